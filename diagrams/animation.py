@@ -1,4 +1,4 @@
-"""The walking robot in pictures: a replay page, filmed in a headless browser.
+"""Pictures and films of a walking robot, from its replay page in a headless browser.
 
     tetra-drake replay RUN|GAIT --out replay.html
     python diagrams/animation.py replay.html walking.gif walking.png
@@ -30,19 +30,19 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 LIMITS = {".gif": 750_000, ".png": 90_000}
-"""Sizes of files in bytes, for which pictures become as narrow as they must."""
+"""Largest sizes of files in bytes. Pictures become narrower to meet them."""
 
 GROUND_COLOURS = {".gif": 8, ".png": 100}
-"""Number of colours that a picture has beside the robot's."""
+"""Number of colours of a picture in addition to the robot's colours."""
 
 GREYS = 8
 """Number of greys of a picture."""
 
 ASPECTS = {".gif": 16 / 9, ".png": 2.8}
-"""Width over height of a picture."""
+"""Ratio of width to height of a picture."""
 
 WIDTHS = {".gif": range(560, 239, -40), ".png": range(800, 239, -80)}
-"""Pixels."""
+"""Width in pixels."""
 
 SUPERSAMPLING = 2
 START, END, STEP = 4.0, 10.0, 0.2  # s of the motion: of the frames, between frames
@@ -54,7 +54,7 @@ _SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 def find_browser() -> str | None:
-    """The path of an installed Chromium or Chrome."""
+    """Path of an installed Chromium or Chrome."""
     return next((path for path in map(shutil.which, _NAMES) if path), None)
 
 
@@ -81,8 +81,8 @@ def wait_until_loaded(page: Page) -> None:
 
 
 def do(page: Page, call: str, *arguments: object) -> None:
-    """Calls one of the page's functions (see film.js), such as "show", and waits until the result
-    is drawn."""
+    """Calls a function of the page (see film.js), such as "show", and waits until the page is
+    drawn."""
     page.evaluate(
         """async ([call, given]) => {
             film[call](...given);
@@ -95,7 +95,7 @@ def do(page: Page, call: str, *arguments: object) -> None:
 
 
 def shot(page: Page) -> Image.Image:
-    """What the page shows."""
+    """Picture of the page as it is."""
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
@@ -111,13 +111,13 @@ def shots(page: Page, times: Iterable[float]) -> list[Image.Image]:
 
 
 def still(page: Page, times: Sequence[float]) -> Image.Image:
-    """Picture of the robot at all these times (s) of the motion."""
+    """One picture of the robot at several times (s) of the motion."""
     do(page, "still", list(times))
     return shot(page)
 
 
 def save(images: Sequence[Image.Image], path: Path) -> None:
-    """Writes images as a picture or an endless animation, as wide as LIMITS allow."""
+    """Writes images as a picture or as an endless animation. Its width is limited by LIMITS."""
     palette = _palette(images[0], GROUND_COLOURS[path.suffix])
     with whole_file(path) as temporary:
         for width in WIDTHS[path.suffix]:
@@ -136,8 +136,8 @@ def save(images: Sequence[Image.Image], path: Path) -> None:
 
 
 def _palette(image: Image.Image, count: int) -> Image.Image:
-    """The colours of the robot in light and shade, greys for shadows and grid, and `count` of an
-    image."""
+    """Palette of a picture: the robot's colours in light and shade, greys for shadows and grid, and
+    `count` colours of an image."""
     names = ("rear", "lead", "node", "stance", "actuated", "passive")
     robot = np.array([list(bytes.fromhex(COLOURS[name][1:])) for name in names])
     greys = np.repeat(np.linspace(120, 225, GREYS), 3)
@@ -149,7 +149,7 @@ def _palette(image: Image.Image, count: int) -> Image.Image:
 
 
 def make_picture(browser: Browser, replay: Path, file: Path) -> None:
-    """Writes a picture of a replay page, of a kind in LIMITS."""
+    """Writes a picture or film of a replay page. The suffix of the file must be a key of LIMITS."""
     width = WIDTHS[file.suffix][0]
     height = round(width / ASPECTS[file.suffix])
     page = browser.new_page(
@@ -167,7 +167,7 @@ def make_picture(browser: Browser, replay: Path, file: Path) -> None:
 
 
 def main() -> None:
-    """Films a page."""
+    """Runs the script: films a replay page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("replay", metavar="REPLAY.html", type=Path)
     parser.add_argument("files", metavar="FILE.gif|FILE.png", type=Path, nargs="+")

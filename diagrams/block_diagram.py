@@ -1,6 +1,6 @@
-"""The block diagram of a Drake diagram as an SVG file, drawn by Graphviz.
+"""Block diagram of a Drake diagram as an SVG file, drawn by Graphviz.
 
-Drake's own picture shows every port of every system; this one shows the connected ones.
+Drake's own picture shows all ports of all systems. This one shows only connected ports.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tetra_drake.files import write_whole
 _LOOK = """rankdir=LR; ranksep=0.6
 node [shape=record, fontname=Helvetica, fontsize=12, style=filled, fillcolor=white]
 edge [arrowsize=0.7]"""
-_PYTHON = ', fillcolor="#fdf3d8"'  # a system written in Python; those of Drake are white
+_PYTHON = ', fillcolor="#fdf3d8"'  # a system written in Python; Drake's systems are white
 _INPUTS, _OUTPUTS = "diagram inputs", "diagram outputs"
 _EXPORTED = ', style="rounded,filled", color=forestgreen'
 
@@ -79,7 +79,7 @@ def _port(system: System, index: InputPortIndex | OutputPortIndex) -> _Port:
 
 
 def _block(block: str, ports: list[_Port], *, title: str, look: str) -> str:
-    """A record of up to three columns: input ports, title, output ports."""
+    """Label of a Graphviz node: up to three columns with input ports, title, output ports."""
     columns = {"u": "", "title": title, "y": ""}
     for side in ("u", "y"):
         used = [port for port in ports if (port.block, port.side) == (block, side)]

@@ -1,17 +1,18 @@
-"""A Matsuoka oscillator that drives a mass on a spring and feels it: which of them sets the pace?
+"""Entrainment: a Matsuoka oscillator drives a mass on a spring and senses it. Which sets the pace?
 
     python diagrams/entrainment.py
 
-The oscillator pushes the mass with its signal; the mass's displacement x excites the extensor by
-g x and the flexor by -g x. Theory is harmonic balance (K. Matsuoka, Analysis of a neural
-oscillator, Biological Cybernetics 104, 2011): the positive part of a neuron's state passes its
-swing with a factor 0 < K < 1. For the differences d and e of the two u and of the two v, with
-inhibition w between the neurons and h = 2 g gain / stiffness, a swing exp(i omega t) needs
+The oscillator pushes the mass with its signal. The mass's displacement x excites the extensor by
+g x and the flexor by -g x. The theory is harmonic balance (K. Matsuoka, Analysis of a neural
+oscillator, Biological Cybernetics 104, 2011): taking the positive part of a neuron's state
+multiplies its swing by a factor 0 < K < 1. Let d and e be the differences of the two u and of the
+two v, w the inhibition between the neurons, and h = 2 g gain / stiffness. A swing exp(i omega t)
+then needs
 
     (1 + i omega tau_A) d = w K d - beta e + h P K d,    (1 + i omega tau_B) e = K d,
 
-where P = 1 / (1 - r^2 + 2 i zeta r), r = omega / omega_0, is how the mass follows a force. So 1 / K
-is
+where P = 1 / (1 - r^2 + 2 i zeta r), r = omega / omega_0, is the response of the mass to a force.
+So 1 / K is
 
     R(omega) = (w - beta / (1 + i omega tau_B) + h P) / (1 + i omega tau_A),
 
@@ -56,8 +57,8 @@ def own_frequency() -> float:
 
 
 def make_diagram(*, ratio: float, feedback: float) -> Diagram:
-    """The oscillator, a mass with the given ratio of resonance to the oscillator's own frequency,
-    and feedback in 1/m."""
+    """Diagram of the oscillator and the mass. `ratio` is the mass's resonance divided by the
+    oscillator's own frequency; `feedback` is in 1/m."""
     network = Network.of(
         [[0.0, WEIGHT], [WEIGHT, 0.0]], tau_a=TAU_A, tau_b=TAU_B, self_inhibition_weight=BETA
     )
@@ -81,8 +82,8 @@ def make_diagram(*, ratio: float, feedback: float) -> Diagram:
 
 
 def simulated_frequency(*, ratio: float, feedback: float, start: float = 0.0) -> float:
-    """Frequency of the loop over the oscillator's own, long after a start of the mass at some x (m)
-    by simulation."""
+    """Frequency of the loop divided by the oscillator's own, by simulation: long after the start of
+    the mass at a displacement x (m)."""
     diagram = make_diagram(ratio=ratio, feedback=feedback)
     simulator = Simulator(diagram)
     context = simulator.get_context()
@@ -96,8 +97,8 @@ def simulated_frequency(*, ratio: float, feedback: float, start: float = 0.0) ->
 
 
 def balanced_frequencies(*, ratio: float, feedback: float) -> np.ndarray:
-    """All frequencies, over the oscillator's own, at which the loop can oscillate by harmonic
-    balance; ascending."""
+    """Possible frequencies of the loop divided by the oscillator's own, by harmonic balance;
+    ascending."""
     frequency = np.linspace(0.1, 4.0, 50_001)
     s, r = 2j * math.pi * own_frequency() * frequency, frequency / ratio
     follows = 1.0 / (1.0 - r**2 + 2j * DAMPING_RATIO * r)
@@ -108,7 +109,8 @@ def balanced_frequencies(*, ratio: float, feedback: float) -> np.ndarray:
 
 
 def balance_all(feedback: float) -> tuple[np.ndarray, np.ndarray]:
-    """(points,) each: ratios, closer than RATIOS, and all frequencies by harmonic balance."""
+    """Curve of the theory: ratios (points,), denser than RATIOS, and frequencies (points,) by
+    harmonic balance."""
     points = []
     for ratio in np.geomspace(RATIOS[0], RATIOS[-1], 200):
         for frequency in balanced_frequencies(ratio=ratio, feedback=feedback):
@@ -118,7 +120,8 @@ def balance_all(feedback: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def followed(ratios: np.ndarray, frequencies: np.ndarray) -> str:
-    """Range of ratios at which the loop is nearer the mass's resonance than the own frequency."""
+    """Range of ratios for which the loop's frequency is nearer to the mass's resonance than to the
+    oscillator's own frequency."""
     follows = ratios[np.abs(frequencies - ratios) < np.abs(frequencies - 1.0)]
     return f"{follows.min():.2f} to {follows.max():.2f}"
 
@@ -143,7 +146,7 @@ def compare(panel: Axes, feedback: float) -> None:
 
 @common_style()
 def draw() -> Figure:
-    """A panel for each sign of the feedback."""
+    """Draws a panel for each sign of the feedback."""
     figure, axes = make_figure(width_in=7, height_in=3.6, columns=2, sharey=True)
     for panel, feedback in zip(axes[0], (FEEDBACK, -FEEDBACK), strict=True):
         compare(panel, feedback)

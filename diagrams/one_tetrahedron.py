@@ -1,12 +1,12 @@
-"""One tetrahedron on the ground: the diagram of settling_node.py, sliding_tetrahedron.py, and
-tetrahedron_on_incline.py.
+"""One tetrahedron on the ground: the diagram that settling_node.py, sliding_tetrahedron.py and
+tetrahedron_on_incline.py simulate.
 
     ground ──→ plant ──┬──→ state
       ↑                │
       └────────────────┘
 
-It stands on its base triangle, `top` in front and the two bottom nodes behind, which move alike;
-on an incline without start it is turned with the slope.
+The tetrahedron stands on its base triangle: `top` in front, the two bottom nodes behind. The bottom
+nodes move alike. On an incline the tetrahedron is turned with the slope.
 """
 
 from __future__ import annotations
@@ -33,30 +33,31 @@ from tetra_drake.systems import GroundContact
 BASE = BOTTOM_LEFT, BOTTOM_RIGHT, TOP
 LEADING, TRAILING = TOP, BOTTOM_LEFT
 R_WB = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
-"""Turns a tetrahedron as it lies in the robot so that it stands on its base."""
+"""Rotation from the pose in the robot to a tetrahedron that stands on its base."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples at the ends of steps, in SI units; contact nodes in the order of BASE."""
+    """Motion of the tetrahedron: samples at the ends of steps, in SI units. Contact nodes are in
+    the order of BASE."""
 
     times: np.ndarray
-    """(samples,)."""
+    """Times (samples,)."""
     p_WN: np.ndarray
     v_WN: np.ndarray
-    """(samples, 4, 3): positions and velocities of the nodes."""
+    """Positions and velocities of the nodes (samples, 4, 3)."""
     normal_forces: np.ndarray
-    """(samples, 3)."""
+    """Normal forces (samples, 3)."""
     friction_forces: np.ndarray
-    """(samples, 3, 2): along t1 and t2, which are x and y on flat ground."""
+    """Friction forces along t1 and t2 (samples, 3, 2); on flat ground along x and y."""
     modes: np.ndarray
-    """(samples, 3, 3): contact, and friction modes along t1 and t2, as GroundContact has them."""
+    """Modes (samples, 3, 3): contact, and friction modes along t1 and t2; see GroundContact."""
 
 
 def make_standing_tetrahedron(scenario: Scenario) -> Robot:
-    """One tetrahedron of the robot, without cables, with its base on the ground around the origin.
+    """One tetrahedron of the robot without cables. Its base is on the ground around the origin.
 
-    Its body frame is turned with it, which its inertia, the same about all axes, allows.
+    Its body frame is turned, too. The inertia stays the same, because it is equal about all axes.
     """
     row = scenario.robot.blueprint()
     nodes, struts = row.first_node[1], len(STRUTS)
@@ -91,12 +92,12 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
 
 
 def start_axes(structure: Structure) -> np.ndarray:
-    """(3, 3): the tangents t1 and t2 and the normal of the ground at the start, as rows."""
+    """Tangents t1 and t2 and normal of the ground at the start, as rows (3, 3)."""
     return RotationMatrix(Quaternion(structure.q_WB[0])).matrix().T
 
 
 def make_diagram(scenario: Scenario) -> Diagram:
-    """The tetrahedron and the ground under it, with logs of their outputs."""
+    """Diagram of the tetrahedron and the ground, with logs of their outputs."""
     tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
@@ -117,8 +118,8 @@ def make_diagram(scenario: Scenario) -> Diagram:
 def let_go(
     scenario: Scenario, *, height: float, velocity: Sequence[float], duration: float
 ) -> Samples:
-    """Simulates the tetrahedron from `height` (m) of its base over the ground and `velocity` (3,)
-    in m/s along t1, t2 and the ground's normal."""
+    """Simulates the tetrahedron. It starts with its base at `height` (m) above the ground, with a
+    `velocity` (3,) in m/s along t1, t2 and the ground's normal."""
     tetrahedron = make_standing_tetrahedron(scenario).structure
     diagram = make_diagram(scenario)
     simulator = Simulator(diagram)

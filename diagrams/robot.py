@@ -1,4 +1,4 @@
-"""The robot: build its diagram, simulate one gait, write a page on which it walks.
+"""Diagram of the robot: builds it, simulates one gait, writes a page that shows the motion.
 
     python diagrams/robot.py [GAIT.json]
 
@@ -15,8 +15,8 @@ ground    normal force and friction at 11 nodes; contact and stiction are discre
 plant     five tetrahedra, free bodies without joints and without contact geometry
 
 The wiring is tetra_drake/systems/diagram.py. Writes robot.svg, the block diagram, and robot.html,
-the page. `tetra-drake simulate` takes longer steps, which it lets end where a node is predicted to
-touch the ground or to break free.
+the page. `tetra-drake simulate` takes longer steps. They end at predicted mode changes, where a
+node touches the ground or breaks free.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = DIA
     diagram = MakeTensegrityDiagram(robot, gait)
     save_block_diagram(diagram, out / "robot.svg")
 
-    # Contact and stiction change where a step ends, so no step may be long.
+    # Contact and stiction change at the end of a step, so steps must be short.
     simulator, max_step = Simulator(diagram), 0.001
     ResetIntegratorFromFlags(simulator, "runge_kutta3", max_step)
     sampler = Sampler(diagram, sample_times(duration, 0.01), max_step=max_step)

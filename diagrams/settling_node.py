@@ -2,11 +2,12 @@
 
     python diagrams/settling_node.py
 
-The diagram is that of one_tetrahedron.py. Three nodes share the weight and move alike.
+The diagram is made by one_tetrahedron.py. Three nodes share the weight and move alike.
 
-An impact at the low speed v has the restitution e = 1 - alpha v (thesis Eq. 2), which leaves weight
-out. Here weight alone presses the nodes 0.0006 in into the ground, four times as deep as the
-impact would, and they never leave it again. So the impact is repeated without gravity.
+An impact at a low speed v has the restitution e = 1 - alpha v (thesis Eq. 2), if weight is
+neglected. Here the weight alone presses the nodes 0.0006 in into the ground, four times deeper than
+the impact. The nodes never leave the ground again. Therefore the impact is repeated without
+gravity.
 """
 
 from __future__ import annotations
@@ -30,20 +31,21 @@ DURATION = 0.04  # s
 
 
 def settle(scenario: Scenario) -> Samples:
-    """A fall from rest that meets the ground at IMPACT_SPEED."""
+    """Simulates a fall from rest. It reaches the ground with IMPACT_SPEED."""
     height = IMPACT_SPEED**2 / (2.0 * scenario.robot.gravity)
     return let_go(scenario, height=height, velocity=[0.0, 0.0, 0.0], duration=DURATION)
 
 
 def bounce(scenario: Scenario, *, speed: float = IMPACT_SPEED) -> Samples:
-    """An impact at `speed` (m/s) without gravity, 0.3 ms after the start."""
+    """Simulates an impact at `speed` (m/s) without gravity, 0.3 ms after the start."""
     weightless = scenario.with_changes({"robot.gravity": 0.0})
     velocity = [0.0, 0.0, -speed]
     return let_go(weightless, height=3e-4 * speed, velocity=velocity, duration=DURATION)
 
 
 def contact_speeds(motion: Samples) -> tuple[float, float]:
-    """Speeds (m/s) at which a node first meets the ground and leaves it; NaN if it stays."""
+    """Speeds (m/s) of a node when it first touches the ground, and when it leaves it. The second is
+    NaN if it never leaves."""
     height, rate = motion.p_WN[:, TRAILING, 2], motion.v_WN[:, TRAILING, 2]
     first = int(np.argmax(height <= 0.0))
     above = np.flatnonzero(height[first:] > 0.0)
@@ -51,13 +53,13 @@ def contact_speeds(motion: Samples) -> tuple[float, float]:
 
 
 def velocity_correction(scenario: Scenario) -> float:
-    """alpha of Eq. 2 (s/m): the ground's damping is 3/2 alpha times its stiffness."""
+    """Coefficient alpha of Eq. 2 (s/m): the ground's damping is 3/2 alpha times its stiffness."""
     return scenario.ground.damping / (1.5 * scenario.ground.stiffness)
 
 
 @common_style()
 def draw(settling: Samples, bouncing: Samples) -> Figure:
-    """Height and normal force of one node over time."""
+    """Draws height and normal force of one node over time."""
     figure, axes = make_figure(width_in=7.0, height_in=5.0, rows=2, sharex=True)
     above, below = axes[:, 0]
     for motion, label in ((settling, "settling under its weight"), (bouncing, "without weight")):

@@ -2,16 +2,16 @@
 
     python diagrams/single_oscillator.py
 
-An oscillator is two neurons, extensor and flexor, that inhibit each other with the weight w (thesis
-Eq. 7). While both fire, their equations are linear; the differences d of the two u and e of the
-two v follow
+An oscillator is a pair of neurons, extensor and flexor. They inhibit each other with the weight w
+(thesis Eq. 7). While both fire, their equations are linear. The differences d of the two u, and e
+of the two v, follow
 
     tau_A d' = (w - 1) d - beta e,    tau_B e' = d - e.
 
 This oscillates at sqrt((beta + 1 - w) / (tau_A tau_B) - D^2) rad/s with the damping
-D = (1 / tau_B - (w - 1) / tau_A) / 2. The thesis's choice, w = 1.5 and tau_B = 2 tau_A, is just
-where D vanishes: a sine of frequency 1 / (2 pi tau_A). A smaller ratio tau_B / tau_A damps it
-(thesis Figure 9); a greater ratio or weight lets it grow until neurons fall silent (Figure 10).
+D = (1 / tau_B - (w - 1) / tau_A) / 2. With the thesis's choice, w = 1.5 and tau_B = 2 tau_A, D is
+zero: the signal is a sine of frequency 1 / (2 pi tau_A). A smaller ratio tau_B / tau_A damps it
+(thesis Figure 9). With a greater ratio or weight it grows until neurons fall silent (Figure 10).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from tetra_drake.systems import MatsuokaCpg
 
 TAU_A = 0.3  # s, as in the thesis's figures
 WEIGHT, RATIO = 1.5, 2.0  # w and tau_B / tau_A, the thesis's choice
-WEIGHTS, RATIOS = (WEIGHT, 2.0), (1.5, RATIO, 3.0)  # those it compares
+WEIGHTS, RATIOS = (WEIGHT, 2.0), (1.5, RATIO, 3.0)  # the thesis's other values
 THESIS_FREQUENCY = 0.7  # Hz
 TRANSIENT = 5.0  # s
 
@@ -45,7 +45,7 @@ TRANSIENT = 5.0  # s
 def make_diagram(
     scenario: Scenario, *, weight: float = WEIGHT, tau_a: float = TAU_A, ratio: float = RATIO
 ) -> Diagram:
-    """A network of one oscillator, and a log of its signal."""
+    """Diagram of a network with one oscillator, and a log of its signal."""
     cpg = scenario.cpg
     network = Network.of(
         [[0.0, weight], [weight, 0.0]],
@@ -68,7 +68,7 @@ def make_diagram(
 
 
 def simulate(diagram: Diagram, duration: float = 15.0) -> tuple[np.ndarray, np.ndarray]:
-    """Times (samples,) in s and signal (samples,) in N."""
+    """Simulated signal: times (samples,) in s and signal (samples,) in N."""
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.01).set_target_accuracy(1e-6)
     simulator.AdvanceTo(duration)
@@ -79,7 +79,7 @@ def simulate(diagram: Diagram, duration: float = 15.0) -> tuple[np.ndarray, np.n
 def linear_frequency(
     scenario: Scenario, *, weight: float = WEIGHT, tau_a: float = TAU_A, ratio: float = RATIO
 ) -> float:
-    """Frequency in Hz while both neurons fire."""
+    """Theoretical frequency in Hz while both neurons fire."""
     tau_b = ratio * tau_a
     damping = (1.0 / tau_b - (weight - 1.0) / tau_a) / 2.0
     stiffness = (scenario.cpg.self_inhibition_weight + 1.0 - weight) / (tau_a * tau_b)
@@ -95,7 +95,7 @@ def frequency_and_swing(times: np.ndarray, signal: np.ndarray) -> tuple[float, f
 
 @common_style()
 def draw(diagrams: dict[str, Diagram], title: str) -> Figure:
-    """A panel for the signal of each diagram."""
+    """Draws a panel for the signal of each diagram."""
     rows = len(diagrams)
     height = 0.8 + 1.5 * rows
     figure, axes = make_figure(width_in=7, height_in=height, rows=rows, sharex=True, sharey=True)

@@ -2,12 +2,12 @@
 
     python diagrams/sliding_tetrahedron.py
 
-The diagram is that of one_tetrahedron.py. The tetrahedron starts at 30 in/s. Stiction brakes it to
-1 in/s within a millisecond and tips it, so that its two trailing nodes lift off. The leading node
-reaches the stiction range, 0.004 in, after 0.9 ms and breaks free. It slips for 49 ms, faster
-and faster, as the tetrahedron falls back: friction in slip is three hundred times weaker than in
-stick. Where the trailing nodes land, they stick, which turns the leading node round, so that it
-sticks again. Below 23 in/s no node breaks free.
+The diagram is made by one_tetrahedron.py. The tetrahedron starts at 30 in/s. Stiction brakes it to
+1 in/s within a millisecond and tips it. So its two trailing nodes lift off. The leading node
+reaches the stiction range, 0.004 in, after 0.9 ms and breaks free. It slips for 49 ms, faster and
+faster, while the tetrahedron falls back: friction in slip is three hundred times weaker than in
+stick. The trailing nodes stick when they land. Then the leading node reverses its motion and sticks
+again. Below 23 in/s no node breaks free.
 """
 
 from __future__ import annotations
@@ -30,29 +30,30 @@ INITIAL_SPEED = 30.0 * INCH  # m/s
 
 
 def slide(scenario: Scenario, *, speed: float = INITIAL_SPEED, duration: float = 0.1) -> Samples:
-    """A start at the forward `speed` (m/s) from where the ground bears the weight."""
+    """Simulates a start at a forward `speed` (m/s), at the height where the ground bears the
+    weight."""
     depth = weight(scenario) / (len(BASE) * scenario.ground.stiffness)
     return let_go(scenario, height=-depth, velocity=[speed, 0.0, 0.0], duration=duration)
 
 
 def slips(motion: Samples, node: int) -> list[tuple[float, float]]:
-    """Intervals (s) in which a contact node slips along x."""
+    """Intervals (s) during which a contact node slips along x."""
     return intervals(motion.times, motion.modes[:, node, 1] != 0.0)
 
 
 def flights(motion: Samples, node: int) -> list[tuple[float, float]]:
-    """Intervals (s) in which a contact node is off the ground."""
+    """Intervals (s) during which a contact node is off the ground."""
     return intervals(motion.times, motion.modes[:, node, 0] == 0.0)
 
 
 def travel(motion: Samples, node: int) -> np.ndarray:
-    """(samples,): displacement of a node along x in m."""
+    """Displacement of a node along x (samples,), in m."""
     return motion.p_WN[:, node, 0] - motion.p_WN[0, node, 0]
 
 
 @common_style()
 def draw(motion: Samples, *, stiction_range: float) -> Figure:
-    """Velocity, friction and travel of two nodes: at the start, and all the way to rest."""
+    """Draws velocity, friction and displacement of two nodes: at the start, and until rest."""
     figure, axes = make_figure(width_in=8.0, height_in=6.5, rows=3, columns=2, sharex="col")
     milliseconds = 1e3 * motion.times
     for node, label in ((LEADING, "leading node"), (TRAILING, "trailing node")):

@@ -2,15 +2,18 @@
 
     python diagrams/tetrahedron_on_incline.py
 
-The diagram is that of one_tetrahedron.py, the friction `!Coulomb`, and gravity along World's -z. On
-a slope whose tangent is below the coefficient, bristles as stiff as the ground hold it: the nodes
-move by what stretches the bristles. Without stiffness, friction at rest is damping alone, and it
-creeps: the known limit of regularised friction. On a steeper slope it slides at
-g (sin - mu cos), and thrown uphill it decelerates by g (sin + mu cos), where mu is the kinetic
-coefficient.
+The diagram is made by one_tetrahedron.py, with the friction `!Coulomb`. Four motions are simulated:
 
-The uphill node carries least, so it slips first: all three hold up to
-tan = mu / (1 + mu / sqrt(2)), mu static; 23 degrees here.
+- It holds on a slope with a tangent below the coefficient, if the bristles are as stiff as the
+  ground. The nodes move by the stretch of the bristles.
+- It creeps on the same slope without stiffness. Friction at rest is then only damping, the known
+  limit of regularised friction.
+- It slides on a steeper slope, with the acceleration g (sin - mu cos); mu is the kinetic
+  coefficient.
+- Thrown uphill, it decelerates by g (sin + mu cos) and stops.
+
+The uphill node bears the least weight, so it slips first. All three nodes hold up to
+tan = mu / (1 + mu / sqrt(2)) with the static mu; 23 degrees here.
 """
 
 from __future__ import annotations
@@ -45,14 +48,14 @@ OURS: Any = [
 
 @dataclass(frozen=True)
 class Motion(Samples):
-    """Samples with numbers along the slope: arrays (samples,), positive uphill."""
+    """Motion along the slope: arrays (samples,), positive uphill."""
 
     travel: np.ndarray  # displacement of the base, m
     velocity: np.ndarray  # of the base, m/s
     friction_ratio: np.ndarray  # friction over normal force, of all nodes together
 
     def stopping(self) -> tuple[float, float]:
-        """When (s) a tetrahedron thrown uphill stops, and how far up (m)."""
+        """Time (s) and displacement (m) at the stop of a tetrahedron thrown uphill."""
         first = int(np.argmax(self.velocity <= 0.0))
         return float(self.times[first]), float(self.travel[first])
 
@@ -66,7 +69,8 @@ def on_incline(slope: float, *, stiffness: float = STIFFNESS) -> Scenario:
 
 
 def simulate(scenario: Scenario, *, speed: float = 0.0, duration: float) -> Motion:
-    """A start at `speed` (m/s) up the slope from where the ground bears the weight."""
+    """Simulates a start at `speed` (m/s) up the slope, at the height where the ground bears the
+    weight."""
     depth = parts_of_weight(scenario)[1] / (len(BASE) * scenario.ground.stiffness)
     samples = let_go(scenario, height=-depth, velocity=[speed, 0.0, 0.0], duration=duration)
     uphill = start_axes(make_standing_tetrahedron(scenario).structure)[0]
@@ -79,11 +83,11 @@ def simulate(scenario: Scenario, *, speed: float = 0.0, duration: float) -> Moti
     )
 
 
-# The analytic answers.
+# Analytic solutions.
 
 
 def parts_of_weight(scenario: Scenario) -> tuple[float, float]:
-    """The weight (N) down the slope and into it."""
+    """Components of the weight (N): down the slope, and into it."""
     assert isinstance(scenario.terrain, Incline)
     slope = scenario.terrain.slope
     return weight(scenario) * math.sin(slope), weight(scenario) * math.cos(slope)
@@ -95,7 +99,7 @@ def deflection(scenario: Scenario) -> float:
 
 
 def creep_speed(scenario: Scenario) -> float:
-    """The speed (m/s) at which damping alone bears the weight."""
+    """Creeping speed (m/s): damping alone bears the weight."""
     return parts_of_weight(scenario)[0] / (len(BASE) * DAMPING)
 
 
@@ -111,7 +115,8 @@ Curves = dict[str, tuple[Motion, np.ndarray]]
 
 @common_style()
 def draw(*, resting: Curves, moving: Curves) -> Figure:
-    """Travel at rest; travel of what moves, and its friction over normal force."""
+    """Draws the displacement of tetrahedra that hold, and displacement and friction / normal force
+    of tetrahedra that move."""
     figure, axes = make_figure(width_in=7.0, height_in=8.0, rows=3)
     rest, way, ratio = axes[:, 0]
     panels = (rest, resting, 1e-3, 1e-3 * INCH), (way, moving, 1.0, INCH)

@@ -44,19 +44,20 @@ SCHEMA = 6
 ANALYSIS = "analysis.json"
 
 TIGHT, MUJOCO = "runge_kutta3, witness", "MuJoCo"
-"""Settings: the Drake diagram in steps of some 0.15 ms, with mode changes localised by witness
-functions; MuJoCo's ground, with a coefficient of 0.5 in place of the reset integrator."""
+"""Settings with other engines: the Drake diagram in steps of about 0.15 ms, with mode changes
+localised by witness functions; and MuJoCo, with a coefficient of friction of 0.5 in place of the
+reset integrator."""
 LAWS = {"reset integrator": "thesis", "Coulomb": "coulomb"}
-"""Settings on flat ground: the compiled engine with the friction of another shipped scenario."""
+"""Settings on flat ground with the compiled engine and the friction of another shipped scenario."""
 
 UNSEEN = range(1001, 1021)
-"""Seeds of random ground on which no gait was evolved."""
+"""Seeds of random ground that were not used in evolution."""
 
 WAYS, DISPLACEMENT = 30, 1e-9
-"""Number of displaced starts of a gait, and displacement of each body there (m)."""
+"""Number of displaced starts of a gait, and displacement (m) of each body."""
 
 SHOWN = ("cost_of_transport", "tension", "clearance")
-"""The metrics of the best gaits that pages show."""
+"""Metrics of the best gaits that are shown on pages."""
 
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
@@ -66,7 +67,7 @@ _COLUMNS = {
     "disturbed": ("gait", "undisturbed", *_MEAN, *_KEPT, "failed", "missed"),
 }
 _NUMBERS = [*SHOWN, "sensitivity_in", "distance_in"]
-"""Columns that may be null in all rows."""
+"""Columns with numbers that may all be null."""
 
 
 @dataclass(frozen=True)
@@ -77,14 +78,15 @@ class Analysis:
     """The fittest gait of each trial. Index: trial. Columns: evaluation, evaluations (of the whole
     trial), fitness, the metrics SHOWN in SI units, and sensitivity_in (see sensitivity())."""
     resimulations: pandas.DataFrame
-    """Fittest gaits on other engines and under other laws of friction: trial, setting, distance_in
-    (NaN where it failed)."""
+    """Fittest gaits with other engines and laws of friction. Columns: trial, setting, distance_in
+    (NaN if the simulation failed)."""
     unseen: pandas.DataFrame
-    """Fittest gaits on random ground of UNSEEN seeds, if the scenario has such ground: trial, seed,
-    distance_in (NaN where it failed), met (are the scenario's requirements met there?)."""
+    """Fittest gaits on random ground with UNSEEN seeds, if the scenario has random ground. Columns:
+    trial, seed, distance_in (NaN if the simulation failed), met (True if the scenario's
+    requirements are met)."""
     disturbed: pandas.DataFrame
-    """Fittest gaits on the compiled engine under draws of the default disturbances, in m; see
-    robustness.by_gait(). Index: trial."""
+    """Fittest gaits in draws of the default disturbances, on the compiled engine; see
+    robustness.by_gait(). Lengths are in m. Index: trial."""
 
     @property
     def best_trial(self) -> int:
@@ -92,7 +94,7 @@ class Analysis:
         return int(self.best_gaits["fitness"].idxmax())
 
     def again(self, trial: int, setting: str) -> float:
-        """Distance (in) of a trial's fittest gait with a setting; NaN without."""
+        """Distance (in) of a trial's fittest gait with a setting; NaN if it was not simulated."""
         rows = self.resimulations.query("trial == @trial and setting == @setting")
         return float(rows["distance_in"].iloc[0]) if len(rows) else math.nan
 
@@ -102,7 +104,7 @@ class Analysis:
 
 
 def load_analysis(directory: Path) -> Analysis:
-    """Reads analysis.json of a run; InputError if it is missing or damaged."""
+    """Reads analysis.json of a run. Raises InputError if it is missing or damaged."""
     path = directory / ANALYSIS
     try:
         raw: Any = json.loads(path.read_text(encoding="utf-8"))
@@ -126,9 +128,9 @@ def load_analysis(directory: Path) -> Analysis:
 
 
 def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = None) -> None:
-    """Simulates what Analysis holds for a run's best gaits and writes analysis.json.
+    """Analyses a run's best gaits (see Analysis) and writes analysis.json.
 
-    `executor` is for all but the draws of disturbances.
+    `executor` is used for all simulations except the draws of disturbances.
     """
     run = load_run(directory)
     scenario = run.scenario
@@ -151,7 +153,7 @@ def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = No
 
 
 def best_gaits(run: Run) -> list[dict[str, Any]]:
-    """The fittest gait of each trial, as in Analysis."""
+    """Table of the fittest gait of each trial; see Analysis."""
     made = {status.number: status.evaluations for status in run.statuses}
     rows = []
     for _, gait in run.best().iterrows():
@@ -163,8 +165,9 @@ def best_gaits(run: Run) -> list[dict[str, Any]]:
 
 
 def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list[float]:
-    """Largest change (in) of each gait's distance on the compiled engine if every body starts
-    DISPLACEMENT away, in WAYS random directions; NaN if one of these simulations fails."""
+    """Sensitivity of each gait to its start: the largest change (in) of its distance on the
+    compiled engine. Every body starts displaced by DISPLACEMENT, in WAYS random directions. NaN if
+    a simulation fails."""
     generator = np.random.default_rng(0)
     directions = generator.normal(size=(WAYS, scenario.robot.body_count, 3))
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
@@ -192,7 +195,7 @@ def resimulate(
     workers: int,
     executor: MakeExecutor | None,
 ) -> list[dict[str, Any]]:
-    """The gaits with every setting, as in Analysis."""
+    """Table of the gaits with every setting; see Analysis."""
     space = ParameterSpace.of(scenario)
     tasks = [Task(space.vector(gait), trial) for trial, gait in gaits.items()]
     rows = []
@@ -210,7 +213,8 @@ def resimulate(
 def on_unseen_ground(
     scenario: Scenario, gaits: Mapping[int, Gait], workers: int
 ) -> list[dict[str, Any]]:
-    """The gaits on random ground of UNSEEN seeds, as in Analysis; none on other ground."""
+    """Table of the gaits on random ground with UNSEEN seeds; see Analysis. Empty if the scenario's
+    ground is not random."""
     if not isinstance(scenario.terrain, Rough):
         return []
     walks = [(trial, seed) for trial in gaits for seed in UNSEEN]
@@ -231,7 +235,7 @@ def on_unseen_ground(
 
 
 def settings_of(scenario: Scenario) -> dict[str, Scenario]:
-    """The scenario with each setting, by names; without those that cannot simulate it."""
+    """The scenario with each setting, by name. Settings that cannot simulate it are left out."""
     tight = Drake(scheme="runge_kutta3", accuracy=1e-3, max_step=0.002, mode_changes="witness")
     changes: dict[str, dict[str, Any]] = {TIGHT: {"engine": tight}, MUJOCO: {"engine": "!Mujoco"}}
     if isinstance(scenario.friction, Coulomb):

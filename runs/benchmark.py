@@ -2,16 +2,17 @@
 
     python runs/benchmark.py [TABLE ...]
 
-Prints tables in Markdown, as in tetra_drake/engines/README.md, of random gaits of seeds 0, 1 ...
-on the scenario `thesis`; without names, all but `integrators`:
+Prints tables in Markdown for tetra_drake/engines/README.md. The gaits are random gaits with seeds
+0, 1 ... on the scenario `thesis`. Without names, all tables except `integrators` are printed:
 
     engines        speed and error of the engines
-    integrators    the same for settings of the diagram; takes longest
+    integrators    speed and error for settings of the diagram; takes longest
     batches        speed of the compiled engine with many gaits at a time
     grounds        speed by ground and network
 
-Errors are of distances, against converged runs of the compiled engine (MuJoCo's against its own,
-as its ground differs). Times are meaningful on an idle machine only.
+Errors are differences of distances from converged simulations of the compiled engine. For MuJoCo,
+with its different ground, they are from converged simulations of MuJoCo. Times are only meaningful
+on an idle machine.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from tetra_drake.scenario.scenario import Scenario
 GAITS = 12  # for each engine
 BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time
 GROUND_BATCH = 30  # gaits at a time on each ground
-ROUNDS = 3  # measurements, of which the medians count
+ROUNDS = 3  # measurements; their medians count
 
 ENGINES = {
     "engines": ["!Drake {}", "!Compiled {}", "!Mujoco {}", "!Mujoco {step: 1 ms}"],
@@ -51,28 +52,28 @@ ENGINES = {
         "!Drake {scheme: runge_kutta3, accuracy: 0.001, max_step: 2 ms, mode_changes: witness}",
     ],
 }
-"""Engines of a table, as a scenario has them."""
+"""Engines of a table, written as in a scenario."""
 
 CONVERGED = "!Compiled {tolerance: 0.001 mm/s, max_step: 0.5 ms}"
 CONVERGED_MUJOCO = "!Mujoco {step: 0.0625 ms}"
 
 
 def with_engine(scenario: Scenario, engine: str) -> Scenario:
-    """The scenario with an engine written as in a file, as "!Mujoco {step: 1 ms}"."""
+    """The scenario with an engine written as in a file, such as "!Mujoco {step: 1 ms}"."""
     tag, _, settings = engine.partition(" ")
     values = {f"engine.{key}": value for key, value in yaml.safe_load(settings).items()}
     return scenario.with_changes({"engine": tag} | values)
 
 
 def brief(scenario: Scenario) -> Scenario:
-    """A simulation that only loads and compiles what is measured later."""
+    """Runs a simulation only to load and compile the code before measurements."""
     return scenario.with_changes(
         {"simulation.duration": "0.02 s", "simulation.steady_from": "0.01 s"}
     )
 
 
 def walk(scenario: Scenario, gaits: int, *, cores: int, lanes: bool) -> list[SimulationResult]:
-    """Results of gaits; without `lanes` they walk one after the other."""
+    """Results of gaits. Without `lanes` they are simulated one after the other."""
     drawn = [seeded_gait(scenario, seed) for seed in range(gaits)]
     groups = [drawn] if lanes else [[gait] for gait in drawn]
     results = []
@@ -85,12 +86,12 @@ def walk(scenario: Scenario, gaits: int, *, cores: int, lanes: bool) -> list[Sim
 
 
 def distances_in(results: Sequence[SimulationResult]) -> np.ndarray:
-    """(gaits,): distances in inches."""
+    """Distances of gaits (gaits,) in inches."""
     return np.array([result.metrics.distance_in for result in results])
 
 
 def engines_table(scenario: Scenario, engines: Sequence[str]) -> str:
-    """Speed and error of engines."""
+    """Table of the speed and error of engines."""
     exact_in: dict[str, np.ndarray] = {}
     rows = []
     for engine in engines:
@@ -116,29 +117,29 @@ def engines_table(scenario: Scenario, engines: Sequence[str]) -> str:
 
 
 class Batch(NamedTuple):
-    """Random gaits, of seeds 0, 1 ..., to be simulated at the same time."""
+    """A batch of random gaits, with seeds 0, 1 ..., that are simulated at the same time."""
 
     scenario: Scenario
     gaits: int
     cores: int = 1
 
     def speed(self) -> float:
-        """Times real time, of all gaits together."""
+        """Speed of all gaits together, as a multiple of real time."""
         started = time.perf_counter()
         results = walk(self.scenario, self.gaits, cores=self.cores, lanes=True)
         return sum(result.duration for result in results) / (time.perf_counter() - started)
 
 
 def median_speeds(batches: Sequence[Batch]) -> np.ndarray:
-    """(batches,): medians of rounds in which batches take turns, so that whatever else runs on the
-    machine affects all alike."""
+    """Median speed of each batch (batches,). Batches take turns in several rounds, so that other
+    load on the machine affects all of them equally."""
     for batch in batches:
         batch._replace(scenario=brief(batch.scenario)).speed()
     return np.median([[batch.speed() for batch in batches] for _ in range(ROUNDS)], axis=0)
 
 
 def batches_table(scenario: Scenario) -> str:
-    """Speed of the compiled engine with many gaits at a time, on one core and on all."""
+    """Table of the compiled engine's speed with many gaits at a time, on one core and on all."""
     compiled = with_engine(scenario, "!Compiled {}")
     rows = []
     for cores in sorted({1, available_cores()}):
@@ -150,7 +151,7 @@ def batches_table(scenario: Scenario) -> str:
 
 
 def grounds_table(scenario: Scenario) -> str:
-    """Speed on one core by ground and network."""
+    """Table of the speed on one core by ground and network."""
     rough, senses = load_scenario("rough"), load_scenario("feedback").cpg.feedback
     grounds: dict[str, dict[str, object]] = {
         "the scenario's": {},

@@ -1,11 +1,11 @@
-"""Makes the recorded runs beside this file from nothing.
+"""Makes the recorded runs in the folder of this file from nothing.
 
     python runs/record.py [NAME ...]
 
-Each experiment is evolved and analysed in a folder of out/runs, thinned into a folder here, and its
-best gait shown on a page and, by Chromium, in a picture there; those that README.md shows are
-filmed, too. Interrupted, it goes on; what is done is skipped. All pages share the viewer
-meshcat.js, of one version of Drake. times.json says how long each took.
+Each experiment is evolved and analysed in a folder of out/runs, then thinned into a folder here. A
+page and a picture (made by Chromium) show its best gait. Experiments in README.md are filmed, too.
+After an interruption the script continues; finished experiments are skipped. All pages share the
+viewer meshcat.js of one version of Drake. times.json has the time of each experiment.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES, EXPORTED = "times.json", "lab"
 RATE = 50.0
-"""Hz: samples of exported commands."""
+"""Sampling rate (Hz) of exported commands."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,9 @@ class Experiment:
 
     title: str
     base: str
-    """A shipped scenario."""
+    """Name of a shipped scenario."""
     changes: Mapping[str, Any]
-    """Changes by keys of the scenario, beside its name."""
+    """Changes of the scenario by key, without the name."""
     film: bool = False
     """True if its best gait is filmed, for README.md."""
     exported: bool = False
@@ -75,13 +75,13 @@ class Experiment:
 
 _COMPILED = {"engine": "!Compiled"}
 _SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
-"""Struts do not touch, and cables need not push."""
+"""Requirements: struts do not touch, and cables need not push."""
 
 _WELL_APART = {"require": {"clearance": "0.25 in", "tension": 0.0}}
-"""Struts stay two diameters apart, and cables need not push."""
+"""Requirements: the distance of struts is at least two diameters, and cables need not push."""
 
 _EFFORT = {"require": {"clearance": "0.125 in", "tension": 0.0, "mean_actuator_power": "80 mW"}}
-"""As _SOUND, and no gait has more than this effort."""
+"""Requirements of _SOUND, and a limit for the effort of a gait."""
 
 
 def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, Any]:
@@ -94,7 +94,7 @@ _SHORT, _SETTLED = _by(CmaEs(), 3, 2000), _by(CmaEs(), 10, 2000)
 _STRUCTURE = _by(CmaEs(), 3, 1500) | {
     "simulation.duration": "15 s",
     "simulation.steady_from": "3 s",
-    "require": {"clearance": "8 mm", "tension": 0.0},  # 8 mm: the thickest struts
+    "require": {"clearance": "8 mm", "tension": 0.0},  # 8 mm: the diameter of the thickest struts
 }
 
 EXPERIMENTS = {
@@ -154,13 +154,13 @@ EXPERIMENTS = {
         "the thesis's robot carries motors", "motors", _by(CmaEs(), 3, 1500), exported=True
     ),
 }
-"""Experiments by the names of their folders, in the order of the gallery."""
+"""Experiments by name of the folder, in the order of the gallery."""
 
 
 def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
-    """Makes a run in `scratch` and, thinned, in `out`, from wherever that was left.
+    """Makes a run in `scratch`, and its thinned copy in `out`. Continues unfinished work.
 
-    Raises InputError where `scratch` holds a run of another scenario.
+    Raises InputError if `scratch` holds a run of another scenario.
     """
     made, shown = scratch / name, out / name
     analysis, copy = made / ANALYSIS, shown / ANALYSIS
@@ -169,7 +169,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     with timed(name, "evolution", out):
         resume, progress = (made / MANIFEST).exists(), Display(sys.stdout)
         scenario = experiment.scenario(name)
-        # analyse() simulates the best gaits on the diagram, at tighter settings.
+        # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
     if not analysis.exists():
         with timed(name, "analysis", out):
@@ -185,7 +185,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
 
 
 def make_folder(made: Path, shown: Path) -> None:
-    """Thins a run into the folder `shown`, of which only the page and the pictures stay."""
+    """Thins a run into the folder `shown`. Its old files are deleted, except page and pictures."""
     for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
         shutil.rmtree(old) if old.is_dir() else old.unlink()
     thin(made, shown)
@@ -193,8 +193,8 @@ def make_folder(made: Path, shown: Path) -> None:
 
 @contextlib.contextmanager
 def timed(name: str, stage: str, out: Path) -> Iterator[None]:
-    """Adds what happens inside to TIMES in `out`, even if it is interrupted: wall time, and that of
-    all cores (s)."""
+    """Context manager that adds the times of the block to TIMES in `out`: wall time, and the time
+    of all cores, in s. Also after an interruption."""
     begin, work = time.monotonic(), sum(os.times()[:4])
     try:
         yield
@@ -209,8 +209,8 @@ def timed(name: str, stage: str, out: Path) -> Iterator[None]:
 
 
 def show(directory: Path, *, viewer: Path, film: bool) -> None:
-    """Draws a run's best gait on the compiled engine: the page, the picture, the gait diagram and,
-    if asked for, the film."""
+    """Simulates a run's best gait on the compiled engine. Writes the page, the picture, the gait
+    diagram and, if the experiment is filmed, the film."""
     run = load_run(directory)
     result = simulate(run.scenario.with_changes(_COMPILED), run.best_gait(), record=True)
     result.save_replay(directory / REPLAY, viewer=viewer)
@@ -220,7 +220,8 @@ def show(directory: Path, *, viewer: Path, film: bool) -> None:
 
 
 def take_pictures(page: Path, *pictures: Path) -> None:
-    """Draws the end of a page's motion, or films it, in a browser. Raises CalledProcessError."""
+    """Makes a picture of the end of a page's motion, or a film, in a browser. Raises
+    CalledProcessError."""
     script = HERE.parent / "diagrams" / "animation.py"
     subprocess.run([sys.executable, script, page, *pictures], check=True)
 

@@ -1,9 +1,9 @@
-"""Compares the trials of two recorded runs: which walk farther, and how sure is that?
+"""Comparison of the trials of two recorded runs, with confidence intervals.
 
     python runs/settle.py runs/rough runs/rough-feedback
 
-Prints the means over the trials' best gaits of what analysis.json says of them, and the difference
-of the means with its 95 % interval, by bootstrap over the trials.
+Prints mean numbers of the trials' best gaits, from analysis.json, and the difference of the means
+with its 95 % confidence interval, by bootstrap over the trials.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tetra_drake.scenario.units import INCH
 
 
 def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
-    """Numbers of the trials' best gaits, (trials,) each, by what they are."""
+    """Numbers of the trials' best gaits (trials,), by name."""
     disturbed = analysis.disturbed
     by_name = {
         "distance where it was evolved, in": disturbed["undisturbed"].to_numpy() / INCH,
@@ -41,14 +41,14 @@ def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
 
 
 def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, float, float]:
-    """Mean of `other` (m,) less that of `one` (n,), and its 95 % interval by bootstrap."""
+    """Mean of `other` (m,) minus mean of `one` (n,), and its 95 % interval by bootstrap."""
     generator = np.random.default_rng(0)
     means, other_means = resampled(one, generator), resampled(other, generator)
     return float(other.mean() - one.mean()), *middle(other_means - means)
 
 
 def settled(first: Path, second: Path) -> Table:
-    """The comparison of two runs."""
+    """Text with the comparison of two runs."""
     one, other = (numbers(load_analysis(run)) for run in (first, second))
     rows = []
     for name in one:

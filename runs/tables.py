@@ -1,8 +1,8 @@
-"""The tables of the README beside this file and of those of the recorded runs.
+"""Tables of the README in this folder, and of the READMEs of recorded runs.
 
     python runs/tables.py [FILE ...]
 
-Each table stands in a Markdown file between two lines:
+Each table is in a Markdown file between two lines:
 
     <!-- table NAME: made by runs/tables.py -->
     <!-- end -->
@@ -30,7 +30,7 @@ HERE = Path(__file__).parent
 README = "README.md"
 
 APART = 0.3
-"""in; where the distances on two engines differ by more, a page says so."""
+"""Largest difference (in) of distances on two engines that a page does not mention."""
 
 _TABLE = re.compile(
     r"(?P<begin><!-- table (?P<name>\S+): made by runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
@@ -42,13 +42,13 @@ Runs = Mapping[str, Analysis]
 
 
 def load_all(directory: Path = HERE) -> dict[str, Analysis]:
-    """The recorded runs that are there, in the order of EXPERIMENTS."""
+    """Existing recorded runs, in the order of EXPERIMENTS."""
     there = (name for name in EXPERIMENTS if (directory / name / MANIFEST).exists())
     return {name: load_analysis(directory / name) for name in there}
 
 
 def gallery_table(runs: Runs) -> str:
-    """All runs with the distances of their best gaits."""
+    """Table of all runs with the distances of their best gaits."""
     rows = []
     for name, run in runs.items():
         best = run.best_trial
@@ -63,8 +63,8 @@ def gallery_table(runs: Runs) -> str:
 
 
 def trials_table(run: Analysis) -> str:
-    """The fittest gait of each trial on all engines and on disturbed robots; below, in which trials
-    the engines differ."""
+    """Table of the fittest gait of each trial on all engines and on disturbed robots. Below it, the
+    trials with different distances on the engines."""
     units = {name: customary(UNITS[name]) for name in SHOWN}
     rows, apart = [], []
     for trial, gait in run.best_gaits.iterrows():
@@ -95,8 +95,8 @@ def pages(runs: Runs) -> list[Path]:
 
 
 def made_again(page: Path, runs: Runs) -> str:
-    """The text of a page with its table made again: the gallery, or the trials of the run in whose
-    folder the page is. Raises InputError if it cannot be read."""
+    """Text of a page with a new table: the gallery, or the trials of the page's run. Raises
+    InputError if the page cannot be read."""
 
     def make_table(name: str) -> str:
         tables = {
@@ -109,7 +109,7 @@ def made_again(page: Path, runs: Runs) -> str:
 
 
 def filled(text: str, make_table: Callable[[str], str]) -> str:
-    """The text with every table between its marker lines made again.
+    """A text with new tables between the marker lines.
 
     Raises KeyError for an unknown table, ValueError for one without an end.
     """
@@ -126,7 +126,7 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Makes the tables of the given Markdown files, or of all pages, again."""
+    """Runs the script: writes the tables of the given Markdown files, or of all pages."""
     runs = load_all()
     for page in [Path(name).resolve() for name in arguments] or pages(runs):
         write_whole(page, made_again(page, runs))

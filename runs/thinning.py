@@ -1,12 +1,12 @@
 """A recorded run in a tenth of its size, for publishing.
 
-    manifest.json, scenario.yaml, trial_00/best_gait.json    as they are, and `thinned` in the first
-    trial_00/evaluations.jsonl.xz      genomes and all digits of the gaits that matter alone; of
-                                       others few digits of the metrics by which they are chosen
+    manifest.json, scenario.yaml, trial_00/best_gait.json    unchanged, but the first has `thinned`
+    trial_00/evaluations.jsonl.xz      genomes and all digits of the kept gaits; for other gaits few
+                                       digits of the metrics that select gaits
     trial_00/iterations.jsonl.xz, trial_00/reevaluations.jsonl.xz (without genomes), elites.jsonl.xz
 
-The gaits that matter are the first of each trial, each best so far, the last population, the best
-of each trial, those evaluated again on the diagram and those of a map.
+Kept gaits are: the first of each trial, each gait that was the best so far, the last population,
+the best of each trial, gaits evaluated again on the diagram, and gaits of a map.
 """
 
 from __future__ import annotations
@@ -39,17 +39,19 @@ from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
 
 _DIGITS, _WALL_TIME_DIGITS = 3, 2
-"""Significant ones of numbers of an evaluation without its genome, and of the time of all."""
+"""Significant digits of the numbers of an evaluation without genome, and of all wall times."""
 
 _DECIMALS = 9
-"""Decimals of metrics in SI; less is rounding, such as the drift of a symmetric robot."""
+"""Decimals of metrics in SI. Further digits are rounding errors, such as the drift of a symmetric
+robot."""
 
 _DOWN = decimal.Context(prec=6, rounding=decimal.ROUND_FLOOR)
-"""For the fitness of an evaluation without its genome, so that none becomes a new best."""
+"""Digits of the fitness of an evaluation without genome. With fewer, it could become a new best."""
 
 
 def thin(source: Path, out: Path) -> None:
-    """Writes a run, thinned, into the folder `out`; InputError if one cannot be read or written."""
+    """Writes a thinned copy of a run to the folder `out`. Raises InputError if a file cannot be
+    read or written."""
     run = load_run(source)
     manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": True}
     whole = {(int(trial), int(index)) for trial, index in _that_matter(run)}
@@ -74,7 +76,7 @@ def thin(source: Path, out: Path) -> None:
 
 
 def _that_matter(run: Run) -> set[tuple[Any, Any]]:
-    """Trial and index of the evaluations that keep their genomes."""
+    """Trial and index of the kept gaits; their evaluations keep their genomes."""
     table = run.evaluations
     rises = table[table["fitness"] == table.groupby("trial")["fitness"].cummax()]
     last = [last_population(run, trial) for trial in table["trial"].unique()]
@@ -87,19 +89,19 @@ def last_population(run: Run, trial: int) -> pandas.DataFrame:
     rows = run.evaluations[run.evaluations["trial"] == trial]
     if "placed" not in rows:
         return rows.iloc[:0]
-    # The last row of a place is its member.
+    # The last vector that was placed at an index is the member there.
     rows = rows.dropna(subset="placed").drop_duplicates("placed", keep="last")
     return rows.sort_values("placed")
 
 
 def _that_choose(scenario: Scenario) -> set[str]:
-    """The metrics by which gaits of a run are compared."""
+    """Metrics that select gaits of a run: objective, requirements, and measures of a map."""
     measures = getattr(scenario.optimizer, "measures", ())
     return {"distance", *scenario.objective, *scenario.require, *measures}
 
 
 def _thinned(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any]:
-    """An entry of evaluations that does not matter, with these metrics."""
+    """Entry of a gait that is not kept, with few digits and only these metrics."""
     few = dict(entry) | {"genome": None}
     few["metrics"] = {name: value for name, value in few["metrics"].items() if name in metrics}
     few |= {key: _rounded(few[key], _DIGITS) for key in ("metrics", "draws") if key in few}
@@ -109,7 +111,7 @@ def _thinned(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any
 
 
 def _rounded(value: Any, digits: int) -> Any:
-    """A number, or those in lists and mappings, rounded."""
+    """Rounds a number, or all numbers in lists and mappings."""
     if isinstance(value, float):
         return float(f"{round(value, _DECIMALS) + 0.0:.{digits}g}")
     if isinstance(value, list):
@@ -127,7 +129,7 @@ def _write(
     *,
     trial: int | None = None,
 ) -> None:
-    """Writes lines of a run into its folder `out`, compressed, if there are any."""
+    """Writes lines of a run to the folder `out`, compressed. Writes no file without lines."""
     file = RecordFile.of(out, run.manifest.run, name, trial=trial)
     lines = [json.dumps({**file.owner, **entry}, allow_nan=False) for entry in entries]
     if lines:

@@ -4,9 +4,9 @@
 
     def play(gait: File, *, seed: Seed = 0) -> None:
 
-A keyword-only parameter is an option of its name, another one a positional argument. What has no
-default is required. The help of an option is what its type says, and then what the function's
-docstring says under `Args:`.
+A keyword-only parameter is an option with its name; another parameter is a positional argument. A
+parameter without default is required. The help of an option is the text of its type, then the text
+under `Args:` in the function's docstring.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ BAD_INPUT = 2  # exit status
 
 
 class Option:
-    """What the type of a parameter says about its option, with arguments of argparse's
-    add_argument(). Options of one `group` exclude each other."""
+    """Annotation of a parameter's type: help and other arguments of argparse's add_argument().
+    Options with the same `group` exclude each other."""
 
     def __init__(self, help: str = "", *, group: str = "", **arguments: Any) -> None:
         self.arguments = {"help": help, "group": group, **arguments}
 
 
 class Command(argparse.ArgumentParser):
-    """The parser of a command's options, whose errors are one line."""
+    """Parser of a command's options. Its errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Ends the process."""
+        """Prints an error in one line and ends the process."""
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
     def add_commands(self, functions: Sequence[Callable[..., None]]) -> None:
@@ -61,7 +61,7 @@ class Command(argparse.ArgumentParser):
                 groups[group].add_argument(name, **more)
 
     def call_of(self, argv: Sequence[str] | None) -> Callable[[], None]:
-        """The call of a command's function that arguments ask for."""
+        """The call of a command's function for given arguments."""
         options, unknown = self.parse_known_args(argv)
         values = vars(options)
         function, parser = values.pop("function"), values.pop("parser")
@@ -74,7 +74,7 @@ class Command(argparse.ArgumentParser):
 
 
 def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[str, Any]]:
-    """Name, group, and arguments of add_argument() for a parameter, with more text for its help."""
+    """Name, group, and arguments of add_argument() for a parameter. `text` is added to its help."""
     name, kind, default = parameter.name, parameter.annotation, parameter.default
     more: dict[str, Any] = {"help": "", "group": ""}
     for part in (kind, *typing.get_args(kind)):
@@ -96,7 +96,7 @@ def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[s
 
 
 def integer(least: int) -> Callable[[str], int]:
-    """A reader of integers that are not less than `least`."""
+    """Function that reads an integer of at least `least`."""
 
     def read(text: str) -> int:
         if text.isascii() and text.isdecimal() and int(text) >= least:
@@ -108,7 +108,7 @@ def integer(least: int) -> Callable[[str], int]:
 
 
 def quantity(unit: str) -> Callable[[str], float]:
-    """A reader of quantities, such as "14 in", that converts to an SI unit."""
+    """Function that reads a quantity, such as "14 in", as a number in an SI unit."""
 
     def read(text: str) -> float:
         from tetra_drake.scenario.units import quantity_to_si

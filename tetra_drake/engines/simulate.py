@@ -25,23 +25,27 @@ def simulate(
     viewer: Viewer | None = None,
     steering: SteeringSignal | float | None = None,
 ) -> SimulationResult:
-    """Simulates the scenario's robot walking by a gait, or following a command, for the scenario's
-    duration, on the engine that the scenario names.
+    """Simulates a gait, or a command for actuators, on a scenario.
 
         >>> scenario = td.load_scenario("quick")
         >>> result = td.simulate(scenario, td.seeded_gait(scenario, 80), record=True)
         >>> inches, tension = result.metrics.distance_in, result.trajectory.tension
 
-    `scenario` may be the name of a shipped one, a file or a run, `gait` a gait file or a run, which
-    stands for its best gait. Either a gait or a
-    command is given; of a command see load_command(). `steering`, the turn from -1 to 1, or a
-    function of the time in s that gives it, acts in place of the gait's turn.
+    The same scenario and gait always give the same numbers, bit for bit, except for the wall time.
+    Recording and watching do not change them.
 
-    Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
-    whether or not a trajectory is recorded and whoever watches.
+    Args:
+        scenario: a scenario, its name or file, or a run.
+        gait: a gait, its file, or a run; a run means its best gait.
+        command: a command in place of a gait; see load_command().
+        record: records the trajectory.
+        viewer: observer that shows the robot during the simulation.
+        steering: the turn, -1 to 1, in place of the gait's turn; or a function from time (s) to the
+            turn.
 
-    Raises Diverged or StepBudgetExceeded, which say when and why, and InputError if the gait or
-    the steering does not fit the scenario, or if its engine cannot be watched.
+    Raises:
+        Diverged, StepBudgetExceeded: if the simulation fails; they have the time and the reason.
+        InputError: if an argument does not fit the scenario, or the engine has no viewer.
     """
     scenario = given_scenario(scenario)
     if steering is not None and not callable(steering):
@@ -68,25 +72,29 @@ def simulate_many(
     record: bool = False,
     workers: int | None = None,
 ) -> list[Outcome]:
-    """Simulates many gaits, on one scenario or each on its own, as simulate() does; the results
-    in the order of the gaits, for one that fails its Diverged or StepBudgetExceeded.
+    """Simulates many gaits, on one scenario or each gait on its own scenario.
 
         >>> scenario = td.load_scenario("quick")
         >>> outcomes = td.simulate_many(scenario, [td.seeded_gait(scenario, i) for i in range(3)])
         >>> [outcome.name for outcome in outcomes]
         ['random gait 0', 'random gait 1', 'random gait 2']
 
-    Results and failures know their scenario and gait.
+    Returns a result for each gait, in the order of the gaits. For a simulation that fails, the list
+    has its Diverged or StepBudgetExceeded. Results and failures have scenario and gait.
 
-    On the compiled engine, `workers` threads (one per core by default) simulate several gaits side
-    by side in the registers of each core: the same numbers, bit for bit, several times as fast.
-    Scenarios may differ; those with the same bodies, cables, `robot.cables.slack` and kind
-    of signals share a core.
+    The compiled engine simulates several gaits side by side in the registers of each core. The
+    numbers are the same, bit for bit, and it is several times faster. Scenarios with the same
+    structure and kinds of laws can share a core. MuJoCo simulates one gait per thread. The Drake
+    diagram, or a mixture of engines, simulates one gait after another.
 
-    On the engine `mujoco`, each of `workers` threads simulates one gait at a time. On the diagram,
-    or if the scenarios name several engines, one gait is simulated after another.
+    Args:
+        scenario: a scenario for all gaits, or a scenario for each gait.
+        gaits: gaits, files or runs.
+        record: records the trajectories.
+        workers: number of threads; one per core by default.
 
-    Raises InputError if there is not one scenario or as many as gaits, or if a gait does not fit.
+    Raises:
+        InputError: if the numbers of scenarios and gaits differ, or a gait does not fit.
     """
     if isinstance(scenario, Sequence) and not isinstance(scenario, str):
         scenarios = [given_scenario(each) for each in scenario]

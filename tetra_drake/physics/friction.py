@@ -20,11 +20,11 @@ depending on the sign of u_f. The component u_l is sideways; a_l is `lateral`. A
 s(u) > static F_N if it moves outward. It sticks again, with x = 0, at s(c v) <= kinetic F_N. With k
 = 0 and static = kinetic the law has no memory: it is MuJoCo's soft friction.
 
-A node on the ground sticks or slips. Its *mode* is STICK, or the direction in which it broke free:
-+1 or -1 along each tangent for the reset integrator, a unit vector for Coulomb friction. A node
-that sticks may creep, because its bristle bends. Modes are constant within a step of an integrator,
-so forces are smooth there. Modes change at the end of a step. With a law without stiction, nodes
-always stick.
+A node on the ground sticks or slips. Its *mode* is STICK, or the direction of its slip when it
+broke free: +1 or -1 along each tangent for the reset integrator, a unit vector for Coulomb
+friction. A node that sticks may creep, because its bristle bends. Modes are constant within a step
+of an integrator, so forces are smooth there. Modes change at the end of a step. With a law without
+stiction, nodes always stick.
 
 Both laws have the same functions of a Slide: force, damping, stuck, next mode, margin, and time to
 the next change. The functions in the last section choose the law of the ground. A further law needs

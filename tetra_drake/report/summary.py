@@ -27,10 +27,10 @@ _TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robu
 _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
     "kept": "draws that cost at most a tenth"
 }
-"""What a number is."""
+"""Notes on numbers that are no metrics."""
 
 _NOTHING = 5e-4
-"""A table has no row for numbers that are all smaller, in the units in which it shows them."""
+"""Threshold for a row of a table: a row is left out if all its numbers, as shown, are smaller."""
 
 
 def metrics_table(

@@ -23,11 +23,10 @@ KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
-    """A shipped structure by its name, or that of a structure file or a file of NTRT by its path.
+    """Reads a structure: a shipped one by name, or a structure file or file of NTRT by path.
 
-    unit: unit of length of coordinates without one, such as "dm"; a file of NTRT needs it.
-
-    Raises InputError that names file and key.
+    `unit` is the unit of length of a file of NTRT, such as "dm". Raises InputError that names file
+    and key.
     """
     file = structure_file(str(name_or_file), Path())
     if not os.path.exists(file):
