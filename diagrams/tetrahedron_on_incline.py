@@ -110,7 +110,7 @@ def acceleration(scenario: Scenario, *, way: float) -> float:
 
 
 Curves = dict[str, tuple[Motion, np.ndarray]]
-"""Motions by label, each with its travel (m) by theory."""
+"""Motions by label, each with its theoretical displacement (m)."""
 
 
 @common_style()

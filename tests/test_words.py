@@ -24,9 +24,9 @@ def texts(file: Path) -> Iterator[tuple[int, str]]:
             if token.type == tokenize.COMMENT:
                 yield token.start[0], token.string
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            if isinstance(node.value.value, str):
-                yield node.lineno, node.value.value
+        value = getattr(node.value, "value", None) if isinstance(node, ast.Expr) else None
+        if isinstance(value, str):
+            yield node.lineno, value
 
 
 def found(file: Path) -> Iterator[str]:

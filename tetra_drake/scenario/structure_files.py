@@ -25,8 +25,8 @@ KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
     """Reads a structure: a shipped one by name, or a structure file or file of NTRT by path.
 
-    `unit` is the unit of length of a file of NTRT, such as "dm". Raises InputError that names file
-    and key.
+    `unit`, such as "dm", is the unit of coordinates without a unit. A file of NTRT needs it. Raises
+    InputError that names file and key.
     """
     file = structure_file(str(name_or_file), Path())
     if not os.path.exists(file):
