@@ -157,7 +157,7 @@ def _simulate(
 
 
 def _scenario_of_command(scenario: str | None, command: Path, engine: str | None) -> Scenario:
-    """The given scenario, or the one beside the command, or the thesis's."""
+    """The given scenario; else the scenario in the command's folder; else the scenario thesis."""
     from tetra_drake.prototype.command_file import scenario_beside
     from tetra_drake.scenario.load import load_scenario
 
@@ -179,9 +179,9 @@ def _export(
 ) -> None:
     """Write a gait as commands for the actuators of a prototype.
 
-    Simulates a gait and writes command.csv (what each actuator is to do), expected.csv (positions
-    of the nodes), limits.csv (the load on each actuator), scenario.yaml and README.md. Prints
-    whether the scenario's actuators can play it, and how far the robot goes by these commands.
+    Simulates a gait and writes command.csv (setpoints of each actuator), expected.csv (positions of
+    the nodes), limits.csv (the load on each actuator), scenario.yaml and README.md. Prints whether
+    the scenario's actuators can follow these commands, and how far the robot walks with them.
 
     Args:
         scenario: (default: the scenario of the gait's run; thesis for a gait in no run)
@@ -279,8 +279,8 @@ def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: 
     """Write a page that shows a gait in a browser.
 
     Writes one HTML page (1.2 MB) that shows the robot walking, in any browser, without server or
-    network: from the trajectory that `simulate` recorded, or by simulating a gait file, or the
-    best gait of a run of `evolve` on the run's scenario.
+    network. A folder of `simulate` has the recorded trajectory. A gait file, or the best gait of a
+    run of `evolve`, is simulated.
 
     Args:
         source: a folder written by `simulate`, a gait file, or a folder written by `evolve`
@@ -298,13 +298,13 @@ def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: 
 def _figures(source: RunOrResult, *, out: Folder | None = None) -> None:
     """Draw the figures of a run or a simulation.
 
-    Draws figures as SVG and PNG. For a run of `evolve`, finished or not: into figures/ in its
-    directory, where report.html, replay.html and elites/ are written anew, too. For a folder
-    written by `simulate`: the figures of one gait, into figures/ in it.
+    Draws figures as SVG and PNG into figures/ in the given folder. A run of `evolve` need not be
+    finished; its report.html, replay.html and elites/ are also written again. A folder written by
+    `simulate` gets the figures of one gait.
 
     Args:
         source: a folder written by `evolve` or by `simulate`
-        out: draw into this folder; leave the source as it is
+        out: draw into this folder instead, without changes to the source
 
     Example: tetra-drake figures runs/thesis --out figures
     """
@@ -394,10 +394,10 @@ def _cpg(
 ) -> None:
     """Write the oscillator signals of a gait to a CSV file.
 
-    Writes the signals that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a column
-    per oscillator, zero before the start-up time. A positive signal shortens the cables that its
-    oscillator drives. The file's first lines, which begin with #, say what each column is. Feedback
-    depends on the robot: gaits with it are refused.
+    Writes the signals of the driven cables: time_s, signal_1, signal_2 ..., one per oscillator,
+    zero before the start-up time. A positive signal shortens the cables that its oscillator drives.
+    Comment lines (#) at the top of the file describe the columns. Gaits with feedback are refused,
+    because feedback depends on the robot.
 
     Args:
         scenario: (default: the scenario of the gait's run; thesis for a gait in no run)
@@ -421,15 +421,15 @@ def _structure(
     out: File | None = None,
     mjcf: File | None = None,
 ) -> None:
-    """Tell what a structure is, and how it rests.
+    """Analyse a structure and its equilibrium.
 
-    Reads a structure file, or one of NTRT, and finds its rest on flat ground without actuation.
-    Prints bodies, cables, states of self-stress, infinitesimal mechanisms, natural frequencies,
-    tensions and heights.
+    Reads a structure file, or one of NTRT, and computes its equilibrium on flat ground without
+    actuation. Prints bodies, cables, states of self-stress, infinitesimal mechanisms, natural
+    frequencies, tensions and heights.
 
     Args:
         unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
-        out: write an HTML page that shows the structure at rest
+        out: write an HTML page that shows the structure in equilibrium
         mjcf: write a model for MuJoCo, with its tendons
 
     Example: tetra-drake structure six_bar --out six_bar.html

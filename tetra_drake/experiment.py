@@ -48,25 +48,33 @@ def evolve(
         >>> run = td.evolve(scenario, "runs/mine", seed=1, overwrite=True)
         >>> result = td.simulate(scenario, run.best_gait())
 
-    seed: 0 by default. The record depends on scenario, method and seed only.
-    workers: one per core by default; a Dask cluster's are as many as it has.
-    resume: goes on with the run in `out`; then `scenario` may be None, and what is given must be
-        what the run began with: a recorded gait is evaluated again and must get its fitness again.
-    overwrite: replaces the run in `out`, with all that its directory holds.
-    optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
-        (see optimizers.base); by default the scenario's.
-    objective: objective(result) -> float, to be maximised; by default the scenario's fitness. One
-        that reads result.trajectory has the attribute `needs_trajectory = True`.
-    executor: executor(workers) makes a concurrent.futures.Executor, such as mpi4py's
-        MPIPoolExecutor; see also evolution.cluster.dask_cluster(). By default the compiled engine
-        simulates candidates of all trials side by side, as simulate_many() does; others do in
-        worker processes, or one by one where these cannot get an objective, as in a notebook.
-    progress: shown none by default; see evolution.progress.
-    reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another,
-        and simulates the gaits of a map on disturbed robots.
-    report: in the end, writes report.html, replay.html, figures/, elites/ (of a map).
+    Args:
+        scenario: A scenario, its name or its file. May be None with `resume`.
+        out: The new directory.
+        seed: 0 by default. The record depends only on scenario, method and seed.
+        workers: Number of worker processes; one per core by default. A Dask cluster uses all of its
+            workers.
+        resume: Continues the run in `out`. Scenario, seed, optimiser and objective must be the same
+            as before: a recorded gait is evaluated again and must get the recorded fitness.
+        overwrite: Replaces the run in `out` and all other files in that directory.
+        optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
+            (see optimizers.base). By default the scenario gives the optimiser.
+        objective: objective(result) -> float is maximised; by default the scenario's fitness. An
+            objective that reads result.trajectory has the attribute `needs_trajectory = True`.
+        executor: executor(workers) makes a concurrent.futures.Executor, such as mpi4py's
+            MPIPoolExecutor; see also evolution.cluster.dask_cluster(). By default the compiled
+            engine simulates the candidates of all trials together, like simulate_many(). The other
+            engines simulate in worker processes. If worker processes cannot import the objective,
+            for example in a notebook, gaits are simulated one by one.
+        progress: Display of the progress; none by default. See evolution.progress.
+        reevaluate: After the evolution, evaluates the best gaits on the Drake diagram if the engine
+            is another, and simulates the gaits of a map on disturbed robots.
+        report: After the evolution, writes report.html, replay.html, figures/ and, for a map,
+            elites/.
 
-    Raises InputError for what cannot be used, or if a gait ends its worker twice: then resume.
+    Raises:
+        InputError: An argument cannot be used. Also if a gait ends its worker process twice: the
+            run can then be resumed.
     """
     check_guard()
     _check_counts(seed=(seed, 0), workers=(workers, 1))

@@ -1,6 +1,6 @@
 """A first gait: simulate it, read its numbers, watch it, draw it."""
 
-# %% A scenario has every number of the robot and its world; a gait is what its oscillators do.
+# %% A scenario gives the robot and its world. A gait gives the numbers of its oscillators.
 from pathlib import Path
 
 import tetra_drake as td
@@ -11,12 +11,12 @@ gait = td.seeded_gait(scenario, seed=80)  # a random one
 result = td.simulate(scenario, gait, record=True)
 print(result.metrics)
 
-# %% A page for any browser. In a notebook, result.show() shows it.
+# %% An animation for any browser. In a notebook, result.show() shows it.
 result.save_replay("out/first_gait.html")
 
 # %% The trajectory is an xarray dataset in SI units, with names along its axes.
 outer = result.trajectory.tension.sel(cable_group="outer", time=slice(5.0, None))
 print("greatest tension of an outer cable:", f"{outer.max().item():.2f} N")
 
-# %% Which feet are on the ground when, what the oscillators do, how fast the robot is.
+# %% Feet on the ground, signals of the oscillators and speed of the robot over time.
 gait_diagram(result).savefig(Path(__file__).with_suffix(".png"), dpi=120)

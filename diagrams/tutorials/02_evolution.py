@@ -1,6 +1,6 @@
 """Evolution: gaits that walk far, found by CMA-ES on the compiled engine in some seconds."""
 
-# %% What to search for stands in the scenario, changed here from Python.
+# %% The scenario has the settings of the search. They are changed here from Python.
 from pathlib import Path
 
 import tetra_drake as td
@@ -16,7 +16,7 @@ scenario = td.load_scenario("coulomb").with_changes(
     }
 )
 
-# %% The folder records every evaluation. With resume=True, an interrupted run goes on.
+# %% The folder records every evaluation. With resume=True, an interrupted run continues.
 run = td.evolve(scenario, "out/evolution", overwrite=True, reevaluate=False, report=False)
 print(run)
 
@@ -27,5 +27,5 @@ for gait in run.gaits():
 diagram = td.simulate(scenario.with_changes({"engine": "!Drake"}), run.best_gait())
 print(f"the best on the diagram: {diagram.metrics.distance_in:.2f} in")
 
-# %% How the trials got there.
+# %% Fitness over the evaluations of each trial.
 fitness_of_trials(run).savefig(Path(__file__).with_suffix(".png"), dpi=120)

@@ -1,6 +1,6 @@
 """An objective of one's own: far, with little power."""
 
-# %% An objective is a function of a result, to be maximised.
+# %% An objective is a function of a result. The search maximises it.
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -23,7 +23,7 @@ def far_and_frugal(result: SimulationResult) -> float:
     return result.metrics.distance_in - 100.0 * result.metrics.mean_actuator_power
 
 
-# %% Two searches, by the scenario's own objective and by this one, and all their gaits.
+# %% Two searches with all their gaits: one with the scenario's objective, one with this objective.
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 axes = figure.subplots()
 for name, objective in {"distance": None, "distance and power": far_and_frugal}.items():

@@ -1,6 +1,6 @@
 """A structure of one's own: a prism of four struts, from its file to a gait."""
 
-# %% The file beside this script lists nodes, struts, cables, and which cables oscillators drive.
+# %% The file beside this script lists nodes, struts, cables and the driven cables.
 from pathlib import Path
 
 import tetra_drake as td
@@ -18,7 +18,7 @@ scenario = td.load_scenario("prism").with_changes(
 )
 print(scenario)
 
-# %% At rest: does every cable pull?
+# %% In equilibrium: does every cable pull?
 still = scenario.with_changes({"cpg.gain": "0 lbf"})
 rest = td.simulate(still, td.seeded_gait(still))
 print(f"least tension of a cable: {rest.metrics.tension:.2f} N")

@@ -22,7 +22,7 @@ grounds = {
 scenarios = [flat.with_changes({"name": name, **changes}) for name, changes in grounds.items()]
 results = [td.simulate(scenario, run.best_gait(), record=True) for scenario in scenarios]
 
-# %% How far it walks on each, over time.
+# %% Distance over time on each kind of ground.
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 axes = figure.subplots()
 for result in results:

@@ -1,6 +1,6 @@
 """Feedback: oscillators that sense the stretch of their cables, on rough ground."""
 
-# %% With `cpg.feedback` a gait has a gain for each sense, which evolution sets.
+# %% With `cpg.feedback`, a gait has a gain for each sense. Evolution finds the gains.
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ for name, scenario in {"with feedback": with_feedback, "without": without}.items
     gaits[name] = scenario, run.best_gait()
 print(gaits["with feedback"][1])
 
-# %% Both gaits on ground that they have not seen. One trial each decides nothing: see runs/.
+# %% Both gaits on new ground. One trial of each is too few to conclude: see runs/.
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 axes = figure.subplots()
 for name, (scenario, gait) in gaits.items():

@@ -16,7 +16,7 @@ from tetra_drake.systems import MatsuokaCpg
 network = Network.of([[0.0, 2.0], [2.0, 0.0]], tau_a=0.25, tau_b=0.5, self_inhibition_weight=2.5)
 neurons = MatsuokaCpg(network, tonic=0.5, initial_state=[0.3, 0.3, 0.1, 0.5], gain=1.0)
 
-# %% Signal to torque, angle to feedback.
+# %% Connects the signal to the torque and the angle to the feedback.
 builder = DiagramBuilder()
 oscillator = builder.AddNamedSystem("oscillator", neurons)
 pendulum = builder.AddNamedSystem("pendulum", PendulumPlant())
@@ -29,7 +29,7 @@ motion = LogVectorOutput(pendulum.get_state_output_port(), builder, publish_peri
 simulator = Simulator(builder.Build())
 simulator.AdvanceTo(20.0)
 
-# %% The oscillator, slower alone, finds the rhythm of the pendulum and pumps it up.
+# %% The oscillator adopts the rhythm of the pendulum, which is faster than its own.
 figure = Figure(figsize=(7.0, 3.0), layout="constrained")
 axes = figure.subplots()
 for name, sink, unit in (("torque", torque, "N m"), ("angle", motion, "rad")):

@@ -1,6 +1,6 @@
 """Ten machines: evolution on a Dask cluster, tried on this machine."""
 
-# %% Worker processes import this file, so what starts them stands below `if __name__`.
+# %% Worker processes import this file, so the code that starts them is below `if __name__`.
 from pathlib import Path
 
 import tetra_drake as td

@@ -37,12 +37,12 @@ class TrialStatus:
     evaluations: int = 0
     failures: int = 0
     wall_time: float = 0.0
-    """Sum over the evaluations, in s."""
+    """Sum of the wall times of all evaluations, in s."""
     best_fitness: float = -math.inf
     best_distance_in: float = math.nan
     """Distance (in) of the fittest gait; NaN if no gait has a fitness yet."""
     stop: str | None = None
-    """Why the trial ended; None while it goes on."""
+    """Reason for the trial's end; None during the trial."""
 
     def complete(self, line: Mapping[str, Any], *, best_distance_in: float) -> None:
         """Updates the state with a line of iterations.jsonl and the distance of the best gait."""

@@ -78,14 +78,19 @@ class Motion:
 
 
 def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
-    """A trajectory: a motion with the lengths and forces that follow from it.
+    """Makes a trajectory: a motion with the resulting lengths and forces.
 
-    Dimensions: time, body, node, cable, contact, oscillator, axis, horizontal, quaternion. Every
-    variable has a `units` attribute. Coordinates along `node` and `contact`, the nodes that the
-    ground can touch: node_body and contact_body; along `cable`: cable_bodies, the two that it joins
-    ("T1-T2"), cable_group and cable_signal, the oscillator that drives the cable ("" if none);
-    along `oscillator`: oscillator_side (1 left, -1 right, else 0). All of them select, as in
-    tension.sel(cable_bodies="T2-T3").
+    Dimensions: time, body, node, cable, contact, oscillator, axis, horizontal, quaternion. A
+    contact is a node that the ground can touch. Every variable has a `units` attribute. Further
+    coordinates:
+
+    - node_body and contact_body: the body of a node or contact.
+    - cable_bodies: the two bodies that a cable joins, such as "T1-T2".
+    - cable_group and cable_signal: the cable's group, and the oscillator that drives it ("" if
+      none).
+    - oscillator_side: 1 on the left, -1 on the right, 0 in the middle.
+
+    Each coordinate can select, for example tension.sel(cable_bodies="T2-T3").
     """
     import xarray
 

@@ -1,6 +1,6 @@
 """Kinds of actuators: the effect of the oscillators' signals on the cables.
 
-The kernels need numba; they are imported when a law is needed.
+The kernels need numba, so functions import them.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class ActuatorKind(Section):
     effect."""
 
     def law(self) -> Actuator:
-        """Law as the kernels take it."""
+        """The law in the form that the kernels need."""
         raise NotImplementedError
 
     def excess(self, signal: float, *, free_length: float) -> str:
@@ -96,7 +96,7 @@ class Force(ActuatorKind):
 
 
 class LimitedActuator(ActuatorKind):
-    """An actuator of limited force and speed on each driven cable, which then never pushes."""
+    """An actuator of limited force and speed on each driven cable. The cable never pushes."""
 
     max_force: quantities.Force = Field(gt=0)
     """Tension at which the actuator stalls."""
@@ -114,7 +114,7 @@ class Winch(LimitedActuator):
 
     time_constant: Time = Field(default=0.02, gt=0)
     """Time constant of the lag with which the free length follows its command. The default is the
-    1 / (2 pi f) of a position loop with a bandwidth f of 8 Hz, as small geared motors have."""
+    1 / (2 pi f) of a position loop with a bandwidth f of 8 Hz, typical of small geared motors."""
     least_length: Length = Field(default=0.0, ge=0)
     """Least free length of a cable."""
 
@@ -140,8 +140,8 @@ class Winch(LimitedActuator):
 
 
 class TensionMotor(LimitedActuator):
-    """A motor on each driven cable that controls its tension: signals, spring and damper of the
-    cable together command it. See physics.actuator."""
+    """A motor on each driven cable that controls the tension. The commanded tension is the sum of
+    the signal and the forces of the cable's spring and damper. See physics.actuator."""
 
     commanded = "tension_N"
     plays_cable = True
@@ -167,4 +167,4 @@ class TensionMotor(LimitedActuator):
 
 
 Actuation = Annotated[Force | Winch | TensionMotor, Kinds()]
-"""The tagged kinds of actuators; without a tag it is the first."""
+"""Union of the kinds of actuators. A mapping without a tag is of the first kind."""

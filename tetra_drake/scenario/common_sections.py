@@ -1,7 +1,7 @@
-"""The sections of a scenario: what can be set, with units, limits and defaults.
+"""Sections of a scenario: their settings with units, limits and defaults.
 
-The type of a number says its unit; numbers are SI. A field gives its limits and, if a file may
-leave it out, its default.
+The type of a field gives its unit; values are in SI units. A field without a default must be in the
+file.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class GaitBounds(Section):
     turn: float = Field(default=0.0, ge=-1, le=1)
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = False
-    """True if weights are drawn and evolved in pairs, left and right alike."""
+    """True if drawn and evolved weights are the same on the left and on the right."""
     independent_tau_b: bool = False
     """True if tau_B evolves by itself. Otherwise it stays at 2 tau_A."""
 
@@ -118,8 +118,8 @@ class EvolutionSection(Section):
     trials: int = Field(ge=1, le=1000)
     """Independent trials, each with a seed of its own."""
     evaluations: int = Field(ge=1)
-    """Gaits of a trial that does not end early. !SteadyState evaluates its population, then two in
-    each iteration."""
+    """Number of gaits that a trial evaluates, unless it ends early. !SteadyState evaluates its
+    population, then two gaits in each iteration."""
     time_budget: Time = Field(gt=0)
     """Wall time of a simulation; a longer one counts as failed."""
 
@@ -135,7 +135,7 @@ class Disturbances(Section):
     """
 
     draws: int = Field(ge=1, le=10_000)
-    """Simulations of each gait, each in another draw."""
+    """Number of draws. Each gait is simulated once in each draw."""
     spreads: dict[str, Spread] = Field(default={})
     """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
     1 + spread. Keys joined by commas get the same factor."""

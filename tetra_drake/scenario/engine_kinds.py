@@ -48,7 +48,7 @@ class Compiled(EngineSettings):
     """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
 
     tolerance: Speed = Field(default=1e-4, gt=0)
-    """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
+    """Permitted error, per step, of the velocity of a body or of its strut tips by rotation."""
     max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
     """Longest step."""
 
@@ -72,4 +72,4 @@ class Mujoco(EngineSettings):
 
 
 Engine = Annotated[Drake | Compiled | Mujoco, Kinds()]
-"""The tagged kinds of engines; without a tag it is the first."""
+"""Union of the kinds of engines. A mapping without a tag is of the first kind."""

@@ -62,7 +62,7 @@ class FrictionKind(Section):
 
 
 class ResetIntegrator(FrictionKind):
-    """The friction of the thesis (Table 2, Eq. 3-5), which does not know the load.
+    """Friction of the thesis (Table 2, Eq. 3-5), independent of the load.
 
     A bristle holds a node until it is bent by `stiction_range`. See physics.friction.
     """
@@ -72,9 +72,9 @@ class ResetIntegrator(FrictionKind):
     stiction_range: Annotated[Length, Varied()] = Field(gt=0)
     """Deflection p0 at which a node breaks free."""
     stiction_damping: Annotated[Damping, Varied()] = Field(ge=0)
-    """Friction per velocity in stick, sigma_1."""
+    """Friction per velocity while a node sticks, sigma_1."""
     stiction_switch: Annotated[float, Varied()] = Field(ge=0)
-    """Further share a_c of the force of the bristle in stick."""
+    """Share a_c that is added to the bristle's force while a node sticks."""
     proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """Friction sigma_0 per deflection and velocity."""
 
@@ -155,4 +155,4 @@ class Coulomb(FrictionKind):
 
 
 Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]
-"""The tagged kinds of friction; without a tag it is the first."""
+"""Union of the kinds of friction. A mapping without a tag is of the first kind."""

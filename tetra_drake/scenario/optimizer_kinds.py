@@ -50,11 +50,11 @@ class CmaEs(Section):
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
     """Random gaits evaluated first."""
     starts: int = Field(default=5, ge=1, le=1000)
-    """Searches that are tried out; the one with the best gait continues. The first starts at the
-    mean of the best quarter of the sample, the others at its best gaits. Without a sample, the
-    first starts in the middle of the ranges, the others at random gaits. There are fewer searches
-    where they would take more than half of the evaluations, and at most one more than sampled
-    gaits."""
+    """Number of searches that are tried out; the search with the best gait continues. The first
+    search starts at the mean of the best quarter of the sample, the others start at the best gaits
+    of the sample. Without a sample, the first starts in the middle of the ranges, the others start
+    at random gaits. The searches take at most half of the evaluations, so there may be fewer. There
+    is at most one more than sampled gaits."""
 
 
 class RandomSearch(Section):
@@ -66,7 +66,7 @@ Count = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(Section):
-    """A map of two metrics, in each of whose cells the fittest gait counts (extra `qd`).
+    """A map of two metrics with the fittest gait in each cell (extra `qd`).
 
     CMA-MAE by pyribs (Fontaine and Nikolaidis, arXiv 2205.10752). Several runs of CMA-ES look for
     gaits above the levels of cells. A level follows the fittest gait of its cell slowly.
@@ -75,7 +75,7 @@ class QualityDiversity(Section):
     measures: Annotated[dict[str, Range], UnitsByName(UNITS)] = Field(
         default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
-    """Two metrics with their ranges on the map. Values outside count to the cells at the edge."""
+    """Two metrics with their ranges on the map. Values outside belong to the cells at the edge."""
     cells: list[Count] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
@@ -93,4 +93,4 @@ class QualityDiversity(Section):
 
 
 OptimizerKind = Annotated[SteadyState | CmaEs | RandomSearch | QualityDiversity, Kinds()]
-"""The tagged kinds of optimisers; without a tag it is the first."""
+"""Union of the kinds of optimisers. A mapping without a tag is of the first kind."""

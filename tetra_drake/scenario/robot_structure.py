@@ -117,7 +117,7 @@ class Member(NamedTuple):
 
 
 class StructureFile(Section):
-    """A tensegrity: nodes, struts and cables between them, and what actuates the cables.
+    """A tensegrity: nodes, struts, cables and the oscillators that actuate cables.
 
     A file may give the `unit` of coordinates that are bare numbers; once read, they are in m.
     """
@@ -401,7 +401,7 @@ class StructureFile(Section):
 
 
 Robot = Annotated[Tetrahedra | StructureFile, Kinds()]
-"""The tagged kinds of robots; without a tag it is the first.
+"""Union of the kinds of robots. A mapping without a tag is of the first kind.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`
 (see scenario.metrics), `blueprint()` and `implied_changes()`.

@@ -1,7 +1,7 @@
 """Kinds of terrain, and the grid of heights of each kind.
 
 The ground is the surface z = h(x, y) in the world: x forward, y left, z up. The robot starts around
-the origin, T1's base at x = 0, and walks along +x. physics.terrain says how heights make a surface.
+the origin, T1's base at x = 0, and walks along +x. physics.terrain makes the surface from heights.
 """
 
 import math
@@ -130,7 +130,7 @@ class Steps(Relief):
     count: int = Field(ge=1)
     """Number of steps."""
     start: Length | None = None
-    """x of the first step; 1 in ahead of the robot if not given."""
+    """Coordinate x of the first step; 1 in ahead of the robot if not given."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         start = ahead if self.start is None else self.start
@@ -144,9 +144,10 @@ class Steps(Relief):
 
 
 class Rough(Relief):
-    """Heights drawn uniformly between -2 amplitude and 0, independent, every half wavelength.
+    """Random ground: an independent, uniform height in -2 amplitude to 0 every half wavelength.
 
-    So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in.
+    The mean height is -amplitude. A robot that stands at z = 0 touches the ground without sinking
+    in.
     """
 
     uneven = "on rough ground"
@@ -156,7 +157,7 @@ class Rough(Relief):
     wavelength: Length = Field(gt=0)
     """Twice the distance between heights."""
     seed: int = Field(ge=0, default=0)
-    """Seed of the random heights. The same seed is the same ground."""
+    """Seed of the random heights. The same seed gives the same ground."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         half = 0.5 * self.wavelength
@@ -168,10 +169,10 @@ class Rough(Relief):
 
 
 class Obstacles(Relief):
-    """Round bumps, h = height max(0, 1 - (r / radius)^2), the highest where two overlap.
+    """Round bumps, h = height max(0, 1 - (r / radius)^2). Where bumps overlap, the highest counts.
 
-    One stands at a random place in each square of side `spacing`, none reaches before `start`. The
-    grid lowers a bump's top by about an eighth.
+    Each square of side `spacing` has one bump, at a random position. No bump reaches before
+    `start`. The grid lowers a bump's top by about an eighth.
     """
 
     uneven = "over obstacles"
@@ -183,9 +184,9 @@ class Obstacles(Relief):
     spacing: Length = Field(gt=0)
     """Side of the squares that have a bump each."""
     seed: int = Field(ge=0, default=0)
-    """Seed of the random places. The same seed is the same ground."""
+    """Seed of the random positions. The same seed gives the same ground."""
     start: Length | None = None
-    """x before which there are no bumps; 1 in ahead of the robot if not given."""
+    """Coordinate x where bumps begin; 1 in ahead of the robot if not given."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         cell, spacing = 0.5 * self.radius, self.spacing
@@ -211,11 +212,12 @@ class Obstacles(Relief):
 
 
 class HeightField(Relief):
-    """Heights in m from a file: rows along x, columns along y, both upward.
+    """Heights in m from a file. Rows are along x and columns along y, in ascending order.
 
     The grid's centre is the origin. The file is numpy's `.npy`, or text of numbers separated by
-    blanks or commas; at least 3 x 3, at most 4 million. A relative path starts at the scenario file
-    that names it. A record has a copy of the file beside it, named by a digest of the heights.
+    blanks or commas. It has at least 3 x 3 and at most 4 million heights. A relative path starts at
+    the scenario file that names it. A record keeps a copy of the file, named by a digest of the
+    heights.
     """
 
     file: HeightFile
