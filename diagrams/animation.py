@@ -45,7 +45,7 @@ WIDTHS = {".gif": range(560, 239, -40), ".png": range(800, 239, -80)}
 """Width in pixels."""
 
 SUPERSAMPLING = 2
-START, END, STEP = 4.0, 10.0, 0.2  # s of the motion: of the frames, between frames
+START, END, STEP = 4.0, 10.0, 0.2  # first and last frame, and time between frames, in s
 FRAME_TIME = 100  # ms: twice as fast as the robot walks
 INSTANTS = 4  # of a still
 

@@ -2,7 +2,7 @@
 
     python diagrams/settling_node.py
 
-The diagram is made by one_tetrahedron.py. Three nodes share the weight and move alike.
+The diagram is made by one_tetrahedron.py. Three nodes share the weight and move in the same way.
 
 An impact at a low speed v has the restitution e = 1 - alpha v (thesis Eq. 2), if weight is
 neglected. Here the weight alone presses the nodes 0.0006 in into the ground, four times deeper than

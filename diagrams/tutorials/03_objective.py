@@ -1,4 +1,4 @@
-"""An objective of one's own: far, with little power."""
+"""A custom objective: a large distance with little power."""
 
 # %% An objective is a function of a result. The search maximises it.
 from pathlib import Path

@@ -32,7 +32,8 @@ START, TERRAIN = "displaced start", "terrain seed"
 
 PERCENT, DRAWS = 5.0, 200
 ALONE = 8
-"""Number of draws whose start and terrain seed are also simulated alone."""
+"""Number of draws whose initial positions and terrain seed are also simulated as the only
+disturbance."""
 
 LOSS = 0.1
 """Largest loss of distance, as a share of the undisturbed distance, with which a gait keeps a draw.
@@ -59,8 +60,8 @@ class Judgement:
     undisturbed: pandas.DataFrame
     """A row per gait, simulated without disturbances."""
     draws: pandas.DataFrame
-    """A row per gait and draw. More columns: draw (its number), and for each key of the scenario's
-    spreads its factor."""
+    """A row per gait and draw. Further columns: the number of the draw, and a factor for each key
+    of the scenario's spreads."""
     alone: pandas.DataFrame
     """A row per gait and single change. More columns: what (a key, START or TERRAIN), spread (the
     relative change of the key), draw (the draw that start or terrain seed are taken from)."""
@@ -76,7 +77,7 @@ class Judgement:
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
     """Default disturbances: a spread of `percent` for all numbers marked as Varied, and for the
-    start."""
+    initial positions."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):

@@ -29,7 +29,7 @@ IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
 
 _COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
-"""Key that holds the number of the line, by file name."""
+"""Key of the number of a line, by file name."""
 
 _UNIQUE = {IN_PROGRESS: ("index",), REEVALUATIONS: ("index",), ELITES: ("trial", "index")}
 """Keys whose values are unique among the lines of a file, by file name."""

@@ -121,7 +121,8 @@ class Run:
         return best.loc[best["fitness"].idxmax()]
 
     def initial_best(self, trial: int) -> pandas.Series:
-        """The row of the fittest gait in the first iteration of a trial that has a fitness."""
+        """Row of the fittest gait in the first iteration of a trial. Iterations without any fitness
+        are skipped."""
         rows = self.evaluations.query("trial == @trial").dropna(subset="fitness")
         first = rows[rows["iteration"] == rows["iteration"].min()]
         return first.loc[first["fitness"].idxmax()]

@@ -165,7 +165,7 @@ def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[f
 
 
 def _about(run: Run) -> str:
-    """Name of the metric that the objective of a run is about."""
+    """Name of the main metric in the objective of a run."""
     return headline_metric(run.scenario.objective, run.fittest())
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class DrivenCables(NamedTuple):
-    """The driven cables of a robot: arrays (..., driven cables), in SI units."""
+    """Properties of the driven cables: arrays (..., driven cables), in SI units."""
 
     law: CableLaw
     signal: Any
@@ -75,7 +75,8 @@ class ActuatorKind(Section):
 
 
 class Force(ActuatorKind):
-    """Signals are forces, superimposed on cables without limits (thesis section 2.1.3)."""
+    """Ideal actuators: the signals are forces on the cables, without limits (thesis section
+    2.1.3)."""
 
     lacking = (LIMITS,)
     commanded = "force_N"

@@ -38,7 +38,7 @@ class CpgSection(Section):
     external_input: float
     """Tonic input u0 of all neurons."""
     initial_state: Annotated[list[float], Field(min_length=3, max_length=3)]
-    """At t = 0: u of every neuron, v of extensors, v of flexors."""
+    """Initial values: u of every neuron, v of the extensors, v of the flexors."""
     partner_weight: float = Field(ge=0)
     """Weight of the inhibition between extensor and flexor of an oscillator."""
     gain: Force
@@ -113,7 +113,7 @@ class SimulationSection(Section):
 
 
 class EvolutionSection(Section):
-    """Amount of evolution, for any optimiser."""
+    """Number and length of the trials, for any optimiser."""
 
     trials: int = Field(ge=1, le=1000)
     """Independent trials, each with a seed of its own."""

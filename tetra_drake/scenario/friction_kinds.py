@@ -76,7 +76,7 @@ class ResetIntegrator(FrictionKind):
     stiction_switch: Annotated[float, Varied()] = Field(ge=0)
     """Share a_c that is added to the bristle's force while a node sticks."""
     proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
-    """Friction sigma_0 per deflection and velocity."""
+    """Friction divided by deflection and by velocity, sigma_0."""
 
     def law(self) -> FrictionLaw:
         from tetra_drake.physics.friction import FrictionLaw, ResetConstants
@@ -104,9 +104,9 @@ class Coulomb(FrictionKind):
     modes = "0 sticks, else the signs of the direction of slip"
 
     static: Annotated[float, Varied("coefficients")] = Field(default=0.5, gt=0)
-    """Coefficient in stick."""
+    """Coefficient of friction of nodes that stick."""
     kinetic: Annotated[float, Varied("coefficients")] = Field(default=0.5, gt=0)
-    """Coefficient in slip, at most `static`."""
+    """Coefficient of friction of nodes that slip; at most `static`."""
     stiffness: Stiffness = Field(default=0.0, ge=0)
     """Stiffness of the bristle; 0 lets a robot creep on a slope."""
     damping: Annotated[Damping, Varied()] = Field(default=0.4 * POUND_FORCE / INCH, gt=0)

@@ -82,7 +82,7 @@ class CableGroup(CableConstants):
     free_length: Length | None = Field(default=None, ge=0)
     """Length without tension. A group has a free length or a tension."""
     tension: Force | None = Field(default=None, ge=0)
-    """Tension where the nodes are as given."""
+    """Tension at the given coordinates of the nodes."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:

@@ -122,7 +122,7 @@ class RowCables(CableConstants):
 
 
 class Tetrahedra(Section):
-    """The tetrahedra and where they stand (thesis section 2.1, appendix C.1)."""
+    """The tetrahedra with their initial positions (thesis section 2.1, appendix C.1)."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
     """Properties that some metrics need and this robot does not have."""
