@@ -108,7 +108,7 @@ class MujocoEngine(Engine):
         states = simulator.run(signals, steps_kept, observer)
         wall_time = time.perf_counter() - started
         totals = observer.totals()
-        if robot.model.slack and totals.tension[0] <= 0.0:
+        if robot.model.slack and totals.tension.of_all[0] <= 0.0:
             reason = "a cable went slack, and a tendon of MuJoCo would push"
             raise SimulationFailure(time=float(totals.time[0]), reason=reason)
         signals_kept = signals_at(robot, gait, times, steering=steering)
