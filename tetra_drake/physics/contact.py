@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tetra_drake.physics import friction, terrain
-from tetra_drake.physics.kinematics import P_WN, V_WN, forward_axis
+from tetra_drake.physics import friction, kinematics, terrain
 from tetra_drake.physics.vectors import difference, vector_at
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import (
@@ -78,7 +77,7 @@ def meet_ground(ground: Ground, nodes: Table, frames: Table) -> None:
 def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
     """Distance (m) from the ground to a contact node; negative in the ground."""
     if ground.flat:
-        return nodes[ground.contacts[i], P_WN + 2]
+        return nodes[ground.contacts[i], kinematics.P_WN + 2]
     return frames[i, terrain.GAP]
 
 
@@ -99,8 +98,9 @@ def sliding(
 ) -> tuple[friction.Slide, Real]:
     """Motion of contact node i along the ground, and the rate (m/s) of its gap."""
     node = ground.contacts[i]
-    deflection = difference(vector_at(nodes, node, P_WN), vector_at(modes, i, STICK_POINT))
-    v_1, v_2, v_n = terrain.to_frame(vector_at(nodes, node, V_WN), frames, i, ground.flat)
+    p_WN, v_WN = vector_at(nodes, node, kinematics.P_WN), vector_at(nodes, node, kinematics.V_WN)
+    deflection = difference(p_WN, vector_at(modes, i, STICK_POINT))
+    v_1, v_2, v_n = terrain.to_frame(v_WN, frames, i, ground.flat)
     x_1, x_2, _ = terrain.to_frame(deflection, frames, i, ground.flat)
     t1 = friction.TangentSlide(v_1, x_1, modes[i, MODE])
     t2 = friction.TangentSlide(v_2, x_2, modes[i, MODE + 1])
@@ -150,7 +150,7 @@ def move_stick_point(
 ) -> None:
     """Moves the stick point of a contact node to the node. `along` says, for t1 and t2, whether the
     stick point moves along this tangent."""
-    p_x, p_y, p_z = vector_at(nodes, ground.contacts[i], P_WN)
+    p_x, p_y, p_z = vector_at(nodes, ground.contacts[i], kinematics.P_WN)
     stick_x, stick_y, stick_z = vector_at(modes, i, STICK_POINT)
     if ground.flat:
         modes[i, STICK_POINT] = select(along[0], p_x, stick_x)
@@ -170,7 +170,7 @@ def set_heading(
     state: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
 ) -> None:
     """Stores the heading of a contact node's body: its x axis, projected into the tangent plane."""
-    forward = forward_axis(state, ground.carriers[i])
+    forward = kinematics.forward_axis(state, ground.carriers[i])
     h_1, h_2, _ = terrain.to_frame(forward, frames, i, ground.flat)
     per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))
     modes[i, HEADING] = select(where, h_1 * per_length, modes[i, HEADING])

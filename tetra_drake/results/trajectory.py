@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.files import write_whole
+from tetra_drake.physics import cable
 from tetra_drake.physics.actuator import has_drive, wound
-from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces, forces_along
 from tetra_drake.physics.kinematics import P_WN, V_WN
@@ -104,8 +104,8 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "v_WN": (nodes[..., V_WN : V_WN + 3], "m/s", "node velocity"),
         "p_WB": (poses[..., 4:], "m", "position of the body's origin"),
         "q_WB": (poses[..., :4], "1", "orientation of the body"),
-        "tension": (cable_forces[..., TENSION], "N", "cable tension"),
-        "length": (cable_forces[..., LENGTH], "m", "cable length"),
+        "tension": (cable_forces[..., cable.TENSION], "N", "cable tension"),
+        "length": (cable_forces[..., cable.LENGTH], "m", "cable length"),
         "free_length": (_free_lengths(robot, motion), "m", "free length of the cable"),
         "signal": (motion.signals, "N", "actuation signal"),
         "normal_force": (ground_forces[..., 2], "N", "force along the normal of the ground"),
@@ -145,7 +145,7 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Tables `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, 3)
     of a motion."""
     model, samples = robot.model, len(motion.times)
-    cable_forces = np.empty((samples, len(model.cables.signal), CABLE_FORCE_COLUMNS))
+    cable_forces = np.empty((samples, len(model.cables.signal), cable.CABLE_FORCE_COLUMNS))
     ground_forces = np.empty((samples, len(model.ground.contacts), GROUND_FORCE_COLUMNS))
     forces = Forces.of(model)
     given = motion.states, motion.modes, motion.signals, motion.drives
@@ -156,7 +156,7 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
     """Dimension and values of each coordinate except time."""
     oscillators, cables = structure.oscillators, structure.cables
-    driving = ["" if i == PASSIVE else oscillators[i] for i in cables["signal"]]
+    driving = ["" if i == cable.PASSIVE else oscillators[i] for i in cables["signal"]]
     body_of_node = [structure.bodies[body] for body in structure.carriers]
     joined = [f"{body_of_node[a]}-{body_of_node[b]}" for a, b in cables[["node_a", "node_b"]]]
     contacts = structure.contacts

@@ -11,8 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION
-from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, NormalForce, update_modes
+from tetra_drake.physics import cable, contact
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.model import Model
@@ -71,7 +70,7 @@ class Unactuated(NamedTuple):
     @classmethod
     def of(cls, model: Model) -> Self:
         """The robot of a model, with all cables passive."""
-        cables = model.cables._replace(signal=np.full_like(model.cables.signal, PASSIVE))
+        cables = model.cables._replace(signal=np.full_like(model.cables.signal, cable.PASSIVE))
         return cls(model._replace(cables=cables), Forces.of(model))
 
 
@@ -92,11 +91,11 @@ def find_equilibrium(
         force = force_at_rest(robot, state)
         if not np.isfinite(force).all():
             break
-        tensions = np.abs(robot.forces.cable_forces[:, TENSION])
+        tensions = np.abs(robot.forces.cable_forces[:, cable.TENSION])
         greatest = max(tensions.max(initial=weight), LEAST_FORCE)
         if np.abs(force).max() <= TOLERANCE * greatest:
-            lengths = np.round(robot.forces.cable_forces[:, LENGTH], LENGTH_DIGITS)
-            feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
+            lengths = np.round(robot.forces.cable_forces[:, cable.LENGTH], LENGTH_DIGITS)
+            feet = int(np.count_nonzero(robot.forces.ground_forces[:, contact.NORMAL]))
             return Equilibrium(state, lengths, feet)
         now = time.perf_counter()
         if count == 1:  # kernels are compiled by now
@@ -126,7 +125,7 @@ class _Descent:
 
     def __init__(self, robot: Unactuated) -> None:
         self._robot = robot
-        self._hard = float(NormalForce(*robot.model.ground.normal).stiffness)
+        self._hard = float(contact.NormalForce(*robot.model.ground.normal).stiffness)
         self._shifts = [0.0, LEAST_STIFFNESS * self._hard]
         """Stiffnesses (N/m) to try. A step adds the least one that makes the energy convex."""
         while self._shifts[-1] < math.inf:
@@ -199,10 +198,10 @@ def force_at_rest(robot: Unactuated, state: Table) -> Table:
     """Generalized force (6 n,) at rest: [t_W / radius; f_W] at each body's origin. Contact nodes
     stick at their positions."""
     model, forces = robot.model, robot.forces
-    modes = np.zeros((forces.ground_forces.shape[0], MODE_COLUMNS))
+    modes = np.zeros((forces.ground_forces.shape[0], contact.MODE_COLUMNS))
     generalized = np.empty(6 * (state.size // 13))
     move_robot(model, state, forces)
-    update_modes(state, forces.nodes, model.ground, forces.frames, modes)
+    contact.update_modes(state, forces.nodes, model.ground, forces.frames, modes)
     compute_forces(model, state, modes, np.zeros(1), True, forces, generalized)
     radius = model.bodies.radius.max()
     for body in range(generalized.size // 6):

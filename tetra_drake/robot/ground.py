@@ -5,20 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.errors import InputError
+from tetra_drake.physics import terrain
 from tetra_drake.physics.contact import Ground, NormalForce
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
-from tetra_drake.physics.terrain import (
-    FRAME_COLUMNS,
-    GAP,
-    N_X,
-    N_Z,
-    T1_X,
-    T1_Z,
-    T2_Y,
-    T2_Z,
-    SurfaceGrid,
-    find_frames,
-)
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Grid
@@ -54,10 +43,10 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     return made
 
 
-def _surface_grid(grid: Grid) -> SurfaceGrid:
+def _surface_grid(grid: Grid) -> terrain.SurfaceGrid:
     rows, columns = grid.heights.shape
     inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
-    return SurfaceGrid(
+    return terrain.SurfaceGrid(
         corner_x=grid.corner[0],
         corner_y=grid.corner[1],
         per_cell_x=1.0 / grid.cell[0],
@@ -81,7 +70,7 @@ def _check_start(
         reach = [f"{side / INCH:.4g} in" for side in (*corner, *(corner + cells * grid.cell))]
         problem = f"the robot starts off its grid, which goes from x, y = {reach[0]}, {reach[1]} "
         raise InputError(scenario.name, "terrain", problem + f"to {reach[2]}, {reach[3]}")
-    gaps = ground_frames(start, ground)[:, GAP]
+    gaps = ground_frames(start, ground)[:, terrain.GAP]
     weight = float(structure.mass.sum()) * scenario.robot.gravity
     if gaps.min() < -START_DEPTH - weight / scenario.ground.stiffness:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
@@ -92,9 +81,9 @@ def _check_start(
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:
     """Heights (...) of the surface at x and y (..., 2), in m."""
-    top = np.full((x_y.size // 2, 1), SurfaceGrid(*ground.grid).top)
+    top = np.full((x_y.size // 2, 1), terrain.SurfaceGrid(*ground.grid).top)
     frames = ground_frames(np.hstack([x_y.reshape(-1, 2), top]), ground)
-    return (top[:, 0] - frames[:, GAP] / frames[:, N_Z]).reshape(x_y.shape[:-1])
+    return (top[:, 0] - frames[:, terrain.GAP] / frames[:, terrain.N_Z]).reshape(x_y.shape[:-1])
 
 
 def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
@@ -102,17 +91,18 @@ def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
     of (points, 3, 3)."""
     frames = ground_frames(p_WN, ground)
     axes = np.zeros((len(p_WN), 3, 3))
-    axes[:, 0], axes[:, 1, 1:] = frames[:, T1_X : T1_Z + 1], frames[:, T2_Y : T2_Z + 1]
-    axes[:, 2] = frames[:, N_X : N_Z + 1]
+    axes[:, 0] = frames[:, terrain.T1_X : terrain.T1_Z + 1]
+    axes[:, 1, 1:] = frames[:, terrain.T2_Y : terrain.T2_Z + 1]
+    axes[:, 2] = frames[:, terrain.N_X : terrain.N_Z + 1]
     return axes
 
 
 def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
     """Frames (points, FRAME_COLUMNS) of the surface below points (points, 3) in m; see
     physics.terrain."""
-    frames = np.empty((len(p_WN), FRAME_COLUMNS))
+    frames = np.empty((len(p_WN), terrain.FRAME_COLUMNS))
     nodes = np.zeros((len(p_WN), NODE_COLUMNS))
     nodes[:, P_WN : P_WN + 3] = p_WN
-    grid = SurfaceGrid(*ground.grid)
-    find_frames(nodes, np.arange(len(p_WN)), grid, ground.heights, frames)
+    grid = terrain.SurfaceGrid(*ground.grid)
+    terrain.find_frames(nodes, np.arange(len(p_WN)), grid, ground.heights, frames)
     return frames

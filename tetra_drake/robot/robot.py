@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.cable import PASSIVE, CableLaw, Cables, cable_tension
+from tetra_drake.physics import cable
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.forces import Forces
@@ -69,7 +69,7 @@ class Robot:
     @property
     def driven(self) -> np.ndarray:
         """Indices of the driven cables."""
-        return np.flatnonzero(self.structure.cables["signal"] != PASSIVE)
+        return np.flatnonzero(self.structure.cables["signal"] != cable.PASSIVE)
 
     @property
     def ground(self) -> Ground:
@@ -93,7 +93,8 @@ class Robot:
     def senses(self) -> Senses:
         """Constants of the oscillators' sensors. Raises InputError if there is no equilibrium."""
         drivers, pathways = self.structure.drivers, self.scenario.cpg.feedback
-        sizes = np.bincount(drivers - PASSIVE)[drivers - PASSIVE]  # of each cable's group
+        groups = drivers - cable.PASSIVE
+        sizes = np.bincount(groups)[groups]  # of each cable's group
         neutral = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(
@@ -159,10 +160,10 @@ class Robot:
         """States of the actuators at t = 0 (drives,); see physics.actuator."""
         driven, length = self.structure.cables[self.driven], self._starting_lengths()
         rate: Any = np.zeros(len(driven))
-        law, signal = CableLaw.of(driven), rate
+        law, signal = cable.CableLaw.of(driven), rate
         if len(self.commanded):
             signal = self.commanded[0, driven["signal"]]
-        tension = np.maximum(cable_tension(length, rate, signal, law), 0.0)
+        tension = np.maximum(cable.cable_tension(length, rate, signal, law), 0.0)
         cables = DrivenCables(law, signal, length, rate, tension, law.free_length)
         drives: np.ndarray = self.scenario.actuation.drives(cables)
         return drives
@@ -237,7 +238,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,
-        cables=Cables.of(structure.cables),
+        cables=cable.Cables.of(structure.cables),
         actuator=scenario.actuation.law(),
         couplings=structure.couplings,
         ground=make_ground(scenario, structure),

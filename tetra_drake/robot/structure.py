@@ -12,9 +12,8 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 
-from tetra_drake.physics.cable import CABLE, PASSIVE, CableLaw
+from tetra_drake.physics import cable, kinematics
 from tetra_drake.physics.clearance import Struts
-from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, move_nodes
 from tetra_drake.physics.model import Couplings
 from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import Equilibrium
@@ -59,7 +58,7 @@ class Structure(Blueprint):
     @functools.cached_property
     def drivers(self) -> np.ndarray:
         """Index of the oscillator that drives each cable (cables,); PASSIVE if there is none."""
-        drivers = np.full(len(self.cable_names), PASSIVE)
+        drivers = np.full(len(self.cable_names), cable.PASSIVE)
         for oscillator, cables in enumerate(self.groups):
             drivers[list(cables)] = oscillator
         return drivers
@@ -67,10 +66,10 @@ class Structure(Blueprint):
     @functools.cached_property
     def cables(self) -> np.ndarray:
         """Cables with their constants: records (cables,) of dtype CABLE."""
-        cables = np.zeros(len(self.cable_names), dtype=CABLE)
+        cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
         cables["signal"] = self.drivers
-        for name in CableLaw._fields:
+        for name in cable.CableLaw._fields:
             cables[name] = [law[name] for law in self.cable_laws]
         return cables
 
@@ -146,13 +145,13 @@ def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
     """Positions p_WN (nodes, 3) of the nodes in m, for a state (13 n,) of the bodies."""
-    return moved_nodes(structure, state)[:, P_WN : P_WN + 3]
+    return moved_nodes(structure, state)[:, kinematics.P_WN : kinematics.P_WN + 3]
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
     """Table `nodes` of physics.kinematics for a state (13 n,) of the bodies; without forces."""
-    nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
-    move_nodes(state, structure.p_BN, structure.first_node, nodes)
+    nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
+    kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
 
 

@@ -6,15 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
-from tetra_drake.physics.oscillator import (
-    U_RATE,
-    V_RATE,
-    Network,
-    U,
-    make_neurons,
-    neuron_rates,
-    oscillator_output,
-)
+from tetra_drake.physics import oscillator
 
 
 class MatsuokaCpg(LeafSystem):
@@ -35,7 +27,7 @@ class MatsuokaCpg(LeafSystem):
 
     def __init__(
         self,
-        network: Network,
+        network: oscillator.Network,
         *,
         tonic: npt.ArrayLike,
         initial_state: npt.ArrayLike,
@@ -66,17 +58,17 @@ class MatsuokaCpg(LeafSystem):
             tonic = self._tonic.Eval(context)
         if self._feedback.HasValue(context):
             feedback = self._feedback.Eval(context)
-        neuron_rates(self._network, tonic + feedback, neurons)
-        derivatives.SetFromVector(neurons[:, U_RATE : V_RATE + 1].T.ravel())
+        oscillator.neuron_rates(self._network, tonic + feedback, neurons)
+        derivatives.SetFromVector(neurons[:, oscillator.U_RATE : oscillator.V_RATE + 1].T.ravel())
 
     def _neurons(self, context: Context) -> np.ndarray:
         """Table `neurons` of physics.oscillator, from the state."""
-        return make_neurons(context.get_continuous_state_vector().value())
+        return oscillator.make_neurons(context.get_continuous_state_vector().value())
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
         signals = output.get_mutable_value()
-        oscillator_output(self._neurons(context), signals)
+        oscillator.oscillator_output(self._neurons(context), signals)
         signals *= self._gain
 
     def _calc_neurons(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(np.maximum(0.0, self._neurons(context)[:, U]))
+        output.SetFromVector(np.maximum(0.0, self._neurons(context)[:, oscillator.U]))

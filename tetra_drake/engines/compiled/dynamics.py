@@ -12,18 +12,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK, Schedule
+from tetra_drake.physics import contact, inertia
 from tetra_drake.physics.cable import DIRECTION, TENSION_PER_RATE
-from tetra_drake.physics.contact import (
-    CONTACT,
-    NORMAL,
-    Ground,
-    NormalForce,
-    gap,
-    sliding,
-)
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.friction import friction_damping
-from tetra_drake.physics.inertia import XX, XY, XZ, YY, YZ, ZZ, over_inertia, times_inertia
 from tetra_drake.physics.kinematics import P_BN_W
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.terrain import to_world
@@ -75,19 +67,19 @@ def _indices(numbers: Iterable[int]) -> np.ndarray:
 
 
 @inlined
-def accelerate(robot: Model, inertia: Table, force: Table, acceleration: Table) -> None:
+def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table) -> None:
     """Writes the accelerations (6 bodies,) of bodies under forces (6 bodies,).
 
-    `inertia` is Forces.inertia.
+    `inertia_W` is Forces.inertia.
     """
     for body in range(force.size // BLOCK):
         i = BLOCK * body
         per_mass = 1.0 / robot.bodies.mass[body]
         if robot.isotropic:
-            per_moment = 1.0 / robot.bodies.inertia[body, XX]
+            per_moment = 1.0 / robot.bodies.inertia[body, inertia.XX]
             turns = force[i] * per_moment, force[i + 1] * per_moment, force[i + 2] * per_moment
         else:
-            turns = over_inertia(inertia, body, (force[i], force[i + 1], force[i + 2]))
+            turns = inertia.over_inertia(inertia_W, body, (force[i], force[i + 1], force[i + 2]))
         acceleration[i], acceleration[i + 1], acceleration[i + 2] = turns
         acceleration[i + 3] = force[i + 3] * per_mass
         acceleration[i + 4] = force[i + 4] * per_mass
@@ -95,30 +87,31 @@ def accelerate(robot: Model, inertia: Table, force: Table, acceleration: Table) 
 
 
 @inlined
-def momentum(robot: Model, inertia: Table, velocity: Table, body: int) -> tuple[Real, ...]:
+def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tuple[Real, ...]:
     """Momentum of a body: its mass matrix times its part of a vector over bodies.
 
-    `inertia` is Forces.inertia.
+    `inertia_W` is Forces.inertia.
     """
     i, mass = BLOCK * body, robot.bodies.mass[body]
     if robot.isotropic:
-        moment = robot.bodies.inertia[body, XX]
+        moment = robot.bodies.inertia[body, inertia.XX]
         turns = moment * velocity[i], moment * velocity[i + 1], moment * velocity[i + 2]
     else:
-        turns = times_inertia(inertia, body, (velocity[i], velocity[i + 1], velocity[i + 2]))
+        w_WB = velocity[i], velocity[i + 1], velocity[i + 2]
+        turns = inertia.times_inertia(inertia_W, body, w_WB)
     moves = mass * velocity[i + 3], mass * velocity[i + 4], mass * velocity[i + 5]
     return turns[0], turns[1], turns[2], moves[0], moves[1], moves[2]
 
 
 @inlined
-def refer_torques(inertia: Table, inertia_now: Table, force: Table) -> None:
-    """Converts the torques in `force` (6 bodies,) from `inertia_now` to `inertia`: the angular
+def refer_torques(inertia_W: Table, inertia_now: Table, force: Table) -> None:
+    """Converts the torques in `force` (6 bodies,) from `inertia_now` to `inertia_W`: the angular
     accelerations stay the same."""
     for body in range(force.size // BLOCK):
         i = BLOCK * body
         torque = force[i], force[i + 1], force[i + 2]
-        acceleration = over_inertia(inertia_now, body, torque)
-        force[i], force[i + 1], force[i + 2] = times_inertia(inertia, body, acceleration)
+        acceleration = inertia.over_inertia(inertia_now, body, torque)
+        force[i], force[i + 1], force[i + 2] = inertia.times_inertia(inertia_W, body, acceleration)
 
 
 @merged
@@ -152,26 +145,26 @@ def implicit_matrix(
             add_cables(robot, solver, forces, time, pair, cable, lines, rows)
     add_masses(robot, forces.inertia, rows)
     for i in range(robot.ground.contacts.size):
-        if any_lane(modes[i, CONTACT] != 0.0):
+        if any_lane(modes[i, contact.CONTACT] != 0.0):
             add_contact(modes, forces, robot.ground, i, time, rows)
 
 
 @inlined
-def add_masses(robot: Model, inertia: Table, rows: Table) -> None:
-    """Adds the mass matrix to the rows. `inertia` is Forces.inertia."""
+def add_masses(robot: Model, inertia_W: Table, rows: Table) -> None:
+    """Adds the mass matrix to the rows. `inertia_W` is Forces.inertia."""
     for body in range(rows.shape[0]):
         mass = robot.bodies.mass[body]
         if robot.isotropic:
-            moment = robot.bodies.inertia[body, XX]
+            moment = robot.bodies.inertia[body, inertia.XX]
             for r in range(3):
                 rows[body, r, r] += moment
         else:
-            rows[body, 0, 0] += inertia[body, XX]
-            rows[body, 1, 1] += inertia[body, YY]
-            rows[body, 2, 2] += inertia[body, ZZ]
-            rows[body, 0, 1] += inertia[body, XY]
-            rows[body, 0, 2] += inertia[body, XZ]
-            rows[body, 1, 2] += inertia[body, YZ]
+            rows[body, 0, 0] += inertia_W[body, inertia.XX]
+            rows[body, 1, 1] += inertia_W[body, inertia.YY]
+            rows[body, 2, 2] += inertia_W[body, inertia.ZZ]
+            rows[body, 0, 1] += inertia_W[body, inertia.XY]
+            rows[body, 0, 2] += inertia_W[body, inertia.XZ]
+            rows[body, 1, 2] += inertia_W[body, inertia.YZ]
         for r in range(3, BLOCK):
             rows[body, r, r] += mass
 
@@ -282,17 +275,17 @@ def product(x: Column, y: Column) -> Real:
 
 @inlined
 def add_contact(
-    modes: Table, forces: Forces, ground: Ground, i: int, time: Real, rows: Table
+    modes: Table, forces: Forces, ground: contact.Ground, i: int, time: Real, rows: Table
 ) -> None:
     """Adds time * damping + time² * stiffness of a contact node, in lanes where it touches."""
-    nodes, frames, law = forces.nodes, forces.frames, named(NormalForce, ground.normal)
-    touches, node, body = modes[i, CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
-    depth = -gap(nodes, ground, frames, i)
-    slide, _ = sliding(nodes, modes, ground, frames, i)
+    nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
+    touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
+    depth = -contact.gap(nodes, ground, frames, i)
+    slide, _ = contact.sliding(nodes, modes, ground, frames, i)
     k_1, k_12, k_2 = friction_damping(slide, time, ground.friction)
     k_1, k_2 = select(touches, k_1, 0.0), select(touches, k_2, 0.0)
     k_12 = select(touches, k_12, 0.0)
-    presses = touches & (forces.ground_forces[i, NORMAL] > 0.0)
+    presses = touches & (forces.ground_forces[i, contact.NORMAL] > 0.0)
     k_n = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
     # Turns the matrix K of the contact frame into the world frame: R K, then (R K) Rᵀ.
     a = to_world(k_1, k_12, 0.0, frames, i, ground.flat)

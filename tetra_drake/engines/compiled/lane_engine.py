@@ -9,27 +9,7 @@ from typing import Any
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.compiled.loop import (
-    DONE,
-    DUE,
-    EVALUATIONS,
-    IDLE,
-    MARK,
-    PLANNED,
-    ROUND,
-    RUNNING,
-    SAMPLES,
-    STATUS,
-    STEP_TOO_SMALL,
-    TAKEN,
-    TIME,
-    TOO_FAST,
-    TOO_MANY_EVALUATIONS,
-    TRIED,
-    Constants,
-    Log,
-    advance,
-)
+from tetra_drake.engines.compiled import loop
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE
@@ -55,10 +35,10 @@ class LaneEngine:
         self._heights = np.zeros((width, first.robot.ground.heights.size))
         self._constants = _constants_in_lanes(first.constants, self._heights)
         self._lanes = in_lanes(first.start, width)
-        self._log = allocate(Log, first.log_sizes | {"lanes": width})
-        log = Log(*(FieldArray(array, any_size=True) for array in self._log))
+        self._log = allocate(loop.Log, first.log_sizes | {"lanes": width})
+        log = loop.Log(*(FieldArray(array, any_size=True) for array in self._log))
         self._arguments = self._constants, self._lanes, log, first.live
-        self._advance = machine_code(advance, *self._arguments, 0)
+        self._advance = machine_code(loop.advance, *self._arguments, 0)
         self._in_lane: list[Prepared | None] = [None] * width
         self._wall_times = [0.0] * width
         for lane in range(width):  # idle lanes compute, too, and need valid numbers
@@ -105,19 +85,19 @@ class LaneEngine:
         log.states[lane, 0], log.modes[lane, 0] = start.step.state, start.modes
         log.signals[lane, 0] = start.signals
         log.recent[lane, : len(commanded)] = commanded
-        clock[SAMPLES, lane] = len(commanded)
+        clock[loop.SAMPLES, lane] = len(commanded)
         log.drives[lane, 0] = start.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
-        clock[STATUS, lane] = RUNNING
-        clock[PLANNED, lane] = min(engine.look_ahead, engine.max_step)
-        clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
+        clock[loop.STATUS, lane] = loop.RUNNING
+        clock[loop.PLANNED, lane] = min(engine.look_ahead, engine.max_step)
+        clock[loop.MARK, lane], clock[loop.DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
 
     def stop(self, lane: int) -> float:
         """Removes the gait from a lane, finished or not. Returns its wall time in s."""
         self._in_lane[lane] = None
-        self._lanes.clock.array[STATUS, lane] = IDLE
+        self._lanes.clock.array[loop.STATUS, lane] = loop.IDLE
         return self._wall_times[lane]
 
     def advance(self, body_steps: int) -> list[int]:
@@ -125,23 +105,24 @@ class LaneEngine:
         the lanes with finished gaits; result() empties a lane. Other Python threads run
         meanwhile."""
         started = time.perf_counter()
-        self._advance(*self._arguments, max(1, body_steps // (ROUND * self._bodies)))
+        self._advance(*self._arguments, max(1, body_steps // (loop.ROUND * self._bodies)))
         busy = [lane for lane, prepared in enumerate(self._in_lane) if prepared is not None]
         share = (time.perf_counter() - started) / max(len(busy), 1)
         for lane in busy:
             self._wall_times[lane] += share
-        return [lane for lane in busy if self._lanes.clock.array[STATUS, lane] != RUNNING]
+        return [lane for lane in busy if self._lanes.clock.array[loop.STATUS, lane] != loop.RUNNING]
 
     def result(self, lane: int) -> SimulationResult:
         """The result of the finished simulation in a lane; the lane becomes idle. Raises Diverged
         or StepBudgetExceeded if the simulation failed."""
-        prepared, status = self._in_lane[lane], int(self._lanes.clock.array[STATUS, lane])
+        prepared, status = self._in_lane[lane], int(self._lanes.clock.array[loop.STATUS, lane])
         if prepared is None:
             raise ValueError(f"lane {lane} is idle")
         wall_time = self.stop(lane)
         clock = self._lanes.clock.array[:, lane]
-        if status != DONE:
-            failure = _failure(status, time=float(clock[TIME]), scenario=prepared.robot.scenario)
+        if status != loop.DONE:
+            ended, scenario = float(clock[loop.TIME]), prepared.robot.scenario
+            failure = _failure(status, time=ended, scenario=scenario)
             failure.wall_time = wall_time
             raise failure
         return make_result(
@@ -152,8 +133,8 @@ class LaneEngine:
             work=IntegratorWork(
                 scheme="ros2",
                 accuracy=prepared.robot.scenario.settings_of(Compiled).tolerance,
-                steps=int(clock[TAKEN]),
-                derivative_evaluations=EVALUATIONS * int(clock[TRIED]),
+                steps=int(clock[loop.TAKEN]),
+                derivative_evaluations=loop.EVALUATIONS * int(clock[loop.TRIED]),
             ),
             wall_time=wall_time,
             record=prepared.record,
@@ -175,12 +156,12 @@ class LaneEngine:
 def _failure(status: int, *, time: float, scenario: Scenario) -> SimulationFailure:
     """The failure of a simulation that ended at a time (s) with this status."""
     budget = scenario.simulation.max_evaluations
-    if status == TOO_MANY_EVALUATIONS:
+    if status == loop.TOO_MANY_EVALUATIONS:
         reason = f"force evaluations exceed the budget of {budget}"
         return StepBudgetExceeded(time=time, reason=reason)
     reasons = {
-        TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
-        STEP_TOO_SMALL: "no step is small enough for the tolerance",
+        loop.TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
+        loop.STEP_TOO_SMALL: "no step is small enough for the tolerance",
     }
     return Diverged(time=time, reason=reasons[status])
 
@@ -202,7 +183,7 @@ def processor_features() -> str:
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
-def _constants_in_lanes(constants: Constants, heights: np.ndarray) -> Constants:
+def _constants_in_lanes(constants: loop.Constants, heights: np.ndarray) -> loop.Constants:
     """Tables in lanes for constants like the given ones. `heights` has a row per lane."""
     width = len(heights)
     lanes = in_lanes(constants, width)

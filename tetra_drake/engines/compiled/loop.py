@@ -22,23 +22,13 @@ from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
-from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE
+from tetra_drake.physics import actuator, contact, oscillator
 from tetra_drake.physics.cable import LENGTH
-from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.oscillator import (
-    NEURON_COLUMNS,
-    Network,
-    correct_neurons,
-    euler_step,
-    oscillator_output,
-    predict_neurons,
-    steered_input,
-)
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.simd.compiling import compiled, inlined, merged
 from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, by_lane, maximum, minimum, select
@@ -84,7 +74,7 @@ class Constants(NamedTuple):
 
     robot: Model
     solver: Solver
-    network: Network
+    network: oscillator.Network
     senses: Senses
     sides: Table
     """Side of each neuron (2n,) for n oscillators: 1 left, -1 right, 0 neither."""
@@ -113,17 +103,17 @@ class LaneState(NamedTuple):
     """Numbers that are computed for all lanes and then read lane by lane."""
     step: Step
     forces: Forces
-    modes: Annotated[Table, "contacts", MODE_COLUMNS]
+    modes: Annotated[Table, "contacts", contact.MODE_COLUMNS]
     acceleration: Annotated[Table, "6 * bodies"]
     signals: Annotated[Table, "signals"]
     """Signals at the lane's time."""
     end_signals: Annotated[Table, "signals"]
     """Signals at the end of the lane's step."""
-    drives: Annotated[Table, "drives", DRIVE_COLUMNS]
+    drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
     """Drives at the lane's time."""
     end_drives: Annotated[Table, "drives"]
     """Drives at the end of the lane's step."""
-    neurons: Annotated[Table, "2 * signals", NEURON_COLUMNS]
+    neurons: Annotated[Table, "2 * signals", oscillator.NEURON_COLUMNS]
     output: Annotated[Table, "signals"]
     """Latest outputs of the oscillators."""
     tonic: Annotated[Table, "2 * signals"]
@@ -149,7 +139,7 @@ class Log(NamedTuple):
     kept: Annotated[Table, "lanes", int]
     """Number of recorded samples."""
     states: Annotated[Table, "lanes", "samples", "13 * bodies"]
-    modes: Annotated[Table, "lanes", "samples", "contacts", MODE_COLUMNS]
+    modes: Annotated[Table, "lanes", "samples", "contacts", contact.MODE_COLUMNS]
     """Modes during the step that contains the sample."""
     signals: Annotated[Table, "lanes", "samples", "signals"]
     """Signals in N."""
@@ -210,7 +200,7 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     accepted = is_running & (error <= constants.tolerance[0])
     if live:
         feel(constants, lanes, log, step_end, lanes.step.end)
-        correct_neurons(constants.network, lanes.inputs, step, accepted, lanes.neurons)
+        oscillator.correct_neurons(constants.network, lanes.inputs, step, accepted, lanes.neurons)
         drive(constants, lanes)
     if any_lane(accepted & (clock[DUE] <= step_end)):
         lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
@@ -230,8 +220,8 @@ def arrive(constants: Constants, lanes: LaneState) -> None:
     robot, forces, state = constants.robot, lanes.forces, lanes.step.state
     move_robot(robot, state, forces)
     for i in range(lanes.drives.shape[0]):
-        forces.drives[i, DRIVE] = lanes.drives[i, DRIVE]
-    update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
+        forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
+    contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
     compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
     observe(lanes.tally, robot, lanes.clock[TIME], state, lanes.signals, forces)
 
@@ -242,7 +232,7 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
     clock = lanes.clock
     if live:
         feel(constants, lanes, log, clock[TIME], lanes.step.state)
-        predict_neurons(constants.network, lanes.inputs, clock[STEP], lanes.neurons)
+        oscillator.predict_neurons(constants.network, lanes.inputs, clock[STEP], lanes.neurons)
         drive(constants, lanes)
         return
     run_ahead(constants, lanes, log, clock[END])
@@ -257,16 +247,17 @@ def foresee_drives(lanes: LaneState) -> None:
     step."""
     drives = lanes.forces.drives
     for i in range(drives.shape[0]):
-        lanes.drives[i, RATE] = drives[i, RATE]
-        drives[i, DRIVE] = lanes.drives[i, DRIVE] + lanes.clock[STEP] * drives[i, RATE]
+        rate = drives[i, actuator.RATE]
+        lanes.drives[i, actuator.RATE] = rate
+        drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE] + lanes.clock[STEP] * rate
 
 
 @inlined
 def correct_drives(lanes: LaneState) -> None:
     """Writes the drives at the end of the step, with the mean of the rates at both ends."""
     for i in range(lanes.drives.shape[0]):
-        rate = 0.5 * (lanes.drives[i, RATE] + lanes.forces.drives[i, RATE])
-        lanes.end_drives[i] = lanes.drives[i, DRIVE] + lanes.clock[STEP] * rate
+        rate = 0.5 * (lanes.drives[i, actuator.RATE] + lanes.forces.drives[i, actuator.RATE])
+        lanes.end_drives[i] = lanes.drives[i, actuator.DRIVE] + lanes.clock[STEP] * rate
 
 
 @inlined
@@ -278,7 +269,8 @@ def move_on(lanes: LaneState, is_running: Truth, accepted: Truth) -> None:
     for k in range(lanes.signals.size):
         lanes.signals[k] = select(accepted, lanes.end_signals[k], lanes.signals[k])
     for i in range(lanes.drives.shape[0]):
-        lanes.drives[i, DRIVE] = select(accepted, lanes.end_drives[i], lanes.drives[i, DRIVE])
+        now = lanes.drives[i, actuator.DRIVE]
+        lanes.drives[i, actuator.DRIVE] = select(accepted, lanes.end_drives[i], now)
     clock[TIME] = select(accepted, clock[END], clock[TIME])
     clock[TRIED] += select(is_running, 1.0, 0.0)
     clock[TAKEN] += select(accepted, 1.0, 0.0)
@@ -337,8 +329,9 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
     while any_lane(is_unfinished & (clock[SAMPLES] <= last_needed)):
         takes_step = is_unfinished & (clock[SAMPLES] < end_of_buffer)
         steer(constants, lanes, log, clock[SAMPLES] + 0.5)
-        euler_step(constants.network, lanes.tonic, select(takes_step, period, 0.0), lanes.neurons)
-        oscillator_output(lanes.neurons, lanes.output)
+        step = select(takes_step, period, 0.0)
+        oscillator.euler_step(constants.network, lanes.tonic, step, lanes.neurons)
+        oscillator.oscillator_output(lanes.neurons, lanes.output)
         lanes.scratch[NETWORK_STEPS] = select(takes_step, 1.0, 0.0)
         keep_outputs(constants, lanes, log)
         clock[SAMPLES] += lanes.scratch[NETWORK_STEPS]
@@ -364,7 +357,7 @@ def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Ta
     for i in range(lanes.lengths.size):
         lanes.lengths[i] = lanes.forces.cable_forces[i, LENGTH]
     for i in range(lanes.normal_forces.size):
-        lanes.normal_forces[i] = lanes.forces.ground_forces[i, NORMAL]
+        lanes.normal_forces[i] = lanes.forces.ground_forces[i, contact.NORMAL]
     lengths, loads = lanes.lengths, lanes.normal_forces
     sense(constants.senses, constants.gains, state, lengths, loads, lanes.inputs)
     for i in range(lanes.inputs.size):
@@ -386,13 +379,13 @@ def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> Non
         before, after = log.turns[lane, i], log.turns[lane, i + 1]
         turn = before + (min(position, turns - 1.0) - i) * (after - before)
         for k in range(lanes.tonic.size):
-            tonic[k, lane] = steered_input(external, turn, sides[k, lane])
+            tonic[k, lane] = oscillator.steered_input(external, turn, sides[k, lane])
 
 
 @inlined
 def drive(constants: Constants, lanes: LaneState) -> None:
     """Writes the signals (N) of a live network at the end of the step."""
-    oscillator_output(lanes.neurons, lanes.output)
+    oscillator.oscillator_output(lanes.neurons, lanes.output)
     active, gain = lanes.clock[ACTIVE] != 0.0, constants.gain[0]
     for k in range(lanes.output.size):
         lanes.end_signals[k] = select(active, gain * lanes.output[k], 0.0)
@@ -427,7 +420,7 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
     """Sets the next mark and the signals in lanes that have reached a mark. Returns True if a
     simulation is finished."""
     clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
-    oscillator_output(lanes.neurons, lanes.output)
+    oscillator.oscillator_output(lanes.neurons, lanes.output)
     for lane in range(log.kept.size):
         if clock[STATUS, lane] != RUNNING or clock[TIME, lane] < clock[MARK, lane]:
             continue
@@ -462,7 +455,7 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
             for k in range(state.size):
                 log.states[lane, i, k] = state[k]
             for k in range(modes.shape[0]):
-                for c in range(MODE_COLUMNS):
+                for c in range(contact.MODE_COLUMNS):
                     log.modes[lane, i, k, c] = modes[k, c, lane]
             if not live:
                 interpolate(constants, lanes, log, lane, due, signals)
@@ -472,7 +465,7 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
                 log.signals[lane, i, k] = between if live else signals[k, lane]
             drives, end_drives = by_lane(lanes.drives), by_lane(lanes.end_drives)
             for k in range(lanes.drives.shape[0]):
-                first, last = drives[k, DRIVE, lane], end_drives[k, lane]
+                first, last = drives[k, actuator.DRIVE, lane], end_drives[k, lane]
                 log.drives[lane, i, k] = first + part * (last - first)
             log.kept[lane] = i + 1
             clock[DUE, lane] = log.times[lane, i + 1]

@@ -32,15 +32,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
+from tetra_drake.engines.compiled import dynamics
 from tetra_drake.engines.compiled.block_sparse import BLOCK, factorise, solve
-from tetra_drake.engines.compiled.dynamics import (
-    CABLES_AT_ONCE,
-    LINE_COLUMNS,
-    Solver,
-    implicit_matrix,
-    momentum,
-    refer_torques,
-)
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.inertia import INERTIA_COLUMNS
 from tetra_drake.physics.kinematics import P_BN_W, move_bodies
@@ -71,7 +64,7 @@ class Step(NamedTuple):
     """Mean rate of the positions, 3/2 q1 + 1/2 q2."""
     rows: Annotated[Table, "bodies", BLOCK, "width"]
     """Implicit matrix; see Schedule.width."""
-    lines: Annotated[Table, CABLES_AT_ONCE, LINE_COLUMNS]
+    lines: Annotated[Table, dynamics.CABLES_AT_ONCE, dynamics.LINE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Inertia at the beginning of the step."""
 
@@ -79,7 +72,7 @@ class Step(NamedTuple):
 @merged
 def take_step(
     robot: Model,
-    solver: Solver,
+    solver: dynamics.Solver,
     work: Step,
     modes: Table,
     forces: Forces,
@@ -100,7 +93,7 @@ def take_step(
     size, scaled = work.force.size, GAMMA * step
     bodies = size // BLOCK
     first = state.size - size
-    implicit_matrix(robot, solver, modes, forces, scaled, work.lines, work.rows)
+    dynamics.implicit_matrix(robot, solver, modes, forces, scaled, work.lines, work.rows)
     factorise(work.rows, solver.schedule)
     if not robot.isotropic:
         for body in range(bodies):
@@ -122,7 +115,7 @@ def take_step(
     move_bodies(state, q1, step, end)
     compute_end_forces(robot, work, modes, forces, signals, write_parts)
     for body in range(bodies):
-        gained = momentum(robot, work.inertia, k1, body)
+        gained = dynamics.momentum(robot, work.inertia, k1, body)
         for j in range(BLOCK):
             i = BLOCK * body + j
             k2[i] = work.end_force[i] - 2.0 * gained[j] - work.change[i]
@@ -145,7 +138,7 @@ def compute_end_forces(
     move_robot(robot, work.end, forces)
     compute_forces(robot, work.end, modes, signals, write_parts, forces, work.end_force)
     if not robot.isotropic:
-        refer_torques(work.inertia, forces.inertia, work.end_force)
+        dynamics.refer_torques(work.inertia, forces.inertia, work.end_force)
 
 
 @inlined
