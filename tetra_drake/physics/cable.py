@@ -69,6 +69,11 @@ def elastic_tension(stretch: Real, law: CableLaw) -> Real:
     return law.stiffness * stretch
 
 
+def elastic_stretch(tension: Real, law: CableLaw) -> Real:
+    """Stretch (m) of a cable at rest with a tension (N): the inverse of elastic_tension()."""
+    return tension / law.stiffness
+
+
 @inlined
 def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
     """Tension (N) of a cable by Eq. 6.

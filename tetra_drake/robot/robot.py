@@ -147,7 +147,7 @@ class Robot:
         the actuators; empty if neither."""
         cpg, driven = self.scenario.cpg, self.structure.cables[self.driven]
         signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
-        moved = signal / driven["stiffness"]
+        moved = cable.elastic_stretch(signal, cable.CableLaw.of(driven))
         share = np.max(moved / self._starting_lengths())
         if share < LEAST_MOTION:
             problem = f"move no cable by more than {share:.2g} of its length"

@@ -95,11 +95,19 @@ class CableGroup(CableConstants):
         """The constants of a cable."""
         return self.constants(stiffness=self.stiffness, free_length=free_length)
 
+    def greatest_tension(self, length: float) -> float:
+        """Tension (N) of a cable of this length (m) with a free length of 0."""
+        from tetra_drake.physics.cable import CableLaw, elastic_tension
+
+        return elastic_tension(length, CableLaw(**self.law(0.0)))
+
     def free_length_at(self, length: float) -> float:
         """Free length (m) of a cable. `length` (m) is the distance of its nodes in the file."""
+        from tetra_drake.physics.cable import CableLaw, elastic_stretch
+
         if self.free_length is not None:
             return self.free_length
-        return length - (self.tension or 0.0) / self.stiffness
+        return length - elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))
 
 
 class Member(NamedTuple):
@@ -385,9 +393,9 @@ class StructureFile(Section):
         for cable, free_length in zip(self.all_cables, self.free_lengths, strict=True):
             if free_length < 0.0:
                 group = self.cables[cable.group]
-                most = f"at most {self._length(cable) * group.stiffness:.4g} N"
+                most = f"at most {group.greatest_tension(self._length(cable)):.4g} N"
                 problem = f"found {group.tension} N, expected {most} for '{cable.name}'"
-                refuse(f"cables.{cable.group}.tension", f"{problem}: its stiffness times length")
+                refuse(f"cables.{cable.group}.tension", f"{problem}, where its free length is 0")
 
     def _check_actuated(self) -> None:
         oscillators: dict[int, str] = {}

@@ -278,13 +278,16 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
     neglected: twice the density moves T1 by less than 0.003 in. Refuses cables that balance at no
     spacing.
     """
+    from tetra_drake.physics.cable import CableLaw, elastic_tension
+
     height = strut_length * math.sqrt(2.0 / 3.0)
     radius = strut_length / math.sqrt(3.0)
+    outer, inner = CableLaw(**cables.law("outer top")), CableLaw(**cables.law("inner top"))
 
     def pull(s: float) -> float:
         length = math.hypot(radius, height - s)
-        inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
-        return cables.outer_stiffness * (s - cables.free_length) - inner
+        apart = elastic_tension(length - inner.free_length, inner) * (height - s) / length
+        return elastic_tension(s - outer.free_length, outer) - apart
 
     near, far = 0.0, height + cables.free_length
     if pull(near) >= 0.0:

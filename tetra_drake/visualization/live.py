@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
+from tetra_drake.physics.cable import CableLaw, elastic_tension
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario
@@ -49,8 +50,8 @@ class LiveView:
         # The greatest tension is not known yet. The greatest at the start has half of full size.
         cables = structure.cables
         lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
-        stretch = lengths - cables["free_length"]
-        self._per_newton = radius_per_newton(structure, 2.0 * (cables["stiffness"] * stretch).max())
+        tensions = elastic_tension(lengths - cables["free_length"], CableLaw.of(cables))
+        self._per_newton = radius_per_newton(structure, 2.0 * np.max(tensions))
         add_robot(meshcat, structure)
         around = np.stack([p_WN - free, p_WN + free])
         set_surroundings(meshcat, self._robot, around, seen=around)
