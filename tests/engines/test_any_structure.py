@@ -8,7 +8,10 @@ import pytest
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
 from tetra_drake.experiment import evolve
+from tetra_drake.physics.cable import LENGTH
+from tetra_drake.physics.contact import NORMAL
 from tetra_drake.physics.feedback import sense
+from tetra_drake.physics.forces import Forces
 from tetra_drake.results.result import save_result
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -33,8 +36,11 @@ def felt(robot: Robot, *, gains: list[float], longer: float, pushes: np.ndarray)
     structure, state = robot.structure, robot.structure.initial_state
     p_WN = node_positions(structure, state)
     along = p_WN[structure.cables["node_a"]] - p_WN[structure.cables["node_b"]]
-    lengths, feedback = longer * np.linalg.norm(along, axis=1), np.empty(2 * structure.signals)
-    sense(robot.senses, np.array(gains), state, lengths, pushes, feedback)
+    forces, feedback = Forces.of(robot.model), np.empty(2 * structure.signals)
+    forces.cable_forces[:, LENGTH] = longer * np.linalg.norm(along, axis=1)
+    forces.ground_forces[:, NORMAL] = pushes
+    cable_forces, ground_forces = forces.cable_forces, forces.ground_forces
+    sense(robot.senses, np.array(gains), state, cable_forces, ground_forces, feedback)
     return feedback.reshape(-1, 2)
 
 

@@ -11,16 +11,18 @@ shifts the signal to one side. Feedback with equal signs excites or calms both n
     pitch   sine of the angle by which the x axis of that body points up: + on the extensor, - on
             the flexor
 
-The input of a sense must be smooth within a step of an integrator. Quantities that jump, such as
-contact with the ground, must be read from `modes`, which are constant within a step (see
-`friction`).
+The input of a sense must be smooth within a step of an integrator. Contact with the ground jumps;
+normal forces do not.
+
+To add a pathway: name it, with its gain, in scenario.common_sections, and add its part to sense().
+A constant of the robot is a field of Senses, which robot.robot fills in.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics import cable, contact
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table
 
@@ -51,26 +53,26 @@ def sense(
     senses: Senses,
     gains: Table,
     state: Table,
-    lengths: Table,
-    normal_forces: Table,
+    cable_forces: Table,
+    ground_forces: Table,
     feedback: Table,
 ) -> None:
-    """Writes the feedback of each neuron (2m,).
+    """Writes the feedback of each neuron (2m,), from the state of the bodies and its forces.
 
-    `gains` (3,) are for length, load and pitch. `state` is the state of the bodies, `lengths`
-    (cables,) are in m, `normal_forces` (contacts,) in N.
+    `gains` are in the order of common_sections.Gains. `cable_forces` and `ground_forces` are the
+    tables of `cable` and `contact`.
     """
     for i in range(feedback.size):
         feedback[i] = 0.0
-    for i in range(lengths.size):
-        k = senses.drivers[i]
-        if k != PASSIVE:
-            feedback[2 * k] += senses.per_length[i] * (lengths[i] - senses.neutral_length[i])
+    for i in range(senses.drivers.size):
+        k, length = senses.drivers[i], cable_forces[i, cable.LENGTH]
+        if k != cable.PASSIVE:
+            feedback[2 * k] += senses.per_length[i] * (length - senses.neutral_length[i])
     for k in range(feedback.size // 2):
         body, load = senses.ahead[k], 0.0
-        for c in range(normal_forces.size):
+        for c in range(senses.carriers.size):
             if senses.carriers[c] == body:
-                load += normal_forces[c]
+                load += ground_forces[c, contact.NORMAL]
         q = 7 * body
         pitch = 2.0 * (state[q + 1] * state[q + 3] - state[q] * state[q + 2])
         differs = gains[0] * feedback[2 * k]

@@ -17,6 +17,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import Table
 from tetra_drake.robot.weights import KINDS, Weights
+from tetra_drake.scenario.common_sections import Gains
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Section
@@ -36,14 +37,6 @@ TAU_B_PER_TAU_A = 2.0
 
 _MOST_COLUMNS = 8
 """Largest number of oscillators for which print() shows all weights, in lines of 100 characters."""
-
-
-class Gains(Section):
-    """Gain of each feedback pathway (see physics.feedback), in units of the input u0."""
-
-    length: float = 0.0
-    load: float = 0.0
-    pitch: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,14 @@ Pathway = Literal["length", "load", "pitch"]
 PATHWAYS: tuple[str, ...] = get_args(Pathway)
 
 
+class Gains(Section):
+    """Gain of each pathway of feedback in a gait, in units of the input u0."""
+
+    length: float = 0.0
+    load: float = 0.0
+    pitch: float = 0.0
+
+
 class GroundSection(Section):
     """The normal force (Table 1)."""
 

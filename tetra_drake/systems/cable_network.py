@@ -23,6 +23,7 @@ class CableNetwork(LeafSystem):
     | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
     | tensions          | (cables,)      | N      | tension of each cable                    |
     | lengths           | (cables,)      | m      | length of each cable                     |
+    | cable_forces      | (6 cables,)    | SI     | table of physics.cable, row by row       |
     | rates             | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
     With `robot.cables.slack`, a cable goes slack instead of pushing. The ports `drives` and `rates`
@@ -51,6 +52,8 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, inputs)
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
+        size = self._forces.cable_forces.size
+        self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
 
     def _compute(self, context: Context, force: np.ndarray) -> None:
         """Writes the generalized force to `force`, and the table `cable_forces`."""
@@ -69,6 +72,10 @@ class CableNetwork(LeafSystem):
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
         self._compute(context, self._force)
         output.SetFromVector(self._forces.cable_forces[:, cable.LENGTH])
+
+    def _calc_table(self, context: Context, output: BasicVector) -> None:
+        self._compute(context, self._force)
+        output.SetFromVector(self._forces.cable_forces.ravel())
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
         self._compute(context, self._force)

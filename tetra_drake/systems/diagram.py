@@ -82,10 +82,8 @@ def MakeTensegrityDiagram(
         gains = [gain for _, gain in gait.gains]
         feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))
         builder.Connect(state, feedback.GetInputPort("state"))
-        builder.Connect(cables.GetOutputPort("lengths"), feedback.GetInputPort("lengths"))
-        builder.Connect(
-            ground.GetOutputPort("normal_forces"), feedback.GetInputPort("normal_forces")
-        )
+        for source, name in ((cables, "cable_forces"), (ground, "ground_forces")):
+            builder.Connect(source.GetOutputPort(name), feedback.GetInputPort(name))
         cpg = builder.GetSubsystemByName("cpg")
         builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
 

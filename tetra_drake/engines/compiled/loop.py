@@ -23,7 +23,6 @@ from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics import actuator, contact, oscillator
-from tetra_drake.physics.cable import LENGTH
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
@@ -80,7 +79,7 @@ class Constants(NamedTuple):
     """Side of each neuron (2n,) for n oscillators: 1 left, -1 right, 0 neither."""
     external_input: Table
     gains: Table
-    """Feedback gains (3,): length, load, pitch."""
+    """Feedback gains, in the order of common_sections.Gains."""
     gain: Table
     """Force (N) per unit of an oscillator's output."""
     period: Table
@@ -120,10 +119,6 @@ class LaneState(NamedTuple):
     """Inputs of the neurons without feedback."""
     inputs: Annotated[Table, "2 * signals"]
     """Inputs of the neurons with feedback."""
-    lengths: Annotated[Table, "cables"]
-    """Cable lengths for the feedback."""
-    normal_forces: Annotated[Table, "contacts"]
-    """Normal forces for the feedback."""
     tally: Tally
 
 
@@ -354,12 +349,8 @@ def keep_outputs(constants: Constants, lanes: LaneState, log: Log) -> None:
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
     """Writes the inputs of a live network at a time (s), from a state and its forces."""
     steer(constants, lanes, log, time / constants.period[0])
-    for i in range(lanes.lengths.size):
-        lanes.lengths[i] = lanes.forces.cable_forces[i, LENGTH]
-    for i in range(lanes.normal_forces.size):
-        lanes.normal_forces[i] = lanes.forces.ground_forces[i, contact.NORMAL]
-    lengths, loads = lanes.lengths, lanes.normal_forces
-    sense(constants.senses, constants.gains, state, lengths, loads, lanes.inputs)
+    cable_forces, ground_forces = lanes.forces.cable_forces, lanes.forces.ground_forces
+    sense(constants.senses, constants.gains, state, cable_forces, ground_forces, lanes.inputs)
     for i in range(lanes.inputs.size):
         lanes.inputs[i] += lanes.tonic[i]
 

@@ -1,0 +1,51 @@
+"""Feedback to the oscillators as a LeafSystem."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from tetra_drake.physics import cable, contact
+from tetra_drake.physics.feedback import sense
+from tetra_drake.robot.robot import Robot
+
+
+class Feedback(LeafSystem):
+    """Feedback from cables, ground and bodies to the oscillators (see physics.feedback). It has no
+    state.
+
+    | port          | shape         | unit | meaning                                               |
+    |---------------|---------------|------|-------------------------------------------------------|
+    | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
+    | cable_forces  | (6 cables,)   | SI   | table of physics.cable, row by row, from the cables   |
+    | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
+    | feedback      | (2m,)         | 1    | f of Eq. 7 for the neurons of m oscillators           |
+    """
+
+    def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
+        """`gains` are in the order of Gains. Raises InputError if the robot has no equilibrium."""
+        super().__init__()
+        structure = robot.structure
+        self._senses = robot.senses
+        self._gains = np.array(gains, dtype=float)
+        self._neurons = 2 * structure.signals
+        self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
+        self._cable_shape = len(structure.cables), cable.CABLE_FORCE_COLUMNS
+        self._ground_shape = len(structure.contacts), contact.GROUND_FORCE_COLUMNS
+        self._cables = self.DeclareVectorInputPort("cable_forces", math.prod(self._cable_shape))
+        self._ground = self.DeclareVectorInputPort("ground_forces", math.prod(self._ground_shape))
+        inputs = {self._state.ticket(), self._cables.ticket(), self._ground.ticket()}
+        self.DeclareVectorOutputPort("feedback", self._neurons, self._calc_feedback, inputs)
+
+    def _calc_feedback(self, context: Context, output: BasicVector) -> None:
+        sense(
+            self._senses,
+            self._gains,
+            self._state.Eval(context),
+            self._cables.Eval(context).reshape(self._cable_shape),
+            self._ground.Eval(context).reshape(self._ground_shape),
+            output.get_mutable_value(),
+        )
