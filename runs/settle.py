@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from analyse import Analysis, load_analysis
 
-from tetra_drake.analysis.statistics import middle, resampled
+from tetra_drake.analysis.statistics import interval_of_resamples, resampled
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed, ranged
 from tetra_drake.scenario.units import INCH
@@ -44,7 +44,7 @@ def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, floa
     """Mean of `other` (m,) minus mean of `one` (n,), and its 95 % interval by bootstrap."""
     generator = np.random.default_rng(0)
     means, other_means = resampled(one, generator), resampled(other, generator)
-    return float(other.mean() - one.mean()), *middle(other_means - means)
+    return float(other.mean() - one.mean()), *interval_of_resamples(other_means - means)
 
 
 def settled(first: Path, second: Path) -> Table:

@@ -10,7 +10,7 @@ from helpers.widths import WIDEST
 
 from tetra_drake.engines.compiled import lane_pool
 from tetra_drake.errors import InputError
-from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -48,7 +48,7 @@ def scenario() -> Scenario:
 @pytest.fixture
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
-    return MakeStructure(scenario)
+    return make_structure(scenario)
 
 
 @pytest.fixture

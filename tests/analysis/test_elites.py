@@ -6,7 +6,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from pandas import DataFrame
 from ribs.archives import GridArchive
 
-from tetra_drake.analysis.elites import CELLS, chosen, elites, judge_elites, robust
+from tetra_drake.analysis.elites import CELLS, elites, judge_elites, kept_gaits, notable_gaits
 from tetra_drake.analysis.robustness import Judgement
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.quality_diversity import FLOOR
@@ -73,7 +73,7 @@ def test_all_trials_are_on_one_map_without_failures_and_what_lacks_a_measure(run
 
 def test_a_run_that_asks_for_no_map_has_none(run_of):
     run = run_of({2.0: (0.01, 0.3)}, **{"optimizer": tiny_scenario().optimizer})
-    assert elites(run).empty and chosen(run) == {}
+    assert elites(run).empty and notable_gaits(run) == {}
     judge_elites(run.directory)
     assert not (run.directory / "elites.jsonl").exists()
 
@@ -83,8 +83,8 @@ def test_the_fittest_and_those_next_to_the_corners_are_chosen_without_lucky_ones
         {9.0: (0.09, 0.7), 8.0: (0.05, 0.5), 3.0: (0.01, 0.3), 2.0: (0.03, 0.7), 4.0: (0.07, 0.3)}
     )
     keep(run, {(0, 0): 0.4, (0, 1): 0.5, (0, 2): 1.0})
-    assert keys(robust(elites(run))) == [(0, 1), (0, 4), (0, 2), (0, 3)]
-    assert {name: gait["index"] for name, gait in chosen(run).items()} == {
+    assert keys(kept_gaits(elites(run))) == [(0, 1), (0, 4), (0, 2), (0, 3)]
+    assert {name: gait["index"] for name, gait in notable_gaits(run).items()} == {
         "fittest of the map": 1,
         "low speed, low lifted": 2,
         "low speed, high lifted": 3,
@@ -92,7 +92,7 @@ def test_the_fittest_and_those_next_to_the_corners_are_chosen_without_lucky_ones
         "high speed, high lifted": 1,
     }
     keep(run, {(0, index): 0.0 for index in range(5)})
-    assert chosen(run) == {}
+    assert notable_gaits(run) == {}
 
 
 def test_elites_are_simulated_on_disturbed_robots_once(run_of, monkeypatch):

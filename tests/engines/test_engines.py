@@ -18,7 +18,7 @@ from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.results.measures import path_of_centre
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import MakeStructure
+from tetra_drake.robot.robot import make_structure
 from tetra_drake.scenario import engine_kinds
 from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Drake
@@ -95,7 +95,7 @@ def test_the_path_is_that_of_the_trajectory(scenario, engine):
     beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3, 1, 6)]
     short = shortly(scenario, engine).with_changes({"robot.offsets": beside})
     result = simulate(scenario=short, gait=seeded_gait(short), record=True)
-    path, whole = result.path, path_of_centre(result.trajectory, MakeStructure(short))
+    path, whole = result.path, path_of_centre(result.trajectory, make_structure(short))
     assert path.times.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
     np.testing.assert_allclose(path.centre, whole.centre[::25], atol=1e-9)
     np.testing.assert_allclose(path.heading, whole.heading[::25], atol=1e-9)

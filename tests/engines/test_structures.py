@@ -23,7 +23,7 @@ from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import AddBodies, node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
@@ -122,7 +122,7 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
     row = Robot.of(scenario)
     kind = row_as_kind(row)
     written = scenario.with_sections(robot=kind)
-    structure = MakeStructure(written)  # at rest; the row starts where it is balanced
+    structure = make_structure(written)  # at rest; the row starts where it is balanced
     start = {"p_WB": row.structure.p_WB, "q_WB": row.structure.q_WB}
     alike = Robot.of(written, dataclasses.replace(structure, **start))
     assert alike.model.isotropic

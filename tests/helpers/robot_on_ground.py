@@ -5,7 +5,7 @@ import numpy as np
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.forces import Forces, add_ground_forces, move_contacts
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
-from tetra_drake.robot.robot import MakeStructure, make_model
+from tetra_drake.robot.robot import make_model, make_structure
 from tetra_drake.scenario.scenario import Scenario
 
 REST = (0.0, 0.0, 0.0)
@@ -21,7 +21,7 @@ class RobotOnGround:
     """
 
     def __init__(self, scenario: Scenario, R: np.ndarray) -> None:
-        self.structure, self.R = MakeStructure(scenario), R
+        self.structure, self.R = make_structure(scenario), R
         self.model = make_model(scenario, self.structure)
         self.modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
 

@@ -17,7 +17,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from tetra_drake.physics.clearance import Struts, least_strut_distance, strut_distance
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.physics.model import Model
-from tetra_drake.robot.robot import MakeStructure, make_model
+from tetra_drake.robot.robot import make_model, make_structure
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -98,7 +98,7 @@ def test_the_clearance_is_that_of_drakes_geometry(name):
     # The robot as it starts, then bodies that are turned and moved more and more: in the end,
     # they are all over each other, and any strut may be the nearest.
     scenario = load_scenario(name)
-    structure, generator = MakeStructure(scenario), np.random.default_rng(3)
+    structure, generator = make_structure(scenario), np.random.default_rng(3)
     for size in [0.0, *np.repeat([0.01, 0.02, 0.04, 0.1], 6)]:
         state = disturbed(structure, int(generator.integers(1000)), pose=size, speed=0.0)
         poses = [

@@ -11,7 +11,7 @@ from pydrake.multibody.tree import FixedOffsetFrame
 
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.kinematics import V_WN
-from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import NODES, STRUTS
@@ -23,7 +23,7 @@ IN = 0.0254
 def row(request, scenario) -> Structure:
     """A structure of some number of tetrahedra."""
     scenario = scenario.with_changes({"robot.tetrahedra": request.param})
-    structure = MakeStructure(scenario)
+    structure = make_structure(scenario)
     assert len(structure.bodies) == request.param
     return structure
 
@@ -142,7 +142,7 @@ def test_the_ground_touches_all_bottom_nodes_and_the_lead_tip(row):
 @pytest.mark.parametrize("name", ["thesis", "prism", "mast"])
 def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(name):
     # This needs the plant's state to run body by body, in the structure's order.
-    structure = MakeStructure(load_scenario(name))
+    structure = make_structure(load_scenario(name))
     plant = MultibodyPlant(time_step=0.0)
     bodies = AddBodies(plant, structure)
     nodes = zip(structure.carriers, structure.node_names, structure.p_BN, strict=True)

@@ -9,7 +9,7 @@ from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
-from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 
@@ -40,7 +40,7 @@ def distances(p_WN: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_bars_have_the_mass_and_the_moments_of_the_independent_simulation(name, data):
-    recorded, structure = recorded_structure(data, name), MakeStructure(load_scenario(name))
+    recorded, structure = recorded_structure(data, name), make_structure(load_scenario(name))
     np.testing.assert_allclose(structure.mass, recorded["bar_mass"], rtol=1e-12)
     across, axial = recorded["moment_across"], recorded["moment_axial"]
     for mass, inertia in zip(structure.mass, unit_inertias(structure), strict=True):
@@ -50,7 +50,7 @@ def test_bars_have_the_mass_and_the_moments_of_the_independent_simulation(name, 
 
 def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
     scenario = load_scenario("mast").with_changes({"robot.masses": {"v2_front_low": "35 g"}})
-    structure, group = MakeStructure(scenario), scenario.robot.struts["v2"]
+    structure, group = make_structure(scenario), scenario.robot.struts["v2"]
     nodes = np.flatnonzero(structure.carriers == 1)
     radius, ball_radius = group.diameter / 2, group.node_diameter / 2
     parts = []  # of mass, place of the centre, inertia about it
@@ -80,7 +80,7 @@ def test_offsets_move_the_bodies_of_the_robot_at_rest():
     scenario = load_scenario("prism")
     shift = [[0.0, 0.0, 0.01], [0.02, 0.0, 0.01], [0.0, -0.03, 0.01]]
     moved = scenario.with_sections(robot=scenario.robot.model_copy(update={"offsets": shift}))
-    difference = MakeStructure(moved).p_WB - MakeStructure(scenario).p_WB
+    difference = make_structure(moved).p_WB - make_structure(scenario).p_WB
     np.testing.assert_allclose(difference, shift, atol=1e-15)
 
 
@@ -94,13 +94,13 @@ def test_nodes_placed_in_the_ground_are_refused(refused):
     scenario = load_scenario("prism")
     sunk = scenario.with_changes({"robot.nodes.n1": ["-5 cm", "8.66 cm", "-1 mm"]})
     with refused("prism", "robot.nodes.n1", "0.001 m below"):
-        MakeStructure(sunk)
+        make_structure(sunk)
 
 
 def test_a_structure_without_rest_is_refused_with_the_body_that_is_left(monkeypatch):
     monkeypatch.setattr(equilibrium, "MOST_STEPS", 2)
     with pytest.raises(InputError) as caught:
-        MakeStructure(load_scenario("six_bar"))
+        make_structure(load_scenario("six_bar"))
     assert caught.value.key == "robot"
     assert any(f"'n{2 * i} n{2 * i + 1}'" in str(caught.value) for i in range(6))
 
@@ -110,7 +110,7 @@ def test_a_structure_in_another_order_rests_alike():
     scenario = load_scenario("six_bar")
     backward = scenario.robot.struts["bar"].pairs[::-1]
     turned = scenario.with_changes({"robot.struts.bar.pairs": backward})
-    one, other = MakeStructure(scenario), MakeStructure(turned)
+    one, other = make_structure(scenario), make_structure(turned)
     assert other.node_names != one.node_names
     place = [other.node_names.index(name) for name in one.node_names]
     there = node_positions(other, other.initial_state)[place]

@@ -73,7 +73,9 @@ def runs(tmp_path_factory):
 def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
     run, thinned = runs
     assert len(thinned.evaluations) == len(run.evaluations)
-    assert len(thinned.whole) < 0.8 * len(run.whole) == 0.8 * len(run.evaluations)
+    assert (
+        len(thinned.with_parameters) < 0.8 * len(run.with_parameters) == 0.8 * len(run.evaluations)
+    )
     fitness = run.evaluations.groupby("trial")["fitness"]
     rises = run.evaluations[run.evaluations["fitness"] == fitness.cummax()]
     last = pandas.concat([last_population(run, 0), last_population(run, 1)])
@@ -87,12 +89,12 @@ def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
 
 def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     run, thinned = runs
-    rest = thinned.evaluations.index.difference(thinned.whole.index)
+    rest = thinned.evaluations.index.difference(thinned.with_parameters.index)
     before, after = run.evaluations.loc[rest], thinned.evaluations.loc[rest]
     loss = (before["fitness"] - after["fitness"]).dropna()
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
     assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == after["twist"].dropna().tolist()
-    assert thinned.whole["clearance"].notna().any() and after["clearance"].isna().all()
+    assert thinned.with_parameters["clearance"].notna().any() and after["clearance"].isna().all()
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])
     trial, index = after.iloc[0][["trial", "index"]]
     with pytest.raises(Exception, match="genome"):

@@ -92,7 +92,7 @@ def compare(directories: Sequence[str | Path], *, reach: float | None = None) ->
         curves.append(_curve(progress).assign(run=label))
         run = runs[label]
         summaries[label] = {
-            "draws": run.scenario.draws,
+            "draws": run.scenario.draw_count,
             **_summary(rows),
             "wall_time": run.evaluations["wall_time_s"].mean(),
         }
@@ -118,7 +118,7 @@ def _progress(run: Run) -> pandas.DataFrame:
     table = run.evaluations[["trial", "fitness", "distance"]].copy()
     trial = table["trial"]
     table["ended"] = trial.map({status.number: bool(status.stop) for status in run.statuses})
-    table["cost"] = run.scenario.draws * (table.groupby("trial").cumcount() + 1)
+    table["cost"] = run.scenario.draw_count * (table.groupby("trial").cumcount() + 1)
     table["fitness"] = table["fitness"].fillna(-math.inf).groupby(trial).cummax()
     is_new = table["fitness"] != table["fitness"].groupby(trial).shift()
     table["distance"] = table["distance"].where(is_new).groupby(trial).ffill()

@@ -45,7 +45,7 @@ def elites(run: Run) -> pandas.DataFrame:
     """
     import pandas
 
-    table, kind = run.whole, run.scenario.optimizer
+    table, kind = run.with_parameters, run.scenario.optimizer
     judged = pandas.DataFrame(run.file(ELITES).read(), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
@@ -95,15 +95,15 @@ def judge_elites(
     file.append(lines)
 
 
-def robust(gaits: pandas.DataFrame) -> pandas.DataFrame:
+def kept_gaits(gaits: pandas.DataFrame) -> pandas.DataFrame:
     """Elites that keep at least the share LUCKY of the draws, the fittest first."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 
-def chosen(run: Run) -> dict[str, pandas.Series]:
+def notable_gaits(run: Run) -> dict[str, pandas.Series]:
     """Notable gaits of the map by name: the fittest robust elite, and the robust elites nearest to
     the corners."""
-    gaits, kind = robust(elites(run)), run.scenario.optimizer
+    gaits, kind = kept_gaits(elites(run)), run.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
     return {"fittest of the map": gaits.iloc[0]} | _corners(gaits, kind)

@@ -25,7 +25,7 @@ def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> 
     numbers = numbers[~np.isnan(numbers)]
     if not len(numbers):
         return math.nan, math.nan
-    return middle(resampled(numbers, np.random.default_rng(0), statistic))
+    return interval_of_resamples(resampled(numbers, np.random.default_rng(0), statistic))
 
 
 def resampled(
@@ -37,7 +37,7 @@ def resampled(
     return np.asarray(statistic(values[picks], axis=1))
 
 
-def middle(resamples: np.ndarray) -> tuple[float, float]:
+def interval_of_resamples(resamples: np.ndarray) -> tuple[float, float]:
     """Ends of the middle 95 % of resampled statistics: the bootstrap confidence interval."""
     low, high = np.quantile(resamples, [0.025, 0.975])
     return float(low), float(high)

@@ -50,7 +50,7 @@ def reevaluate(
     for file in files:
         file.repair()
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
-    best = run.best(max(1, BEST_GAITS // scenario.draws))
+    best = run.best(max(1, BEST_GAITS // scenario.draw_count))
     rows = best[["trial", "index", "iteration"]].itertuples(index=False, name=None)
     missing = [row for row in rows if row[:2] not in done]
     if not missing:

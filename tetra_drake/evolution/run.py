@@ -93,7 +93,7 @@ class Run:
         return self.manifest.scenario
 
     @cached_property
-    def whole(self) -> pandas.DataFrame:
+    def with_parameters(self) -> pandas.DataFrame:
         """The evaluations whose parameters are recorded: all, unless the run is thinned."""
         return self.evaluations[self.evaluations.filter(self._columns).notna().all(axis=1)]
 
@@ -108,7 +108,7 @@ class Run:
         Rows are sorted by trial, then from best to worst. The first row is the best gait of trial
         0. For the best gait of the run, see fittest().
         """
-        ranked = self.whole.dropna(subset="fitness").sort_values(
+        ranked = self.with_parameters.dropna(subset="fitness").sort_values(
             ["trial", "fitness", "index"], ascending=[True, False, True]
         )
         return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
@@ -146,7 +146,7 @@ class Run:
 
     def vector(self, trial: int, index: int) -> Vector:
         """The parameters of an evaluation. Raises InputError if thinning removed them."""
-        rows = self.whole.set_index(["trial", "index"])
+        rows = self.with_parameters.set_index(["trial", "index"])
         if (trial, index) not in rows.index:
             problem = f"has no genome of trial {trial}, evaluation {index}"
             raise InputError(self.directory, "", problem)

@@ -10,7 +10,14 @@ import numpy as np
 import pandas
 from matplotlib.axes import Axes
 
-from tetra_drake.analysis.elites import CELLS, LUCKY, chosen, distinct_gaits, elites, robust
+from tetra_drake.analysis.elites import (
+    CELLS,
+    LUCKY,
+    distinct_gaits,
+    elites,
+    kept_gaits,
+    notable_gaits,
+)
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, page_of, set_title
 from tetra_drake.formatting import listed
@@ -32,14 +39,14 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
     Numbers mark the fittest gait and the gaits nearest to the corners."""
     kind = cast(QualityDiversity, run.scenario.optimizer)
     gaits = elites(run)
-    kept = robust(gaits)
+    kept = kept_gaits(gaits)
     judged = bool(gaits["kept"].notna().any())
     count = 2 if judged else 1
     edges = [
         np.linspace(low, high, cells + 1) / customary(UNITS[name])[0]
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
-    named = distinct_gaits(chosen(run))
+    named = distinct_gaits(notable_gaits(run))
     page = page_of(figure, height_in=3.9 + 0.17 * len(named))
     row = page.subplots(1, count, squeeze=False, sharey=True)[0]
     title = f"fitness ({len(kept)} of {math.prod(kind.cells)} cells)"

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 import pandas
 
-from tetra_drake.analysis.elites import chosen, distinct_gaits, elites
+from tetra_drake.analysis.elites import distinct_gaits, elites, notable_gaits
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST
@@ -96,7 +96,7 @@ def _write_map(shown: ShownGaits, directory: Path) -> None:
     """Writes elites/: a table of all gaits of the map, and a gait file and a replay page for each
     notable gait. The run's best gait has its replay page already."""
     run = shown.run
-    on_map = distinct_gaits(chosen(run))
+    on_map = distinct_gaits(notable_gaits(run))
     if on_map:
         write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
     for names, row in on_map:
@@ -120,7 +120,7 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
     scenario = run.scenario
     best_gait = trial_folder(Path(), shown.trial) / BEST_GAIT
     named = {"initially": shown.initial.recorded, "best": shown.best.recorded}
-    gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
+    gaits, on_map = distinct_gaits(named), distinct_gaits(notable_gaits(run))
     map_files: dict[str, Path] = {}
     map_pages: dict[str, Path] = {}
     for names, gait in on_map:

@@ -11,7 +11,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import CableLaw
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.scenario.scenario import Scenario
 
 _NONE_COUPLED = -1
@@ -59,7 +59,7 @@ def robot_without_network(scenario: Scenario) -> Robot:
     not do so here, because the command contains their effect.
     """
     without_law = scenario.actuation.plays_cable
-    structure = MakeStructure(scenario).with_oscillator_per_cable(without_law=without_law)
+    structure = make_structure(scenario).with_oscillator_per_cable(without_law=without_law)
     without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
     cpg = scenario.cpg.model_copy(update=without_network | {"reach": _NONE_COUPLED})
     return Robot.of(scenario.with_sections(cpg=cpg), structure)

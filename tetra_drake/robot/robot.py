@@ -57,7 +57,7 @@ class Robot:
 
         Raises InputError if it would start in the ground or outside its terrain.
         """
-        structure = structure or MakeStructure(scenario)
+        structure = structure or make_structure(scenario)
         model, no_command = make_model(scenario, structure), np.zeros((0, structure.signals))
         return cls(scenario, structure, model, commanded=no_command)
 
@@ -183,7 +183,7 @@ class Robot:
         return modes
 
 
-def MakeStructure(scenario: Scenario) -> Structure:
+def make_structure(scenario: Scenario) -> Structure:
     """The structure of a scenario's robot at its start: displaced by `robot.offsets`, and turned
     with an incline. Raises InputError if it cannot start there."""
     structure = undisturbed_structure(scenario)

@@ -81,7 +81,7 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:
     """The disturbed scenarios of one iteration of an evolution."""
-    draws = [draw_disturbances(scenario, (*seed, k)) for k in range(scenario.draws)]
+    draws = [draw_disturbances(scenario, (*seed, k)) for k in range(scenario.draw_count)]
     return [disturbed(scenario, draw) for draw in draws]
 
 

@@ -34,7 +34,7 @@ from tetra_drake.scenario.robot_structure import Robot
 from tetra_drake.scenario.section import Section, Tree, flattened, written
 from tetra_drake.scenario.structure_files import names_structure, with_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
-from tetra_drake.scenario.units import plainest, rounded, shortest
+from tetra_drake.scenario.units import plainest, rounded_in_text, shortest
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
@@ -150,7 +150,7 @@ class Scenario(Section):
         return *self.robot.lacking, *self.actuation.lacking
 
     @property
-    def draws(self) -> int:
+    def draw_count(self) -> int:
         """Number of simulations per gait in evolution: one, or one per draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
 
@@ -300,7 +300,7 @@ def _text(value: Any, *, exact: bool = False) -> str:
     if value is None:
         return _NONE
     text = json.dumps(written(value) if exact else written(value, plainest)).replace('"', "")
-    return text if exact else rounded(text)
+    return text if exact else rounded_in_text(text)
 
 
 def _differences_in_order(

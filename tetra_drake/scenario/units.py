@@ -54,7 +54,7 @@ def quantity_to_si(text: str, unit: str) -> float:
     return number
 
 
-def rounded(text: str) -> str:
+def rounded_in_text(text: str) -> str:
     """Rounds all numbers with many decimals in a text to six digits."""
     return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
 
