@@ -35,6 +35,14 @@ def walk(short):
     return simulate(scenario=short, gait=seeded_gait(short, 3), record=True)
 
 
+def test_speed_is_of_the_centre_of_mass_of_bodies_with_payloads(short):
+    loaded = short.with_changes({"robot.payload": ["100 g", "0 g", "0 g"]})
+    result = simulate(scenario=loaded, gait=seeded_gait(loaded, 3))
+    times, x = result.path.times, result.path.centre[:, 0]
+    assert times[2] == 0.5
+    assert result.metrics.speed == pytest.approx((x[-1] - x[2]) / 1.5, rel=1e-9)
+
+
 def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
     robot, metrics = Robot.of(short), walk.metrics
     structure, model = robot.structure, robot.model

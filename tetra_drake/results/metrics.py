@@ -35,13 +35,10 @@ def compute_metrics(
     """
     structure, scenario = robot.structure, robot.scenario
     steady_from = scenario.simulation.steady_from
-    followed = followed_nodes(nodes, structure)
-    is_row = len(structure.markers) > 0
     walk = Walk(
-        followed=followed[:, 0],
-        right_foot=followed[:, 1 if is_row else 0],
+        markers=followed_nodes(nodes, structure),
         tip=nodes[:, structure.p_WN[:, 0].argmax()],
-        centre=nodes.mean(axis=1) if is_row else followed[:, 0],  # of a row as recorded
+        centre=structure.node_shares @ nodes,
         path=path.centre[np.searchsorted(path.times, steady_from) :, :2],
         heading=path.heading,
         signals=signals,

@@ -34,16 +34,14 @@ class Walk:
     """Numbers of a simulation for the computation of metrics, in SI units.
 
     Positions (3, 3) are in the world frame, with a row for each time: 0, `simulation.steady_from`
-    and the end. Positions of points that a robot lacks are NaN.
+    and the end.
     """
 
-    followed: np.ndarray
-    """Positions (3, 3) of T1's bottom left node. For robots other than rows of tetrahedra, of the
-    centre of mass."""
+    markers: np.ndarray
+    """Positions (3, markers, 3) of the points whose motion is shown; see Blueprint.markers. The
+    first is T1's bottom left node, or the centre of mass."""
     centre: np.ndarray
     """Positions (3, 3) of the centre of mass."""
-    right_foot: np.ndarray
-    """Positions (3, 3) of T1's bottom right node."""
     tip: np.ndarray
     """Positions (3, 3) of the foremost node."""
     path: np.ndarray
@@ -59,6 +57,11 @@ class Walk:
     """Number of driven cables."""
     tally: Tally
     """Tally of the whole simulation, as plain arrays."""
+
+    @property
+    def followed(self) -> np.ndarray:
+        """Positions (3, 3) of the first marker."""
+        return self.markers[:, 0]
 
     @property
     def followed_way(self) -> np.ndarray:
@@ -147,7 +150,7 @@ class Metrics:
     twist: float = _metric(
         "m",
         "one rear foot ahead of the other",
-        lambda walk: abs(walk.followed[2, 0] - walk.right_foot[2, 0]),
+        lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
         needs=ROW,
     )
     """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
