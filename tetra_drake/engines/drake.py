@@ -8,15 +8,13 @@ import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from tetra_drake.engines.interface import Engine, Viewer
+from tetra_drake.engines.interface import Engine, Simulation
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sample, Sampler, drives_of, motion_of
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import make_dataset
-from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -44,25 +42,18 @@ class DrakeEngine(Engine):
 
     can_be_watched = True
 
-    def simulate(
-        self,
-        robot: Robot,
-        gait: Gait,
-        *,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        steering: SteeringSignal | None = None,
-    ) -> SimulationResult:
+    def simulate(self, simulation: Simulation) -> SimulationResult:
+        robot, viewer = simulation.robot, simulation.viewer
         settings, engine = robot.scenario.simulation, robot.scenario.settings_of(Drake)
         start_up = robot.scenario.cpg.start_up
-        diagram = MakeTensegrityDiagram(robot, gait, steering=steering)
+        diagram = MakeTensegrityDiagram(robot, simulation.gait, steering=simulation.steering)
         simulator = MakeSimulator(diagram, engine)
         integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
         signals, observer = diagram.GetOutputPort("signals"), Observer(robot)
         drives_at = drives_of(diagram)
         work = _Work(integrator)
         aimer = _StepAimer(diagram, simulator, engine, work)
-        times = motion_times(settings, record=record)
+        times = motion_times(settings, record=simulation.record)
         sampler = Sampler(diagram, times, max_step=engine.max_step)
 
         def after_step(context: Context) -> None:
@@ -97,7 +88,7 @@ class DrakeEngine(Engine):
         steps, derivative_evaluations, jacobian_evaluations = work.total()
         return make_result(
             robot,
-            gait,
+            simulation.gait,
             sampler.motion(),
             totals=observer.totals(),
             work=IntegratorWork(
@@ -108,7 +99,7 @@ class DrakeEngine(Engine):
                 jacobian_evaluations=jacobian_evaluations,
             ),
             wall_time=wall_time,
-            record=record,
+            record=simulation.record,
         )
 
 

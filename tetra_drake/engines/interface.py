@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from tetra_drake.engines import ENGINES
@@ -36,6 +37,20 @@ class Viewer(Protocol):
         """Shows one sample of a trajectory (see results.trajectory.make_dataset)."""
 
 
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What an engine simulates: a robot that walks with a gait."""
+
+    robot: Robot
+    gait: Gait
+    record: bool = False
+    """True to record the trajectory."""
+    viewer: Viewer | None = None
+    """Only for an engine with `can_be_watched`."""
+    steering: SteeringSignal | None = None
+    """The turn, in place of the gait's."""
+
+
 class Engine:
     """Base class of engines. A subclass must implement simulate(); the other methods have defaults.
 
@@ -58,21 +73,10 @@ class Engine:
             changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
             scenario = scenario.with_changes(changes)
         with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
-            self.simulate(Robot.of(scenario), seeded_gait(scenario), record=True)
+            self.simulate(Simulation(Robot.of(scenario), seeded_gait(scenario), record=True))
 
-    def simulate(
-        self,
-        robot: Robot,
-        gait: Gait,
-        *,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        steering: SteeringSignal | None = None,
-    ) -> SimulationResult:
-        """Simulates a gait. Raises the same errors as engines.simulate.simulate().
-
-        A viewer is only given to an engine with `can_be_watched`.
-        """
+    def simulate(self, simulation: Simulation) -> SimulationResult:
+        """Simulates a gait. Raises the same errors as engines.simulate.simulate()."""
         raise NotImplementedError
 
     def simulate_many(
@@ -84,7 +88,7 @@ class Engine:
     def outcome(self, scenario: Scenario, gait: Gait, *, record: bool) -> Outcome:
         """Simulates one gait. Returns its result or its failure."""
         try:
-            return self.simulate(Robot.of(scenario), gait, record=record)
+            return self.simulate(Simulation(Robot.of(scenario), gait, record=record))
         except SimulationFailure as failure:
             return failure
 

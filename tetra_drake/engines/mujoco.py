@@ -26,7 +26,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
-from tetra_drake.engines.interface import Engine, Outcome, Viewer
+from tetra_drake.engines.interface import Engine, Outcome, Simulation
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
@@ -37,7 +37,7 @@ from tetra_drake.results.result import IntegratorWork, SimulationResult, make_re
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes
-from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.engine_kinds import Mujoco
@@ -85,22 +85,15 @@ class MujocoEngine(Engine):
         scenario.actuation.check_mujoco(scenario.name)
         scenario.friction.cone(scenario.name)
 
-    def simulate(
-        self,
-        robot: Robot,
-        gait: Gait,
-        *,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        steering: SteeringSignal | None = None,
-    ) -> SimulationResult:
+    def simulate(self, simulation: Simulation) -> SimulationResult:
+        robot, gait, steering = simulation.robot, simulation.gait, simulation.steering
         self.check(robot.scenario)
-        simulation, step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
-        steps = max(1, round(simulation.duration / step))
-        if steps > simulation.max_evaluations:
-            reason = f"{steps} steps exceed the budget of {simulation.max_evaluations}"
+        settings, step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
+        steps = max(1, round(settings.duration / step))
+        if steps > settings.max_evaluations:
+            reason = f"{steps} steps exceed the budget of {settings.max_evaluations}"
             raise StepBudgetExceeded(time=0.0, reason=reason)
-        times = motion_times(simulation, record=record)
+        times = motion_times(settings, record=simulation.record)
         steps_kept = np.rint(times / step).astype(int)
         signals = signals_at(robot, gait, step * np.arange(steps), steering=steering)
         simulator, observer = _Simulator(robot), Observer(robot)
@@ -121,7 +114,7 @@ class MujocoEngine(Engine):
                 scheme=INTEGRATOR, accuracy=step, steps=steps, derivative_evaluations=steps
             ),
             wall_time=wall_time,
-            record=record,
+            record=simulation.record,
         )
 
     def simulate_many(

@@ -5,7 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from tetra_drake.engines.interface import Outcome, Viewer, check_can_be_watched, engine_of
+from tetra_drake.engines.interface import (
+    Outcome,
+    Simulation,
+    Viewer,
+    check_can_be_watched,
+    engine_of,
+)
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
@@ -57,12 +63,14 @@ def simulate(
         if gait is not None or steering is not None:
             raise InputError("simulate", "command", "excludes a gait, and steering")
         robot = commanded_robot(scenario, command)
-        result = engine.simulate(robot, command.gait, record=record, viewer=viewer)
+        simulation = Simulation(robot, command.gait, record=record, viewer=viewer)
+        result = engine.simulate(simulation)
         return dataclasses.replace(result, scenario=scenario)  # the caller's, with a network
     if gait is None:
         raise InputError("simulate", "gait", "is needed, or a command")
     robot, gait = Robot.of(scenario), given_gait(gait, scenario)
-    return engine.simulate(robot, gait, record=record, viewer=viewer, steering=steering)
+    simulation = Simulation(robot, gait, record=record, viewer=viewer, steering=steering)
+    return engine.simulate(simulation)
 
 
 def simulate_many(

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.prepared import Prepared
-from tetra_drake.engines.interface import Engine, Outcome, Viewer
+from tetra_drake.engines.interface import Engine, Outcome, Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 _BODY_STEPS = 100_000
@@ -29,16 +29,13 @@ class CompiledEngine(Engine):
         prepared = Prepared.of(Robot.of(scenario), seeded_gait(scenario), record=False)
         LaneEngine(prepared, width=1)
 
-    def simulate(
-        self,
-        robot: Robot,
-        gait: Gait,
-        *,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        steering: SteeringSignal | None = None,
-    ) -> SimulationResult:
-        prepared = Prepared.of(robot, gait, record=record, steering=steering)
+    def simulate(self, simulation: Simulation) -> SimulationResult:
+        prepared = Prepared.of(
+            simulation.robot,
+            simulation.gait,
+            record=simulation.record,
+            steering=simulation.steering,
+        )
         engine = LaneEngine(prepared, width=1)
         engine.load(0, prepared)
         while not engine.advance(_BODY_STEPS):
