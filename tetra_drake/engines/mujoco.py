@@ -83,7 +83,7 @@ class MujocoEngine(Engine):
             problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
         scenario.actuation.check_mujoco(scenario.name)
-        scenario.friction.cone(scenario.name)
+        scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
     def simulate(self, simulation: Simulation) -> SimulationResult:
         robot, gait, steering = simulation.robot, simulation.gait, simulation.steering

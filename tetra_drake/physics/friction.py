@@ -34,7 +34,7 @@ constants, these functions, and a branch in each function of the last section.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -327,7 +327,9 @@ def time_to_coulomb_change(
 
 # Functions of the ground's law: each calls the function of the reset integrator or of Coulomb.
 
-RESET_INTEGRATOR, COULOMB = range(2)
+LAWS = ResetConstants, CoulombConstants
+RESET_INTEGRATOR, COULOMB = range(len(LAWS))
+"""Kinds of laws, in the order of LAWS."""
 
 
 class FrictionLaw(NamedTuple):
@@ -339,14 +341,9 @@ class FrictionLaw(NamedTuple):
     """Table of the numbers of ResetConstants or CoulombConstants."""
 
     @classmethod
-    def reset_integrator(cls, constants: ResetConstants) -> FrictionLaw:
-        """The reset integrator with these constants."""
-        return cls(RESET_INTEGRATOR, np.array(constants))
-
-    @classmethod
-    def coulomb(cls, constants: CoulombConstants) -> FrictionLaw:
-        """Coulomb friction with these constants."""
-        return cls(COULOMB, np.array(constants))
+    def of(cls, constants: ResetConstants | CoulombConstants) -> Self:
+        """The law with these constants."""
+        return cls(LAWS.index(type(constants)), np.array(constants))
 
 
 @inlined

@@ -239,7 +239,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         p_BN=structure.p_BN,
         first_node=structure.first_node,
         cables=cable.Cables.of(structure.cables),
-        actuator=scenario.actuation.law(),
+        actuator=scenario.actuation.actuator(),
         couplings=structure.couplings,
         ground=make_ground(scenario, structure),
         bodies=Bodies(

@@ -47,8 +47,8 @@ class ActuatorKind(Section):
     """True if software imitates the spring and damper of the cable. A command then contains their
     effect."""
 
-    def law(self) -> Actuator:
-        """The law in the form that the kernels need."""
+    def actuator(self) -> Actuator:
+        """The actuators in the form of the kernels."""
         raise NotImplementedError
 
     def excess(self, signal: float, *, free_length: float) -> str:
@@ -81,7 +81,7 @@ class Force(ActuatorKind):
     lacking = (LIMITS,)
     commanded = "force_N"
 
-    def law(self) -> Actuator:
+    def actuator(self) -> Actuator:
         from tetra_drake.physics import actuator
 
         return actuator.Actuator.of(actuator.DIRECT)
@@ -119,7 +119,7 @@ class Winch(LimitedActuator):
     least_length: Length = Field(default=0.0, ge=0)
     """Least free length of a cable."""
 
-    def law(self) -> Actuator:
+    def actuator(self) -> Actuator:
         from tetra_drake.physics import actuator
 
         return actuator.Actuator.of(actuator.WINCH, **dict(self))
@@ -147,7 +147,7 @@ class TensionMotor(LimitedActuator):
     commanded = "tension_N"
     plays_cable = True
 
-    def law(self) -> Actuator:
+    def actuator(self) -> Actuator:
         from tetra_drake.physics import actuator
 
         return actuator.Actuator.of(actuator.TENSION_MOTOR, **dict(self))

@@ -81,7 +81,7 @@ class ResetIntegrator(FrictionKind):
     def law(self) -> FrictionLaw:
         from tetra_drake.physics.friction import FrictionLaw, ResetConstants
 
-        return FrictionLaw.reset_integrator(ResetConstants(**dict(self)))
+        return FrictionLaw.of(ResetConstants(**dict(self)))
 
     @property
     def text(self) -> str:
@@ -127,7 +127,7 @@ class Coulomb(FrictionKind):
     def law(self) -> FrictionLaw:
         from tetra_drake.physics.friction import CoulombConstants, FrictionLaw
 
-        return FrictionLaw.coulomb(
+        return FrictionLaw.of(
             CoulombConstants(
                 static=self.static,
                 kinetic=self.kinetic,

@@ -182,8 +182,7 @@ class Tetrahedra(Section):
         Base triangles are vertical, with two nodes at height 0. The base of T1 is at x = 0. Tips
         point forward (+x) into the next tetrahedron.
         """
-        n, junctions = self.tetrahedra, self.tetrahedra - 1
-        bodies = tuple(f"T{i + 1}" for i in range(n))
+        n, junctions, bodies = self.tetrahedra, self.tetrahedra - 1, self.body_names
         p_FN = tetrahedron_nodes(self.strut_length)
         x, _, z = p_FN[BOTTOM_LEFT]
         bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
