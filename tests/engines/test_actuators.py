@@ -16,7 +16,8 @@ from helpers.actuations import LIMITED
 from helpers.quantities import with_unit
 from helpers.states import body_velocities
 
-from tetra_drake.engines.interface import Simulation, engine_of
+from tetra_drake.engines.interface import engine_of
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.inertia import XX
 from tetra_drake.robot.gait import seeded_gait

@@ -8,9 +8,10 @@ import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from tetra_drake.engines.interface import Engine, Simulation
+from tetra_drake.engines.interface import Engine
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sample, Sampler, drives_of, motion_of
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times

@@ -5,19 +5,17 @@ from __future__ import annotations
 import contextlib
 import importlib
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 from tetra_drake.engines import ENGINES
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
-    import xarray
-
     from tetra_drake.engines.compiled.lane_pool import LanePool
 
 _BRIEF = 0.01
@@ -25,30 +23,6 @@ _BRIEF = 0.01
 
 Outcome = SimulationResult | SimulationFailure
 """Result of a simulation, or its failure: Diverged or StepBudgetExceeded."""
-
-
-class Viewer(Protocol):
-    """Observer that shows a simulation while it runs."""
-
-    def wants(self, time: float) -> bool:
-        """True if the viewer needs the state at this time (s)."""
-
-    def show(self, frame: xarray.Dataset) -> None:
-        """Shows one sample of a trajectory (see results.trajectory.make_dataset)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Simulation:
-    """What an engine simulates: a robot that walks with a gait."""
-
-    robot: Robot
-    gait: Gait
-    record: bool = False
-    """True to record the trajectory."""
-    viewer: Viewer | None = None
-    """Only for an engine with `can_be_watched`."""
-    steering: SteeringSignal | None = None
-    """The turn, in place of the gait's."""
 
 
 class Engine:

@@ -26,8 +26,9 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
-from tetra_drake.engines.interface import Engine, Outcome, Simulation
+from tetra_drake.engines.interface import Engine, Outcome
 from tetra_drake.engines.observer import Observer
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE

@@ -5,13 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from tetra_drake.engines.interface import (
-    Outcome,
-    Simulation,
-    Viewer,
-    check_can_be_watched,
-    engine_of,
-)
+from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
+from tetra_drake.engines.simulation import Simulation, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult

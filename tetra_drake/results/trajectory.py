@@ -67,14 +67,8 @@ class Motion:
     def at(self, times: np.ndarray) -> Motion:
         """The motion at a selection of its times."""
         rows = np.searchsorted(self.times, times)
-        return Motion(
-            times=self.times[rows],
-            states=self.states[rows],
-            signals=self.signals[rows],
-            modes=self.modes[rows],
-            drives=self.drives[rows],
-            ground_forces=None if self.ground_forces is None else self.ground_forces[rows],
-        )
+        given = {name: table for name, table in vars(self).items() if table is not None}
+        return Motion(**{name: table[rows] for name, table in given.items()})
 
 
 def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:

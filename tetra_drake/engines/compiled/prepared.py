@@ -9,13 +9,14 @@ import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.loop import Constants, LaneState
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.results.result import motion_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
+from tetra_drake.robot.robot import Robot, initial_neurons
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.allocation import allocate
@@ -43,25 +44,19 @@ class Prepared:
     """State at t = 0, with scratch memory."""
 
     @classmethod
-    def of(
-        cls,
-        robot: Robot,
-        gait: Gait,
-        *,
-        record: bool,
-        steering: SteeringSignal | None = None,
-    ) -> Prepared:
-        """Prepares a gait. Raises InputError if gait or steering do not fit the scenario."""
-        simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        instants = [0.0, simulation.steady_from, simulation.duration, start_up]
+    def of(cls, simulation: Simulation) -> Prepared:
+        """Prepares a simulation. Raises InputError if gait or steering do not fit the scenario."""
+        robot, gait, record = simulation.robot, simulation.gait, simulation.record
+        settings, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
+        instants = [0.0, settings.steady_from, settings.duration, start_up]
         marks = np.unique(np.concatenate([instants, _jumps(robot)]))
-        turns, solver = robot.turns(gait, steering), Solver.of(robot.model)
+        turns, solver = robot.turns(gait, simulation.steering), Solver.of(robot.model)
         return cls(
             robot=robot,
             gait=gait,
             record=record,
-            times=motion_times(simulation, record=record),
-            marks=marks[marks <= simulation.duration],
+            times=motion_times(settings, record=record),
+            marks=marks[marks <= settings.duration],
             turns=turns,
             constants=_constants(robot, gait, solver),
             start=_start(robot, turns, solver),
