@@ -137,7 +137,7 @@ def test_an_engine_is_prepared_by_a_moment_of_simulation(scenario, monkeypatch, 
     monkeypatch.setattr(engine, "simulate", simulated)
     prepare(scenario.with_changes({"robot.tetrahedra": 2} | changes))
     (call,) = simulated.call_args_list
-    robot = call.args[0]
+    robot = call.args[0].robot
     assert robot.scenario.simulation.duration < 0.1
     assert robot.scenario.engine_name == scenario.engine_name == "drake"
 
