@@ -32,9 +32,9 @@ class GroundContact(LeafSystem):
     | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin                  |
     | normal_forces     | (m,)    | N      | along the normal of the surface, by contact node  |
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
-    | ground_forces     | (3 m,)  | N      | table of physics.contact, row by row              |
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
     |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
+    | ground_forces     | (3 m,)  | N      | table of physics.contact, row by row              |
 
     On flat ground t1 and t2 are x and y; otherwise see `physics.terrain`. The scenario chooses the
     law of friction, and `physics.friction` explains modes.
@@ -74,8 +74,8 @@ class GroundContact(LeafSystem):
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
         self.DeclareVectorOutputPort("normal_forces", count, self._calc_normal, sources)
         self.DeclareVectorOutputPort("friction_forces", 2 * count, self._calc_friction, sources)
-        self.DeclareVectorOutputPort("ground_forces", 3 * count, self._calc_table, sources)
         self.DeclareVectorOutputPort("modes", 3 * count, self._calc_modes, {self.xd_ticket()})
+        self.DeclareVectorOutputPort("ground_forces", 3 * count, self._calc_table, sources)
 
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
