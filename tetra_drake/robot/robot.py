@@ -19,6 +19,7 @@ from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.physics.model import Bodies, Model
 from tetra_drake.physics.oscillator import Network, steered_input
+from tetra_drake.physics.strut_contact import Search
 from tetra_drake.robot.equilibrium import Equilibrium, find_equilibrium
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import make_ground
@@ -35,6 +36,9 @@ LEAST_MOTION = 0.01
 """Least change of a cable's length that signals should cause, as a share of the length."""
 DEEPEST = 1e-3
 """Largest depth of a node in the ground at the start, as a share of the structure's height."""
+SKIN = 0.05
+"""Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
+pairs are near; with a smaller one, they are searched more often."""
 SteeringSignal = Callable[[float], float]
 """Function from time (s) to the turn, -1 to 1."""
 
@@ -248,9 +252,16 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
             weight=structure.mass * scenario.robot.gravity,
         ),
         struts=structure.strut_table,
+        strut_contact=scenario.strut_contact.law(_strut_search(structure)),
         isotropic=structure.isotropic,
         slack=structure.slack,
     )
+
+
+def _strut_search(structure: Structure) -> Search:
+    """Distances of the search for near struts: SKIN decides how often it is made."""
+    skin = SKIN * structure.strut_table.length.min()
+    return Search(near=2.0 * structure.strut_radius.max() + skin, drift=0.5 * skin)
 
 
 def constant_steering(turn: float) -> SteeringSignal:

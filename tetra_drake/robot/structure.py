@@ -13,9 +13,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 
 from tetra_drake.physics.cable import CABLE, PASSIVE, CableLaw
-from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, move_nodes
 from tetra_drake.physics.model import Couplings
+from tetra_drake.physics.struts import Struts
 from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import Blueprint
@@ -79,8 +79,8 @@ class Structure(Blueprint):
         """The struts in the form of the kernels."""
         node_a, node_b = self.struts.T
         first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
-        along = self.p_BN[node_b] - self.p_BN[node_a]
-        return Struts(node_a.copy(), node_b.copy(), first, length=np.linalg.norm(along, axis=1))
+        length = np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1)
+        return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
 
     @property
     def couplings(self) -> Couplings:
