@@ -1,6 +1,5 @@
 """Bars that touch, against analytic results, Drake's own contact, and engine against engine."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -18,10 +17,13 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from tetra_drake.physics.forces import Forces, compute_strut_forces
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
+from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
 
 def moving(robot: Robot, *velocities: list[float]) -> Robot:
     """A robot whose bodies move at t = 0 with [angular velocity (rad/s), velocity (m/s)]."""
@@ -137,3 +139,31 @@ def test_bars_that_tumble_move_as_drakes_capsules():
     robot = tumbling(1.0, 0.5)
     state, expected = final_state(robot), drake_state(robot, 1.0, 0.5)
     np.testing.assert_allclose(poses_of(state[None]), poses_of(expected[None]), atol=1e-4)
+
+
+def test_forces_do_not_depend_on_when_near_struts_were_searched():
+    robot = tumbling(0.0, 0.5)
+    states = simulated(robot)[1].states
+
+    def forces_at(state: np.ndarray, memory: Forces) -> np.ndarray:
+        force = np.empty(12)
+        compute_strut_forces(Packed((robot.model, memory)), state, force)
+        return force
+
+    kept = Forces.of(robot.model)
+    forces = np.array([forces_at(state, kept) for state in states])
+    anew = np.array([forces_at(state, Forces.of(robot.model)) for state in states])
+    assert 3 < np.count_nonzero(anew.any(axis=1)) < len(states)
+    np.testing.assert_array_equal(forces, anew)
+
+
+@pytest.mark.parametrize("where", ["nodes", "offsets"])
+def test_struts_that_overlap_at_the_start_are_named(refused, where):
+    through = (ACROSS[0], ((0.0, -0.1, 0.0075), (0.0, 0.1, 0.0075)))  # 0.5 mm too near
+    with refused("prism", "strut_contact", "a0 b0", "a1 b1", "0.5 mm"):
+        if where == "nodes":
+            loose_bars(through, dissipation=1.0)
+        else:
+            scenario = loose_bars(ACROSS, dissipation=1.0).scenario
+            offsets = [["0 m", "0 m", "1 m"], ["0 m", "0 m", "0.9875 m"]]
+            Robot.of(scenario.with_changes({"robot.offsets": offsets}))

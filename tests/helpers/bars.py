@@ -43,5 +43,6 @@ def loose_bars(
         strut_contact=HuntCrossley(stiffness=STIFFNESS, dissipation=dissipation),
     )
     times = {"simulation.duration": f"{duration} s", "simulation.steady_from": "0 s"}
+    times["simulation.sample_period"] = "1 ms"
     fine = {"engine.tolerance": "1e-6 m/s", "engine.max_step": "1 ms"}
     return Robot.of(scenario.with_changes(times | fine))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from tetra_drake.physics.capsules import add_contact_force
 from tetra_drake.physics.contact import NormalForce
 from tetra_drake.physics.kinematics import FORCE, NODE_COLUMNS, P_WN, V_WN
-from tetra_drake.physics.strut_contact import add_contact_force
 from tetra_drake.physics.struts import Struts
 
 LAW = NormalForce(stiffness=1e4, damping=2e4)

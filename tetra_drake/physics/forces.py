@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
-from tetra_drake.physics import actuator, cable, contact, kinematics, strut_contact, terrain
+from tetra_drake.physics import actuator, cable, capsules, contact, kinematics, terrain
 from tetra_drake.physics.friction import friction_force
 from tetra_drake.physics.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
 from tetra_drake.physics.model import Model
@@ -38,7 +38,7 @@ class Forces(NamedTuple):
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
     """Drives of the actuators, in the order of the driven cables. Column DRIVE is input, the other
     columns are output."""
-    near_struts: strut_contact.NearStruts
+    near_struts: capsules.NearStruts
 
     @classmethod
     def of(cls, robot: Model) -> Self:
@@ -48,18 +48,16 @@ class Forces(NamedTuple):
 
 def sizes_of(robot: Model) -> dict[str, int]:
     """Sizes of a robot's tables, for allocate()."""
-    drivers, struts_touch = robot.cables.signal, robot.strut_contact.acts
-    has_drive = actuator.has_drive(robot.actuator)
-    struts = np.diff(robot.struts.first_strut)  # of each body
-    strut_pairs = (struts.sum() ** 2 - (struts**2).sum()) // 2
-    return {
+    drivers, has_drive = robot.cables.signal, actuator.has_drive(robot.actuator)
+    near = capsules.near_sizes(robot.struts)
+    if not robot.strut_contact.acts:
+        near = dict.fromkeys(near, 0)
+    return near | {
         "bodies": len(robot.bodies.mass),
         "nodes": len(robot.p_BN),
         "contacts": robot.ground.contacts.size,
         "cables": drivers.size,
         "drives": np.count_nonzero(drivers != cable.PASSIVE) if has_drive else 0,
-        "touching_nodes": len(robot.p_BN) if struts_touch else 0,
-        "strut_pairs": int(strut_pairs) if struts_touch else 0,
     }
 
 
@@ -191,13 +189,13 @@ def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
     law, near, nodes = robot.strut_contact, forces.near_struts, forces.nodes
     if not law.acts:
         return
-    search = named(strut_contact.Search, law.search)
-    if strut_contact.have_moved(nodes, near, search.drift):
-        strut_contact.find_near_struts(robot.struts, law, robot.bodies.radius, state, nodes, near)
+    search = named(capsules.Search, law.search)
+    if capsules.have_moved(nodes, near, search.drift):
+        capsules.find_near_struts(robot.struts, law, robot.bodies.radius, state, nodes, near)
     normal = named(contact.NormalForce, law.normal)
     for k in range(near.count[0]):
         i, j = near.pairs[k, 0], near.pairs[k, 1]
-        strut_contact.add_contact_force(robot.struts, normal, nodes, i, j)
+        capsules.add_contact_force(robot.struts, normal, nodes, i, j)
 
 
 @compiled

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from tetra_drake.physics.actuator import Actuator
 from tetra_drake.physics.cable import Cables
+from tetra_drake.physics.capsules import StrutContact
 from tetra_drake.physics.contact import Ground
-from tetra_drake.physics.strut_contact import StrutContact
 from tetra_drake.physics.struts import Struts
 from tetra_drake.simd.lanes import Table
 

@@ -19,7 +19,7 @@ class StrutContact(LeafSystem):
     | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant |
     | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin        |
 
-    Struts are capsules; see `physics.strut_contact`. The force is continuous, so no step has to end
+    Struts are capsules; see `physics.capsules`. The force is continuous, so no step has to end
     where struts begin to touch.
     """
 

@@ -17,7 +17,9 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, Self
+
+import numpy as np
 
 from tetra_drake.physics import kinematics
 from tetra_drake.physics.contact import NormalForce, normal_force
@@ -41,6 +43,7 @@ from tetra_drake.physics.vectors import (
     subtract_vector,
     vector_at,
 )
+from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named
 
@@ -74,12 +77,27 @@ class StrutContact(NamedTuple):
 class NearStruts(NamedTuple):
     """Memory for the pairs of struts that are near. Without contact of struts it is empty."""
 
-    p_WN: Annotated[Table, "touching_nodes", 3, math.inf]
+    p_WN: Annotated[Table, "strut_nodes", 3, math.inf]
     """Positions (nodes, 3) in m of the nodes at the latest search; infinite before the first."""
     pairs: Annotated[Table, "strut_pairs", 2, int]
     """Indices of the two struts of each near pair (pairs, 2)."""
     count: Annotated[Table, 1, int]
     """Number of near pairs."""
+
+    @classmethod
+    def of(cls, struts: Struts) -> Self:
+        """Memory for the near pairs among struts."""
+        return allocate(cls, near_sizes(struts))
+
+
+def near_sizes(struts: Struts) -> dict[str, int]:
+    """Sizes of NearStruts, for allocate()."""
+    of_bodies = np.diff(struts.first_strut)
+    pairs = (of_bodies.sum() ** 2 - (of_bodies**2).sum()) // 2
+    return {
+        "strut_nodes": int(max(struts.node_a.max(), struts.node_b.max())) + 1,
+        "strut_pairs": int(pairs),
+    }
 
 
 @functools.partial(compiled, nogil=True)  # a call of its own, as searches are rare
@@ -119,10 +137,16 @@ def are_near(struts: Struts, nodes: Table, i: int, j: int, limit: Real) -> bool:
     offset = difference(midpoint(struts, nodes, i), midpoint(struts, nodes, j))
     if not may_be_nearer(offset, 0.5 * (struts.length[i] + struts.length[j]), limit):
         return False
+    return any_lane(axis_distance(struts, nodes, i, j) <= limit)
+
+
+@inlined
+def axis_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
+    """Distance (m) of the axes of two struts where they touch or would touch."""
     axes = axes_of(struts, nodes, i, j)
     s, t = contact_places(axes)
     between = vector_between(axes, s, t)
-    return any_lane(dot(between, between) <= limit * limit)
+    return math.sqrt(dot(between, between))
 
 
 @inlined
