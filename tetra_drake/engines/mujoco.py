@@ -41,7 +41,7 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 
@@ -65,8 +65,9 @@ _OBSERVED = 8  # steps from one observation to the next; 1 ms with the default s
 INTEGRATOR = "implicitfast"
 """Name of MuJoCo's integrator."""
 MAX_SPEED = 1.0
-"""Largest speed of a body (m/s); less than in other engines. With too long a step a robot is thrown
-about, sometimes far forward. A walking robot stays below 0.2 m/s."""
+"""Largest speed of a body (m/s) of a robot that starts on the ground; less than in other engines.
+With too long a step a robot is thrown about, sometimes far forward. A walking robot stays below
+0.2 m/s."""
 
 
 class MujocoEngine(Engine):
@@ -179,6 +180,11 @@ class _Simulator:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
         self._step = robot.scenario.settings_of(Mujoco).step
+        height = max(
+            0.0, node_positions(robot.structure, robot.structure.initial_state)[:, 2].min()
+        )
+        fall = math.sqrt(2.0 * robot.scenario.robot.gravity * height)
+        self._max_speed = MAX_SPEED + fall
         nodes = [robot.structure.node_names[node] for node in robot.structure.contacts]
         self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(nodes)}
         driven = robot.structure.cables["signal"]
@@ -227,9 +233,9 @@ class _Simulator:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
         step `first` and the following ones."""
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
-        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
+        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
         if fast.any():
-            reason = f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s"
+            reason = f"a body's velocity exceeds the limit of {self._max_speed:.3g} m/s"
             raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
         # An unstable simulation starts again from time 0, or stops.
         times = self._step * (first + 1.0 + np.arange(len(states)))
