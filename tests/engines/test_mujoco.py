@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray
 from helpers.actuations import LIMITED
+from helpers.bars import RADIUS, STIFFNESS, loose_bars
 
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
@@ -204,3 +205,15 @@ def test_without_mujoco_its_engine_is_refused(short, monkeypatch, refused):
     monkeypatch.setattr(engine, "installed", lambda: False)
     with refused("thesis", "engine"):
         simulate(scenario=short, gait=seeded_gait(short))
+
+
+@needs_mujoco
+def test_a_bar_rests_across_two_others_as_on_the_other_engines():
+    beams = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
+    across = ((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))
+    robot = loose_bars([*beams, across], dissipation=1.0, gravity=9.80665, duration=0.5)
+    resting = robot.scenario.with_changes({"engine": "!Mujoco", "friction.stiffness": 0.0})
+    p_WB = trajectory_of(resting)["p_WB"].values
+    depth = 2.0 * RADIUS - (p_WB[-1, 2, 2] - p_WB[-1, :2, 2].mean())
+    assert 2.0 * STIFFNESS * depth == pytest.approx(robot.weight / 3.0, rel=0.02)
+    np.testing.assert_allclose(p_WB[-1], robot.structure.p_WB, atol=2e-5)

@@ -5,6 +5,7 @@ is MuJoCo's soft contact with a friction cone.
 
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
   grows with depth. Both agree at the depth of a robot in equilibrium.
+- Contact of struts: capsules with the scenario's stiffness. The damping is constant, too.
 - Coulomb friction without bristle stiffness is the same law. Robots walk as far as on the other
   engines.
 - The reset integrator does not exist in MuJoCo. A sticking node is held by the scenario's stiction
@@ -16,6 +17,7 @@ The ground must be a plane, level or inclined.
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Sequence
@@ -32,7 +34,7 @@ from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NormalForce
 from tetra_drake.physics.inertia import XX
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
@@ -40,7 +42,7 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 
@@ -57,14 +59,16 @@ _IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
 keeps friction stable in long steps, and 1 / _IMPRATIO of the mass along the normal."""
 _POINT = 1e-8  # radius (m) of the spheres that touch the floor; larger ones spin thin bars
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
+_FLOOR = 0  # index of the floor's geom
 _STRETCH = 5000  # steps between two checks of stability
 _NO_DRIVES = np.zeros(0)  # the actuators have no states
 _OBSERVED = 8  # steps from one observation to the next; 1 ms with the default step
 INTEGRATOR = "implicitfast"
 """Name of MuJoCo's integrator."""
 MAX_SPEED = 1.0
-"""Largest speed of a body (m/s); less than in other engines. With too long a step a robot is thrown
-about, sometimes far forward. A walking robot stays below 0.2 m/s."""
+"""Largest speed of a body (m/s) of a robot that starts on the ground; less than in other engines.
+With too long a step a robot is thrown about, sometimes far forward. A walking robot stays below
+0.2 m/s."""
 
 
 class MujocoEngine(Engine):
@@ -102,8 +106,9 @@ class MujocoEngine(Engine):
         states = simulator.run(signals, steps_kept, observer)
         wall_time = time.perf_counter() - started
         totals = observer.totals()
-        if robot.model.slack and totals.tension.of_all[0] <= 0.0:
-            reason = "a cable went slack, and a tendon of MuJoCo would push"
+        is_damped = robot.structure.cables["damping"].any()
+        if robot.model.slack and is_damped and totals.tension.of_all[0] <= 0.0:
+            reason = "a cable went slack, and the damper of MuJoCo's tendon would push"
             raise SimulationFailure(time=float(totals.time[0]), reason=reason)
         signals_kept = signals_at(robot, gait, times, steering=steering)
         return make_result(
@@ -145,6 +150,8 @@ def make_mjcf(robot: Robot) -> str:
     world = _add(model, "worldbody")
     _add_floor(world, robot)
     _add_bodies(model, world, robot)
+    if robot.model.strut_contact.acts:
+        _add_strut_contacts(model, robot)
     _add_cables(model, robot.structure)
     return tostring(model, encoding="unicode")
 
@@ -167,6 +174,13 @@ class _Simulator:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
         self._step = robot.scenario.settings_of(Mujoco).step
+        height = max(
+            0.0, node_positions(robot.structure, robot.structure.initial_state)[:, 2].min()
+        )
+        fall = math.sqrt(2.0 * robot.scenario.robot.gravity * height)
+        self._max_speed = MAX_SPEED + fall
+        nodes = [robot.structure.node_names[node] for node in robot.structure.contacts]
+        self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(nodes)}
         driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # index of each motor's signal
 
@@ -213,9 +227,9 @@ class _Simulator:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
         step `first` and the following ones."""
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
-        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
+        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
         if fast.any():
-            reason = f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s"
+            reason = f"a body's velocity exceeds the limit of {self._max_speed:.3g} m/s"
             raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
         # An unstable simulation starts again from time 0, or stops.
         times = self._step * (first + 1.0 + np.arange(len(states)))
@@ -255,15 +269,16 @@ class _Simulator:
         forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)
-            # Geom 0 is the floor, geom i + 1 is contact node i.
-            forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
+            if contact.geom[0] == _FLOOR:
+                node = self._contact_of_geom[contact.geom[1]]
+                forces[node] += contact.frame.reshape(3, 3).T @ wrench[:3]
         nodes = data.site_xpos[self._robot.structure.contacts]
         axes = ground_axes(nodes, self._robot.ground)
         return (axes @ forces[:, :, None])[:, :, 0]
 
 
 def _add_floor(world: Element, robot: Robot) -> None:
-    """Adds the floor: a plane, geom 0."""
+    """Adds the floor: a plane, the first geom."""
     slope = robot.scenario.terrain.plane_slope or 0.0
     pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
     quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
@@ -271,7 +286,7 @@ def _add_floor(world: Element, robot: Robot) -> None:
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
-    """Adds the bodies, with a site at each node and a small sphere at each contact node."""
+    """Adds the bodies: a site at each node, a small sphere at each contact node, and struts."""
     structure, bodies = robot.structure, robot.model.bodies
     pairs = _add(model, "contact")
     for i, body_name in enumerate(structure.bodies):
@@ -298,6 +313,11 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             if node in structure.contacts:
                 _add(body, "geom", name=name, pos=p_BN, size=_POINT, **_ALONE)
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
+        for strut in np.flatnonzero(structure.carriers[structure.struts[:, 0]] == i):
+            ends = structure.p_BN[structure.struts[strut]]
+            size = structure.strut_radius[strut]
+            geom = {"name": f"strut {strut}", "type": "capsule", "fromto": ends, "size": size}
+            _add(body, "geom", **geom, **_ALONE)
 
 
 def _contact(robot: Robot, mass: float) -> dict:
@@ -318,6 +338,25 @@ def _contact(robot: Robot, mass: float) -> dict:
     }
 
 
+def _add_strut_contacts(model: Element, robot: Robot) -> None:
+    """Adds the contact of all struts of different bodies, without friction."""
+    normal = NormalForce(*robot.model.strut_contact.normal)
+    rest_damping = normal.damping * robot.weight / normal.stiffness
+    bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
+    pairs = _add(model, "contact")
+    for i, j in itertools.combinations(range(len(bodies)), 2):
+        if bodies[i] == bodies[j]:
+            continue
+        per_mass = (1.0 / robot.structure.mass[bodies[[i, j]]]).sum()
+        scale = -(1.0 - _IMPEDANCE) * per_mass
+        contact = {
+            "condim": "1",
+            "solref": [normal.stiffness * scale, rest_damping * scale],
+            "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
+        }
+        _add(pairs, "pair", geom1=f"strut {i}", geom2=f"strut {j}", **contact)
+
+
 def _feet(robot: Robot) -> int:
     """Number of nodes that bear the weight: from the blueprint, or in equilibrium."""
     return robot.structure.feet or max(1, robot.equilibrium.feet)
@@ -328,7 +367,9 @@ def _add_cables(model: Element, structure: Structure) -> None:
     tendons, actuators = _add(model, "tendon"), _add(model, "actuator")
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
-        tendon = _add(tendons, "spatial", name=name, springlength=cable["free_length"], **law)
+        least = 0.0 if structure.slack else cable["free_length"]
+        springlength = [least, cable["free_length"]]  # the spring exerts no force in between
+        tendon = _add(tendons, "spatial", name=name, springlength=springlength, **law)
         for node in (cable["node_a"], cable["node_b"]):
             _add(tendon, "site", site=structure.node_names[node])
         if cable["signal"] != PASSIVE:  # a motor's force lengthens its tendon, ours shortens it

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
-from tetra_drake.physics import actuator, cable, contact, kinematics, terrain
+from tetra_drake.physics import actuator, cable, capsules, contact, kinematics, terrain
 from tetra_drake.physics.friction import friction_force
 from tetra_drake.physics.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
 from tetra_drake.physics.model import Model
@@ -21,7 +21,7 @@ from tetra_drake.physics.vectors import (
 )
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Table, any_lane, inverse_sqrt, maximum, select
+from tetra_drake.simd.lanes import Table, any_lane, inverse_sqrt, maximum, named, select
 from tetra_drake.simd.packed import Packed, unpacked
 
 
@@ -38,6 +38,7 @@ class Forces(NamedTuple):
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
     """Drives of the actuators, in the order of the driven cables. Column DRIVE is input, the other
     columns are output."""
+    near_struts: capsules.NearStruts
 
     @classmethod
     def of(cls, robot: Model) -> Self:
@@ -46,10 +47,12 @@ class Forces(NamedTuple):
 
 
 def sizes_of(robot: Model) -> dict[str, int]:
-    """Numbers of bodies, nodes, contacts, cables and drives of a robot, for allocate()."""
-    drivers = robot.cables.signal
-    has_drive = actuator.has_drive(robot.actuator)
-    return {
+    """Sizes of a robot's tables, for allocate()."""
+    drivers, has_drive = robot.cables.signal, actuator.has_drive(robot.actuator)
+    near = capsules.near_sizes(robot.struts)
+    if not robot.strut_contact.acts:
+        near = dict.fromkeys(near, 0)
+    return near | {
         "bodies": len(robot.bodies.mass),
         "nodes": len(robot.p_BN),
         "contacts": robot.ground.contacts.size,
@@ -164,6 +167,7 @@ def compute_forces(
     """
     add_cable_forces(robot, signals, write_parts, forces)
     add_ground_forces(robot, modes, write_parts, forces)
+    add_strut_forces(robot, state, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
     bodies = generalized.size // 6
     for body in range(bodies):
@@ -177,6 +181,21 @@ def compute_forces(
         generalized[t] += t_x
         generalized[t + 1] += t_y
         generalized[t + 2] += t_z
+
+
+@inlined
+def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
+    """Adds the forces between struts that touch to the forces on the nodes."""
+    law, near, nodes = robot.strut_contact, forces.near_struts, forces.nodes
+    if not law.acts:
+        return
+    search = named(capsules.Search, law.search)
+    if capsules.have_moved(nodes, near, search.drift):
+        capsules.find_near_struts(robot.struts, law, robot.bodies.radius, state, nodes, near)
+    normal = named(contact.NormalForce, law.normal)
+    for k in range(near.count[0]):
+        i, j = near.pairs[k, 0], near.pairs[k, 1]
+        capsules.add_contact_force(robot.struts, normal, nodes, i, j)
 
 
 @compiled
@@ -200,6 +219,18 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
     add_ground_forces(robot, modes, True, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+
+
+@compiled
+def compute_strut_forces(parts: Parts, state: Table, generalized: Table) -> None:
+    """Writes the generalized force between struts (6 bodies,): [t_W; f_W] at each body's origin.
+
+    Also writes nodes.
+    """
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_strut_forces(robot, state, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
 
 

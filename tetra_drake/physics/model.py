@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from tetra_drake.physics.actuator import Actuator
 from tetra_drake.physics.cable import Cables
-from tetra_drake.physics.clearance import Struts
+from tetra_drake.physics.capsules import StrutContact
 from tetra_drake.physics.contact import Ground
+from tetra_drake.physics.struts import Struts
 from tetra_drake.simd.lanes import Table
 
 
@@ -51,6 +52,7 @@ class Model(NamedTuple):
     ground: Ground
     bodies: Bodies
     struts: Struts
+    strut_contact: StrutContact
     isotropic: bool
     """True if each body has the same moment of inertia about all axes."""
     slack: bool

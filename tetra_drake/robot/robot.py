@@ -13,7 +13,8 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics import cable
-from tetra_drake.physics.contact import MODE_COLUMNS, Ground
+from tetra_drake.physics.capsules import NearStruts, axis_distance, find_near_struts
+from tetra_drake.physics.contact import MODE_COLUMNS, Ground, NormalForce
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
@@ -21,8 +22,8 @@ from tetra_drake.physics.model import Bodies, Model
 from tetra_drake.physics.oscillator import Network, steered_input
 from tetra_drake.robot.equilibrium import Equilibrium, find_equilibrium
 from tetra_drake.robot.gait import Gait, check_gait
-from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import Structure, node_positions, turn_with_slope
+from tetra_drake.robot.ground import START_DEPTH, make_ground
+from tetra_drake.robot.structure import Structure, moved_nodes, node_positions, turn_with_slope
 from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.actuator_kinds import DrivenCables
 from tetra_drake.scenario.common_sections import CpgSection
@@ -190,6 +191,7 @@ def make_structure(scenario: Scenario) -> Structure:
     p_WB, slope = structure.p_WB, scenario.terrain.plane_slope or 0.0
     if scenario.robot.offsets:
         p_WB = p_WB + np.array(scenario.robot.offsets)
+        check_apart(scenario, dataclasses.replace(structure, p_WB=p_WB))
     p_WB, q_WB = turn_with_slope(p_WB, structure.q_WB, slope)
     return dataclasses.replace(structure, p_WB=p_WB, q_WB=q_WB)
 
@@ -198,6 +200,7 @@ def undisturbed_structure(scenario: Scenario) -> Structure:
     """The structure of a scenario's robot at its start on flat ground, without offsets."""
     blueprint = scenario.robot.blueprint()
     placed = Structure.of(blueprint)
+    check_apart(scenario, placed)
     if not blueprint.settles:
         return placed
     up = np.array([0.0, 0.0, _lift(scenario, placed)])
@@ -221,6 +224,26 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
     return float(depth)
 
 
+def check_apart(scenario: Scenario, structure: Structure) -> None:
+    """Raises InputError if struts that touch overlap in the initial pose of a structure, by more
+    than the robot's weight would press them."""
+    struts, contact = structure.strut_table, scenario.strut_contact.law(structure.strut_search)
+    if not contact.acts:
+        return
+    weight = float(structure.mass.sum()) * scenario.robot.gravity
+    allowed = START_DEPTH + weight / NormalForce(*contact.normal).stiffness
+    near, state = NearStruts.of(struts), structure.initial_state
+    nodes = moved_nodes(structure, state)
+    find_near_struts(struts, contact, structure.radius, state, nodes, near)
+    for i, j in near.pairs[: near.count[0]].tolist():
+        depth = struts.radius[i] + struts.radius[j] - axis_distance(struts, nodes, i, j)
+        if depth > allowed:
+            first, second = structure.strut_name(i), structure.strut_name(j)
+            found = f"struts '{first}' and '{second}' overlap by {1e3 * depth:.3g} mm at the start"
+            advice = "move their nodes, make them thinner, or set strut_contact to !Nothing"
+            raise InputError(scenario.name, "strut_contact", f"{found}; {advice}")
+
+
 def equilibrium_of(
     scenario: Scenario, structure: Structure, start: np.ndarray | None = None
 ) -> Equilibrium:
@@ -234,7 +257,6 @@ def equilibrium_of(
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
     """Constants of a structure and its laws, in the form of the kernels."""
-    distances = np.linalg.norm(structure.p_BN, axis=1)
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,
@@ -245,10 +267,11 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         bodies=Bodies(
             mass=structure.mass,
             inertia=structure.mass[:, np.newaxis] * structure.unit_inertia,
-            radius=np.maximum.reduceat(distances, structure.first_node[:-1]),
+            radius=structure.radius,
             weight=structure.mass * scenario.robot.gravity,
         ),
         struts=structure.strut_table,
+        strut_contact=scenario.strut_contact.law(structure.strut_search),
         isotropic=structure.isotropic,
         slack=structure.slack,
     )

@@ -13,11 +13,16 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 
 from tetra_drake.physics import cable, kinematics
-from tetra_drake.physics.clearance import Struts
+from tetra_drake.physics.capsules import Search
 from tetra_drake.physics.model import Couplings
+from tetra_drake.physics.struts import Struts
 from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import Blueprint
+
+SKIN = 0.05
+"""Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
+pairs are near; with a smaller one, near pairs are searched more often."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +83,25 @@ class Structure(Blueprint):
         """The struts in the form of the kernels."""
         node_a, node_b = self.struts.T
         first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
-        along = self.p_BN[node_b] - self.p_BN[node_a]
-        return Struts(node_a.copy(), node_b.copy(), first, length=np.linalg.norm(along, axis=1))
+        length = np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1)
+        return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
+
+    @property
+    def strut_search(self) -> Search:
+        """Distances of the search for struts that may touch."""
+        skin = SKIN * self.strut_table.length.min()
+        return Search(near=2.0 * self.strut_radius.max() + skin, drift=0.5 * skin)
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Largest distance of a node from the centre of mass of each body (bodies,), in m."""
+        distances = np.linalg.norm(self.p_BN, axis=1)
+        radius: np.ndarray = np.maximum.reduceat(distances, self.first_node[:-1])
+        return radius
+
+    def strut_name(self, strut: int) -> str:
+        """Name of a strut: the names of its two nodes."""
+        return " ".join(self.node_names[node] for node in self.struts[strut])
 
     @property
     def couplings(self) -> Couplings:

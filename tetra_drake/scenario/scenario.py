@@ -33,6 +33,7 @@ from tetra_drake.scenario.refusals import TAG, hint, refuse
 from tetra_drake.scenario.robot_structure import Robot
 from tetra_drake.scenario.section import Section, Tree, flattened, written
 from tetra_drake.scenario.structure_files import names_structure, with_structure
+from tetra_drake.scenario.strut_contact_kinds import NoStrutContact, StrutContactKind
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.units import plainest, rounded_in_text, shortest
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
@@ -60,6 +61,7 @@ class Scenario(Section):
     ground: GroundSection
     friction: Friction
     terrain: Terrain = Flat()
+    strut_contact: StrutContactKind = NoStrutContact()
     actuation: Actuation = Force()
     cpg: CpgSection
     gait_bounds: GaitBounds

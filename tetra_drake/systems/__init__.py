@@ -7,6 +7,7 @@ from tetra_drake.systems.ground_contact import GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
 from tetra_drake.systems.steering import Steering
+from tetra_drake.systems.strut_contact import StrutContact
 
 __all__ = [
     "Actuators",
@@ -16,4 +17,5 @@ __all__ = [
     "MatsuokaCpg",
     "StartUpGate",
     "Steering",
+    "StrutContact",
 ]

@@ -21,6 +21,7 @@ from tetra_drake.systems import (
     MatsuokaCpg,
     StartUpGate,
     Steering,
+    StrutContact,
 )
 
 
@@ -45,6 +46,7 @@ def MakeTensegrityDiagram(
       without oscillators has no cpg.
     - feedback: only if `cpg.feedback` is not empty
     - actuators: only if the kind of actuators has states, as winches have
+    - strut_contact: from state to forces, only if struts touch
 
     `steering` replaces the gait's turn. Input port: turn (of a live network). Output ports: state
     (from plant), signals (start_up), drives (actuators), tensions and lengths (cables),
@@ -64,14 +66,17 @@ def MakeTensegrityDiagram(
     cables = builder.AddNamedSystem("cables", CableNetwork(robot))
     witness = isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness"
     ground = builder.AddNamedSystem("ground", GroundContact(robot, witness=witness))
-    forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
+    pushing: list[System] = [cables, ground]
+    if robot.model.strut_contact.acts:
+        pushing.append(builder.AddNamedSystem("strut_contact", StrutContact(robot)))
+    forces = builder.AddNamedSystem("forces", Adder(len(pushing), 6 * len(structure.bodies)))
 
     state, signals = plant.get_state_output_port(), start_up.get_output_port()
     builder.Connect(signals, cables.GetInputPort("signals"))
-    builder.Connect(state, cables.GetInputPort("state"))
-    builder.Connect(state, ground.GetInputPort("state"))
-    builder.Connect(cables.GetOutputPort("generalized_force"), forces.get_input_port(0))
-    builder.Connect(ground.GetOutputPort("generalized_force"), forces.get_input_port(1))
+    for number, system in enumerate(pushing):
+        builder.Connect(state, system.GetInputPort("state"))
+        force = system.GetOutputPort("generalized_force")
+        builder.Connect(force, forces.get_input_port(number))
     builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
     if len(robot.starting_drives()):
         actuators = builder.AddNamedSystem("actuators", Actuators(robot))

@@ -31,6 +31,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import TensionMotor, Winch
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.strut_contact_kinds import HuntCrossley
 from tetra_drake.scenario.terrain_kinds import Rough
 
 FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}
@@ -46,12 +47,21 @@ ROUGH = {"robot.contacts": "all", "friction": Coulomb()}
 ROUGH |= {"terrain": Rough(amplitude=2e-3, wavelength=0.1)}
 FINER = ROUGH | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1)}
 FINER |= {"friction": Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)}
+TOUCHING = {"strut_contact": HuntCrossley(stiffness=1e4, dissipation=1.0)}
+TOUCHING |= {"robot.strut_diameter": "13 mm", "cpg.gain": "10 lbf"}
+SOFT = TOUCHING | {"strut_contact": HuntCrossley(stiffness=3e3, dissipation=0.0)}
 LIMITS = [(70.0, 0.5, 0.02), (5.0, 0.1, 0.1), (4.0, 0.3, 0.5e-3)]
 """Force (N), speed (m/s) and time constant (s) of actuators."""
 
 GOES, FAILS, ENDS = SimulationResult, Diverged, StepBudgetExceeded
 NEIGHBOURS = {
     "strength": [({}, GOES), (FAR_TOO_STRONG, FAILS), ({}, GOES), (TOO_STRONG, ENDS)],
+    # They touch, each by a law of its own.
+    "struts": [
+        (TOUCHING | {"robot.strut_diameter": "12 mm"}, GOES),
+        (TOUCHING, GOES),
+        (SOFT, GOES),
+    ],
     # Each lane has a grid of its own size, and constants of its own.
     "ground": [(FINER, GOES), (ROUGH, GOES), (ROUGH | FAR_TOO_STRONG, FAILS)],
 }

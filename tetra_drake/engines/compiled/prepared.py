@@ -79,6 +79,7 @@ class Prepared:
             ground.flat,
             ground.friction.kind,
             self.robot.model.actuator.kind,
+            self.robot.model.strut_contact.acts,
         )
 
     @property

@@ -1,0 +1,115 @@
+"""The contact of two struts, against hand-made pairs."""
+
+import numpy as np
+import pytest
+
+from tetra_drake.physics.capsules import add_contact_force
+from tetra_drake.physics.contact import NormalForce
+from tetra_drake.physics.kinematics import FORCE, NODE_COLUMNS, P_WN, V_WN
+from tetra_drake.physics.struts import Struts
+
+LAW = NormalForce(stiffness=1e4, damping=2e4)
+RADIUS = 0.01
+
+
+def forces_between(first, second, v_WN=None) -> np.ndarray:
+    """Forces (2, 6) of two struts on each other, from the ends of both: force, and torque about the
+    origin of World."""
+    nodes = np.zeros((4, NODE_COLUMNS))
+    nodes[:, P_WN : P_WN + 3] = p_WN = np.array([*first, *second], dtype=float)
+    if v_WN is not None:
+        nodes[:, V_WN : V_WN + 3] = v_WN
+    length = np.linalg.norm(p_WN[1::2] - p_WN[::2], axis=1)
+    struts = Struts(
+        np.array([0, 2]), np.array([1, 3]), np.array([0, 1, 2]), length, np.full(2, RADIUS)
+    )
+    add_contact_force(struts, LAW, nodes, 0, 1)
+    force = nodes[:, FORCE : FORCE + 3]
+    wrenches = np.hstack([force, np.cross(p_WN, force)])
+    return wrenches.reshape(2, 2, 6).sum(axis=1)
+
+
+ALONG_X = [(-1, 0, 0), (1, 0, 0)]
+
+
+def test_struts_that_cross_push_each_other_apart_by_stiffness_and_dissipation():
+    # 18 mm apart they overlap by 2 mm. The upper one falls at 0.1 m/s.
+    above = [(0, -1, 0.018), (0, 1, 0.018)]
+    falling = np.repeat([[0, 0, 0], [0, 0, -0.1]], 2, axis=0)
+    force = LAW.stiffness * 0.002 + LAW.damping * 0.002 * 0.1
+    below, on_top = forces_between(ALONG_X, above, falling)
+    np.testing.assert_allclose(on_top[:3], [0.0, 0.0, force], rtol=1e-12)
+    np.testing.assert_allclose(below, -on_top, atol=1e-12)
+
+
+def test_the_contact_never_pulls():
+    parting = np.repeat([[0, 0, 0], [0, 0, 10.0]], 2, axis=0)
+    assert not forces_between(ALONG_X, [(0, -1, 0.018), (0, 1, 0.018)], parting).any()
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        [(0, -1, 0.021), (0, 1, 0.021)],  # crossing, 1 mm above
+        [(1.021, 0, 0), (2, 0, 0)],  # end to end
+        [(-1, 0.021, 0), (1, 0.021, 0)],  # parallel
+        [(1.1, -1, 0), (1.1, 1, 0)],  # across, beyond the end
+    ],
+)
+def test_struts_apart_exert_no_force(second):
+    assert not forces_between(ALONG_X, second).any()
+
+
+@pytest.mark.parametrize(
+    ("second", "place"),
+    [
+        ([(-1, 0, 0.018), (1, 0, 0.018)], 0.0),  # parallel, side by side
+        ([(0, 0, 0.018), (2, 0, 0.018)], 0.5),  # parallel, half beyond
+        ([(2, 0, 0.018), (-0.5, 0, 0.018)], 0.25),  # antiparallel
+        ([(0.7, 0, 0.018), (0.7, 0, 1)], 0.7),  # an end above
+        ([(0.7, -1, 0.018), (0.7, 1, 0.018)], 0.7),  # across
+        ([(0.5, -0.5, 0.018), (-0.2, 0.2, 0.018)], 0.0),  # at 45 degrees
+    ],
+)
+def test_struts_touch_where_they_are_nearest_and_parallel_ones_in_the_middle(second, place):
+    below, _ = forces_between(ALONG_X, second)
+    force = LAW.stiffness * 0.002
+    np.testing.assert_allclose(below[:3], [0.0, 0.0, -force], atol=1e-3 * force)
+    np.testing.assert_allclose(below[4], place * force, atol=2e-3 * force)
+
+
+def test_struts_whose_axes_meet_exert_no_force():
+    for second in ([(0, -1, 0), (0, 1, 0)], ALONG_X, [(1, 0, 0), (2, 0, 0)]):
+        assert not forces_between(ALONG_X, second).any()
+
+
+def test_the_force_is_continuous_as_struts_turn_through_parallel():
+    # Without smoothing, the contact would jump by 2 m from one end to the other at angle 0.
+    angles = np.linspace(-0.1, 0.1, 4001)
+    seconds = [
+        [(-np.cos(angle), -np.sin(angle), 0.018), (np.cos(angle), np.sin(angle), 0.018)]
+        for angle in angles
+    ]
+    wrenches = np.array([forces_between(ALONG_X, second)[0] for second in seconds])
+    tilted = np.array(
+        [
+            forces_between(
+                ALONG_X, [(-1, 0, 0.018 - np.sin(angle)), (1, 0, 0.018 + np.sin(angle))]
+            )[0]
+            for angle in angles / 20.0
+        ]
+    )
+    for each in (wrenches, tilted):
+        largest = np.abs(each).max()
+        assert np.abs(np.diff(each, axis=0)).max() < 0.02 * largest
+
+
+def test_both_struts_feel_opposite_wrenches():
+    random = np.random.default_rng(0)
+    pushed = 0
+    for _ in range(300):
+        first, second = random.normal(0.0, 0.02, (2, 2, 3))
+        below, above = forces_between(first, second, random.normal(0.0, 0.1, (4, 3)))
+        np.testing.assert_allclose(below, -above, atol=1e-9)
+        pushed += below.any()
+    assert pushed > 100
