@@ -149,9 +149,12 @@ def make_mjcf(robot: Robot) -> str:
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
     world = _add(model, "worldbody")
-    _add_floor(world, robot)
+    if scenario.terrain.is_ground:
+        _add_floor(world, robot)
+    _add_fixed_nodes(world, robot.structure)
     _add_bodies(model, world, robot)
     _add_cables(model, robot.structure)
+    _add_anchors(model, world, robot.structure)
     return tostring(model, encoding="unicode")
 
 
@@ -175,6 +178,8 @@ class _Simulator:
         self._step = robot.scenario.settings_of(Mujoco).step
         driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # index of each motor's signal
+        names = np.array(robot.structure.node_names)[robot.structure.contacts]
+        self._contacts = [self._model.site(name).id for name in names]
 
     def run(self, signals: Array, steps_kept: Array, observer: Observer) -> Array:
         """Simulates and returns MuJoCo's states (time, qpos, qvel) after the steps `steps_kept`.
@@ -193,7 +198,7 @@ class _Simulator:
         with Rollout(nthread=0) as rollout:
             for first in range(0, len(signals), _STRETCH):
                 check_time()
-                forces = signals[first : first + _STRETCH, self._motors]
+                forces = self._controls(signals[first : first + _STRETCH])
                 (states,), _ = rollout.rollout(self._model, [data], state, forces)
                 here = (first < steps_kept) & (steps_kept <= first + len(states))
                 kept[here] = states[steps_kept[here] - first - 1]
@@ -201,6 +206,13 @@ class _Simulator:
                 self._observe(observer, states, signals, first)
                 self._check(states, first)
         return kept
+
+    def _controls(self, signals: Array) -> Array:
+        """MuJoCo's controls (steps, actuators) for signals (steps, n). Anchors and loads have the
+        control 0."""
+        controls = np.zeros((len(signals), self._model.nu))
+        controls[:, : self._motors.size] = signals[:, self._motors]
+        return controls
 
     def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
         """Passes states to an observer: every _OBSERVED-th one, and the state at the end of the
@@ -256,14 +268,14 @@ class _Simulator:
         """MuJoCo's contact forces on the nodes along t1, t2 and n (contacts, 3), in N."""
         mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        data.ctrl[:] = signals[self._motors]
+        data.ctrl[:] = self._controls(signals[np.newaxis])[0]
         mujoco.mj_forward(model, data)
         forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)
             # Geom 0 is the floor, geom i + 1 is contact node i.
             forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
-        nodes = data.site_xpos[self._robot.structure.contacts]
+        nodes = data.site_xpos[self._contacts]
         axes = ground_axes(nodes, self._robot.ground)
         return (axes @ forces[:, :, None])[:, :, 0]
 
@@ -274,6 +286,12 @@ def _add_floor(world: Element, robot: Robot) -> None:
     pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
     quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
     _add(world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE)
+
+
+def _add_fixed_nodes(world: Element, structure: Structure) -> None:
+    """Adds a site of the world for each fixed node."""
+    for node in range(structure.first_node[-1], len(structure.node_names)):
+        _add(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
@@ -339,6 +357,25 @@ def _add_cables(model: Element, structure: Structure) -> None:
             _add(tendon, "site", site=structure.node_names[node])
         if cable["signal"] != PASSIVE:  # a motor's force lengthens its tendon, ours shortens it
             _add(actuators, "motor", name=name, tendon=name, gear="-1")
+
+
+def _add_anchors(model: Element, world: Element, structure: Structure) -> None:
+    """Adds an actuator for each axis of an anchor, a spring with damping, and for each component of
+    a load, a constant force. They act along the axes of a site of the world."""
+    actuators, axes = model.find("actuator"), np.eye(3, 6)
+    anchors, loads = structure.anchors, structure.loads
+    pushes: list[tuple[int, Array, int, list[float]]] = []
+    for i, node in enumerate(anchors.nodes):
+        for axis in np.flatnonzero(anchors.stiffness[i]):
+            law = [0.0, -anchors.stiffness[i, axis], -anchors.damping[i, axis]]
+            pushes.append((node, anchors.places[i], axis, law))
+    for node, force in zip(loads.nodes, loads.forces, strict=True):
+        pushes += [(node, np.zeros(3), axis, [force[axis], 0.0, 0.0]) for axis in range(3)]
+    for i, (node, place, axis, law) in enumerate(pushes):
+        ends = {"site": structure.node_names[node], "refsite": f"place {i}"}
+        _add(world, "site", name=ends["refsite"], pos=place)
+        force = {"biastype": "affine", "biasprm": law, "gainprm": "0"}
+        _add(actuators, "general", name=f"push {i}", gear=axes[axis], **ends, **force)
 
 
 def _add(parent: Element, tag: str, **attributes: Any) -> Element:
