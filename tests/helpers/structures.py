@@ -68,16 +68,14 @@ def joined_nodes(given: robot_structure.StructureFile) -> dict[str, np.ndarray]:
     return {
         "p_WN": np.array(list(given.nodes.values())),
         "body_of_node": np.array([given.body_of_node[node] for node in given.nodes]),
-        "held": np.array(
-            [[axis in given.anchors.get(n, "") for axis in "xyz"] for n in given.nodes]
-        ),
         "cable_ends": np.array([[number[n] for n in cable.nodes] for cable in given.all_cables]),
     }
 
 
 def statics_of(given: robot_structure.StructureFile) -> Statics:
     """Statics of a structure with its nodes as given."""
-    return find_statics(**joined_nodes(given))
+    held = [[axis in given.anchors.get(node, "") for axis in "xyz"] for node in given.nodes]
+    return find_statics(**joined_nodes(given), held=np.array(held))
 
 
 def recorded_structure(data: Path, name: str) -> dict[str, Any]:

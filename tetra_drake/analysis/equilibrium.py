@@ -78,9 +78,7 @@ def study_equilibrium(robot: Robot) -> EquilibriumStudy:
     )
 
 
-def _anchor_forces(
-    structure: Structure, unactuated: Unactuated, p_WN: np.ndarray
-) -> np.ndarray:
+def _anchor_forces(structure: Structure, unactuated: Unactuated, p_WN: np.ndarray) -> np.ndarray:
     """Forces (nodes, 3) of the anchors on the structure at rest, at the last computed state."""
     fixed, anchors = structure.first_node[-1], structure.anchors
     forces = np.zeros_like(p_WN)

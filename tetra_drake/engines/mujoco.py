@@ -154,7 +154,7 @@ def make_mjcf(robot: Robot) -> str:
     _add_fixed_nodes(world, robot.structure)
     _add_bodies(model, world, robot)
     _add_cables(model, robot.structure)
-    _add_anchors(model, world, robot.structure)
+    _add_pushes(model, world, robot.structure)
     return tostring(model, encoding="unicode")
 
 
@@ -359,23 +359,30 @@ def _add_cables(model: Element, structure: Structure) -> None:
             _add(actuators, "motor", name=name, tendon=name, gear="-1")
 
 
-def _add_anchors(model: Element, world: Element, structure: Structure) -> None:
+def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
     """Adds an actuator for each axis of an anchor, a spring with damping, and for each component of
-    a load, a constant force. They act along the axes of a site of the world."""
-    actuators, axes = model.find("actuator"), np.eye(3, 6)
-    anchors, loads = structure.anchors, structure.loads
-    pushes: list[tuple[int, Array, int, list[float]]] = []
-    for i, node in enumerate(anchors.nodes):
-        for axis in np.flatnonzero(anchors.stiffness[i]):
-            law = [0.0, -anchors.stiffness[i, axis], -anchors.damping[i, axis]]
-            pushes.append((node, anchors.places[i], axis, law))
+    a load, a constant force."""
+    actuators, anchors, loads = _add(model, "actuator"), structure.anchors, structure.loads
+    laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
+    for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
+        _add_push(actuators, world, f"anchor {structure.node_names[node]}", place, of_axes)
     for node, force in zip(loads.nodes, loads.forces, strict=True):
-        pushes += [(node, np.zeros(3), axis, [force[axis], 0.0, 0.0]) for axis in range(3)]
-    for i, (node, place, axis, law) in enumerate(pushes):
-        ends = {"site": structure.node_names[node], "refsite": f"place {i}"}
-        _add(world, "site", name=ends["refsite"], pos=place)
-        force = {"biastype": "affine", "biasprm": law, "gainprm": "0"}
-        _add(actuators, "general", name=f"push {i}", gear=axes[axis], **ends, **force)
+        of_axes = np.outer(force, [1.0, 0.0, 0.0])
+        _add_push(actuators, world, f"load {structure.node_names[node]}", np.zeros(3), of_axes)
+
+
+def _add_push(actuators: Element, world: Element, name: str, place: Array, laws: Array) -> None:
+    """Adds an actuator along each axis of the world that pushes the node after the blank of `name`.
+
+    The three numbers of each law are a constant force, and the force per displacement from `place`
+    and per velocity.
+    """
+    _add(world, "site", name=name, pos=place)
+    ends = {"site": name.partition(" ")[2], "refsite": name}
+    for axis, gear, law in zip("xyz", np.eye(3, 6), laws, strict=True):
+        if law.any():
+            force = {"gear": gear, "gainprm": "0", "biastype": "affine", "biasprm": law}
+            _add(actuators, "general", name=f"{name} {axis}", **ends, **force)
 
 
 def _add(parent: Element, tag: str, **attributes: Any) -> Element:

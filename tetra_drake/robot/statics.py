@@ -2,7 +2,7 @@
 
 The method is from S. Pellegrino, "Structural computations with the singular value decomposition of
 the equilibrium matrix", International Journal of Solids and Structures 30 (1993). Here the joined
-parts are rigid bodies. Anchors leave the motions that move no node along an axis that it is held in.
+parts are rigid bodies. Anchors leave the motions that move no node along an axis that is held.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ class Statics(NamedTuple):
     """Orthonormal basis (s, cables) of the tensions that are in balance without loads, other than
     the forces of anchors."""
     mechanisms: int
-    """Number of infinitesimal motions that change no cable's length to first order. Motions of the
-    whole structure do not count, nor does the spin of a straight body about its axis."""
+    """Number of infinitesimal motions that change no cable's length to first order. Motions of a
+    whole structure without anchors do not count, nor does the spin of a straight body about its
+    axis."""
 
 
 def find_statics(
@@ -39,16 +40,15 @@ def find_statics(
     """
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
     wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
-    of_nodes = _motions_of_nodes(p_WN, body_of_node)
-    allowed = null_space(of_nodes[held], TOLERANCE)
+    allowed = null_space(_motions_of_nodes(p_WN, body_of_node)[held], TOLERANCE)
     self_stresses = null_space(allowed.T @ wrenches, TOLERANCE)
     rank = len(cable_ends) - self_stresses.shape[1]
-    # Fixed nodes move with the whole structure, if it moves.
-    idle, of_whole = _idle_motions(p_WN, body_of_node), rigid_motions(p_WN)
-    moved = of_nodes @ idle
-    moved[body_of_node < 0, :, :6] = of_whole[body_of_node < 0]
-    rigid = np.linalg.matrix_rank(idle @ null_space(moved[held], TOLERANCE), tol=TOLERANCE)
-    return Statics(self_stresses.T, mechanisms=int(allowed.shape[1] - rank - rigid))
+    idle = _spins(p_WN, body_of_node)
+    if not held.any():
+        whole = np.tile(np.eye(6), (idle.shape[0] // 6, 1))
+        idle = np.hstack([idle, whole])  # a structure on one line spins as its bodies do
+    uncounted = np.linalg.matrix_rank(idle, tol=TOLERANCE) if idle.size else 0
+    return Statics(self_stresses.T, mechanisms=int(allowed.shape[1] - rank - uncounted))
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
@@ -93,16 +93,15 @@ def _motions_of_nodes(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
     return motions[:, :, :bodies].reshape(len(p_WN), 3, 6 * bodies)
 
 
-def _idle_motions(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
-    """Motions (6 B, motions) of B bodies that stretch no cable: the six of the whole structure,
-    then the spins of straight bodies."""
+def _spins(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
+    """Spins (6 B, straight bodies) of the straight ones of B bodies about their axes."""
     bodies = body_of_node.max() + 1
-    motions = [np.tile(np.eye(6), (bodies, 1))]
+    spins = []
     for body in range(bodies):
         p = p_WN[body_of_node == body]
         _, sizes, axes = np.linalg.svd(p - p[0])
         if sizes[1:].max(initial=0.0) <= TOLERANCE:
             spin = np.zeros((bodies, 6))
             spin[body] = np.concatenate([axes[0], np.cross(p[0], axes[0])])
-            motions.append(spin.reshape(-1, 1))
-    return np.hstack(motions)
+            spins.append(spin.ravel())
+    return np.array(spins).reshape(-1, 6 * bodies).T

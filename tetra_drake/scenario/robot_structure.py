@@ -47,12 +47,12 @@ LEAST_DISTANCE = 1e-3
 
 
 def _check_name(name: object) -> object:
-    """Checks the name of a node, group or oscillator. Blanks, dots and commas are refused: they
-    separate the parts of cable names, the parts of keys, and keys."""
+    """Checks the name of a node, group or oscillator. Blanks, dots, brackets and commas are
+    refused: they separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
-    if re.search(r"[\s.,]", name):
-        refuse("", f"found the name '{name}', expected one without blanks, dots and commas")
+    if re.search(r"[\s.,\[\]]", name):
+        refuse("", f"found the name '{name}', expected one without blanks, dots, commas, brackets")
     return name
 
 

@@ -12,7 +12,8 @@ from tetra_drake.simd.packed import Packed
 
 
 class Loads(LeafSystem):
-    """Constant forces on nodes, in the world frame (see physics.node_forces). The system has no state.
+    """Constant forces on nodes, in the world frame (see physics.node_forces). The system has no
+    state.
 
     | port              | shape   | unit   | meaning                                  |
     |-------------------|---------|--------|------------------------------------------|
