@@ -90,6 +90,8 @@ def find_equilibrium(
     """
     robot, state = Unactuated.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
+    # Anchors turn the rounding of positions into forces.
+    borne = max(weight, 1e-4 * radius * model.anchors.stiffness.max(initial=0.0))
     descent = _Descent(robot)
     reach, announce_at = FIRST_REACH * radius, math.inf
     most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
@@ -98,7 +100,7 @@ def find_equilibrium(
         if not np.isfinite(force).all():
             break
         tensions = np.abs(robot.forces.cable_forces[:, TENSION])
-        greatest = max(tensions.max(initial=weight), LEAST_FORCE)
+        greatest = max(tensions.max(initial=borne), LEAST_FORCE)
         if np.abs(force).max() <= TOLERANCE * greatest:
             lengths = np.round(robot.forces.cable_forces[:, LENGTH], LENGTH_DIGITS)
             feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
@@ -188,7 +190,7 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
         ]
     )[:, kept]
     free = null_space(resisted, RESISTED)
-    return (motions @ free).reshape(-1, free.shape[1])
+    return (motions @ free).reshape(6 * len(p_WB), free.shape[1])
 
 
 @compiled

@@ -21,13 +21,13 @@ from tetra_drake.scenario.blueprint import WORLD, Blueprint
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.quantities import (
     Acceleration,
-    Damping,
     Density,
     Force,
     Length,
     Mass,
     Position,
     Stiffness,
+    Time,
 )
 from tetra_drake.scenario.refusals import described, hint, refuse
 from tetra_drake.scenario.robot_tetrahedra import (
@@ -154,8 +154,9 @@ class StructureFile(Section):
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
     """Stiffness that holds a node of a strut along each axis of its anchor."""
-    anchor_damping: Damping = Field(default=100.0, ge=0)
-    """Damping beside `anchor_stiffness`."""
+    anchor_time_constant: Time = Field(default=1e-3, ge=0)
+    """Damping beside `anchor_stiffness`, divided by it. With less than 1 ms, a stiff anchor
+    vibrates, and steps are short."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
     gravity: Acceleration = Field(default=9.80665, ge=0)
@@ -208,7 +209,7 @@ class StructureFile(Section):
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
             anchor_stiffness=self.anchor_stiffness * held,
-            anchor_damping=self.anchor_damping * held,
+            anchor_damping=self.anchor_stiffness * self.anchor_time_constant * held,
             payload=np.zeros(self.body_count),
             cable_names=tuple(cable.name for cable in cables),
             cable_groups=tuple(cable.group for cable in cables),
