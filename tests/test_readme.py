@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shlex
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from record import EXPERIMENTS
 
 import tetra_drake as td
 from tetra_drake.cli import main, make_parser
+from tetra_drake.robot.robot import equilibrium_of
 from tetra_drake.scenario.structure_files import read_structure
 
 CHECKOUT = Path(__file__).parents[1]
@@ -88,7 +91,7 @@ def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.Monkey
 
 
 def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: None) -> None:
-    (snippet,) = snippets("python", SCENARIOS)
+    (_, snippet) = snippets("python", SCENARIOS)
     names: dict[str, Any] = {}
     exec(compile(snippet, "scenario/README.md", "exec"), names)
     assert names["result"].duration == names["simulator"].get_context().get_time() == 1.0
@@ -97,6 +100,28 @@ def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: 
     # u0 (1 + 0.8) for extensor and flexor on the left, u0 (1 - 0.8) on the right.
     tonic = steering.get_output_port().Eval(context)
     assert tonic[:4] == pytest.approx([0.9, 0.9, 0.1, 0.1], rel=1e-12)
+
+
+def test_a_structure_is_wound_up_to_its_rest_with_shorter_cables(
+    work: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Without ground, because friction holds feet where they are: 1 mm beside the rest.
+    floats = {"robot.gravity": "0 m/s^2", "terrain": "!Nothing"}
+    floating = td.load_scenario("six_bar").with_changes(floats)
+    monkeypatch.setattr(td, "load_scenario", lambda name: floating, raising=False)
+    (snippet, _) = snippets("python", SCENARIOS)
+    names: dict[str, Any] = {}
+    exec(compile(snippet, "scenario/README.md", "exec"), names)
+    robot, trajectory = names["robot"], names["result"].trajectory
+    laws = [dict(law) for law in robot.structure.cable_laws]
+    for cable in robot.driven:
+        laws[cable]["free_length"] *= 0.7
+    shorter = dataclasses.replace(robot.structure, cable_laws=tuple(laws))
+    poses = [trajectory[name].values[-1] for name in ("q_WB", "p_WB")]
+    start = np.append(np.hstack(poses), np.zeros(36))
+    rest = equilibrium_of(robot.scenario, shorter, start)
+    np.testing.assert_allclose(trajectory.length[-1], rest.lengths, atol=1e-5)
+    assert np.abs(trajectory.length[0] - rest.lengths).max() > 0.01
 
 
 def test_the_scenario_loads(work: Path) -> None:

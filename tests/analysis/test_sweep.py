@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from helpers.anchored import supported_prism
 
 from tetra_drake.analysis.sweep import sweep
 from tetra_drake.engines.simulate import simulate
@@ -22,6 +23,15 @@ STIFFNESS = "robot.cables.outer_stiffness"
 def short() -> Scenario:
     times = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.1 s"}
     return load_scenario("thesis").with_changes({"engine": "!Compiled"} | times)
+
+
+def test_a_load_is_an_axis() -> None:
+    supported = supported_prism(duration=0.5)
+    changes = {"robot.loads.n3[2]": ["-0.1 N", "-0.4 N"]}
+    found = sweep(supported, seeded_gait(supported, 3), changes, workers=1)
+    assert found["n3[2]"].values.tolist() == [-0.1, -0.4]
+    assert found["n3[2]"].units == "N"
+    assert float(found.tension[0, 0]) != float(found.tension[1, 0])
 
 
 def test_each_key_is_a_labelled_axis_of_the_numbers_of_single_simulations(short: Scenario) -> None:

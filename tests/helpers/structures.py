@@ -75,7 +75,8 @@ def joined_nodes(given: robot_structure.StructureFile) -> dict[str, np.ndarray]:
 
 def statics_of(given: robot_structure.StructureFile) -> Statics:
     """Statics of a structure with its nodes as given."""
-    return find_statics(**joined_nodes(given))
+    held = [[axis in given.anchors.get(node, "") for axis in "xyz"] for node in given.nodes]
+    return find_statics(**joined_nodes(given), held=np.array(held))
 
 
 def recorded_structure(data: Path, name: str) -> dict[str, Any]:

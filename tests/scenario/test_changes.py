@@ -11,7 +11,7 @@ from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.refusals import TAG
 from tetra_drake.scenario.scenario import Scenario
 
-IN = 0.0254
+IN, LBF = 0.0254, 4.4482216152605
 
 
 def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
@@ -50,6 +50,24 @@ def test_what_a_file_changes_decides_on_the_spacing(load_text, text, balanced):
     # A robot that balances otherwise is balanced anew; the thesis rounds its own 2.9436 in to
     # 2.94 in.
     assert (abs(axial_force(load_text(f"robot: {{{text}}}"))) < 1e-9) == balanced
+
+
+def test_a_key_with_an_index_changes_an_item_of_a_list(refused):
+    prism = load_scenario("prism")
+    loaded = prism.with_changes({"robot.loads.n3": ["1 N", "0 N", "-6 N"]})
+    changes = {"robot.loads.n3[2]": "-0.5 lbf", "robot.nodes.n0[0]": "11 cm"}
+    changed = loaded.with_changes(changes).robot
+    assert changed.loads["n3"] == pytest.approx([1.0, 0.0, -0.5 * LBF])
+    assert changed.nodes["n0"] == [0.11, *prism.robot.nodes["n0"][1:]]
+    assert loaded.robot.loads == {"n3": [1.0, 0.0, -6.0]}
+    with refused("changes", "robot.loads.n3[3]", "list of 3"):
+        loaded.with_changes({"robot.loads.n3[3]": "1 N"})
+    with refused("scenario prism", "robot.loads.n3"):
+        prism.with_changes({"robot.loads.n3[2]": "1 N"})
+    with refused("scenario prism", "robot.loads.n3[2]", "without a unit"):
+        loaded.with_changes({"robot.loads.n3[2]": 5.0})
+    with refused("scenario prism", "robot.loads.n3[1]", "twice"):
+        loaded.with_changes({"robot.loads.n3": ["1 N"] * 3, "robot.loads.n3[1]": "1 N"})
 
 
 def test_what_python_changes_decides_on_the_spacing_as_in_a_file(load_text, scenario):

@@ -70,6 +70,26 @@ def test_a_structure_has_what_its_file_says_in_si() -> None:
     assert structure("contacts: all").contact_nodes == tuple("gabcdef")
 
 
+def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
+    given = structure(
+        "{nodes: {h: [1, 1, 9]}, anchors: {h: xyz, a: xz}, loads: {g: [0 N, 0 N, -6 N]}, "
+        "contacts: all, cables: {up: {pairs: [[a, h]], stiffness: 1 N/m, damping: 0 N*s/m, "
+        "free_length: 0 m}}}"
+    )
+    blueprint = given.blueprint()
+    assert blueprint.node_names[-1] == "h"
+    assert blueprint.body_of_node[-1] == "world"
+    assert blueprint.held[-1].all()
+    assert blueprint.p_WN[-1] == pytest.approx([0.01, 0.01, 0.09])
+    assert blueprint.cable_names[0] == "up a h"
+    assert "h" not in given.contact_nodes
+    a, g = blueprint.node_names.index("a"), blueprint.node_names.index("g")
+    assert blueprint.held[a].tolist() == [True, False, True]
+    assert blueprint.anchor_damping[a] == pytest.approx(1e-3 * blueprint.anchor_stiffness[a])
+    assert blueprint.node_load[g].tolist() == [0.0, 0.0, -6.0]
+    assert np.count_nonzero(blueprint.node_load) == 1
+
+
 def test_a_written_structure_is_read_as_it_was(tmp_path: Path) -> None:
     (tmp_path / "my.yaml").write_text(dump_yaml(written(structure().model_dump())))
     again = read_structure(tmp_path / "my.yaml")
@@ -127,6 +147,32 @@ def test_shipped_structures(name, first, bodies, cables, oscillators) -> None:
         ("actuated: {right: [side c d, side b d]}", "actuated.right[1]", ["'left'"]),
         ("actuated: {right: [side c d, side d c]}", "actuated.right[1]", ["'right'"]),
         ("actuated: {to left: [side c d]}", "actuated.to left", ["blanks"]),
+        ("{nodes: {'h[1]': [2, 2, 1]}}", "nodes.h[1]", ["brackets"]),
+        ("anchors: {q: xyz}", "anchors.q", ["'q'"]),
+        ("anchors: {a: xw}", "anchors.a", ["'xw'", "x, y and z"]),
+        ("anchors: {a: xx}", "anchors.a", ["'xx'"]),
+        ("anchors: {a: ''}", "anchors.a", ["''"]),
+        ("anchors: {a: 7}", "anchors.a", ["7"]),
+        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xz}}", "nodes.h", ["no strut", "xyz"]),
+        (
+            "anchors: {a: xyz, b: yz, c: z, d: xyz, e: yx, f: xyz, g: xy}",
+            "anchors",
+            ["every body", "can move"],
+        ),
+        (
+            "{nodes: {h: [1, 1, 1], i: [1, 1, 2]}, anchors: {h: xyz, i: xyz}, "
+            "cables: {long: {pairs: [[e, f], [h, i]]}}}",
+            "cables.long.pairs[1]",
+            ["two fixed nodes"],
+        ),
+        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, masses: {h: 1 g}}", "masses.h", ["fixed"]),
+        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, loads: {h: [0, 0, 0]}}", "loads.h", ["fixed"]),
+        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, contacts: [h]}", "contacts[0]", ["fixed"]),
+        ("loads: {q: [0, 0, 1 N]}", "loads.q", ["'q'"]),
+        ("loads: {a: [0, 0, 600]}", "loads.a[2]", ["600", "without a unit"]),
+        ("loads: {a: [0, 0, 1 m]}", "loads.a[2]", ["'1 m'"]),
+        ("loads: {a: [0, 1 N]}", "loads.a", ["at least 3"]),
+        ("anchor_stiffness: 0 N/m", "anchor_stiffness", ["0"]),
     ],
 )
 def test_problems_name_key_and_facts(changes: str, key: str, facts: list[str], refused) -> None:

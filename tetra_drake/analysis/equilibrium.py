@@ -3,6 +3,7 @@ positions, natural frequencies."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,10 +13,11 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
+from tetra_drake.physics.kinematics import FORCE
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
-from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.structure import Structure, node_positions
 
 if TYPE_CHECKING:
     import pandas
@@ -31,9 +33,10 @@ class EquilibriumStudy:
 
     robot: Robot
     statics: Statics
-    """Statics of the robot without weight, away from the ground."""
+    """Statics of the robot without weight and loads, away from the ground."""
     nodes: pandas.DataFrame
-    """A row per node, by its name: body, x, y, z, load (normal force of the ground)."""
+    """A row per node, by its name: body, x, y, z, load (normal force of the ground), and the force
+    of its anchor on the structure, anchor_x, anchor_y, anchor_z."""
     cables: pandas.DataFrame
     """A row per cable, by its name: group, length, free_length, tension."""
     frequencies: np.ndarray
@@ -50,9 +53,11 @@ def study_equilibrium(robot: Robot) -> EquilibriumStudy:
     loads = np.zeros(len(structure.node_names))
     loads[structure.contacts] = unactuated.forces.ground_forces[:, NORMAL]
     ends = np.column_stack([structure.cables["node_a"], structure.cables["node_b"]])
-    bodies = np.array(structure.bodies)[structure.carriers]
-    x, y, z = node_positions(structure, equilibrium.state).T
-    nodes = {"body": bodies, "x": x, "y": y, "z": z, "load": loads}
+    p_WN = node_positions(structure, equilibrium.state)
+    nodes = pandas.DataFrame(p_WN, list(structure.node_names), ["x", "y", "z"])
+    nodes.insert(0, "body", structure.body_of_node)
+    nodes["load"] = loads
+    nodes[[f"anchor_{axis}" for axis in "xyz"]] = _anchor_forces(structure, unactuated, p_WN)
     cables = {
         "group": structure.cable_groups,
         "length": equilibrium.lengths,
@@ -62,20 +67,32 @@ def study_equilibrium(robot: Robot) -> EquilibriumStudy:
     return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
-            p_WN=_weightless_nodes(robot), body_of_node=structure.carriers, cable_ends=ends
+            p_WN=_weightless_nodes(robot),
+            body_of_node=structure.carriers,
+            cable_ends=ends,
+            held=structure.held,
         ),
-        nodes=pandas.DataFrame(nodes, index=list(structure.node_names)),
+        nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
         frequencies=_frequencies(unactuated, equilibrium.state),
     )
 
 
+def _anchor_forces(structure: Structure, unactuated: Unactuated, p_WN: np.ndarray) -> np.ndarray:
+    """Forces (nodes, 3) of the anchors on the structure at rest, at the last computed state."""
+    fixed, anchors = structure.first_node[-1], structure.anchors
+    forces = np.zeros_like(p_WN)
+    forces[fixed:] = -unactuated.forces.nodes[fixed:, FORCE : FORCE + 3]
+    forces[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
+    return forces
+
+
 def _weightless_nodes(robot: Robot) -> np.ndarray:
-    """p_WN (nodes, 3) in the equilibrium without weight, away from the ground."""
-    bodies, start = robot.model.bodies, robot.equilibrium.state.copy()
-    start[6 : 7 * len(bodies.mass) : 7] += 10.0 * bodies.radius.max()
-    weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
-    return node_positions(robot.structure, equilibrium_of(weightless, robot.structure, start).state)
+    """p_WN (nodes, 3) in the equilibrium without weight, loads and ground."""
+    nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(robot.structure.node_load)
+    structure = dataclasses.replace(robot.structure, contacts=nowhere, node_load=no_load)
+    weightless, start = robot.scenario.with_numbers({"robot.gravity": 0.0}), robot.equilibrium.state
+    return node_positions(structure, equilibrium_of(weightless, structure, start).state)
 
 
 def _frequencies(unactuated: Unactuated, state: np.ndarray) -> np.ndarray:

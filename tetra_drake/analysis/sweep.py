@@ -16,7 +16,7 @@ from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import flattened
+from tetra_drake.scenario.section import value_at
 
 if TYPE_CHECKING:
     import xarray
@@ -103,7 +103,7 @@ def _labels(
 ) -> tuple[list[Any], dict[str, str]]:
     """Coordinates of a dimension: the numbers of a key in SI and their unit. Values that are not
     numbers become text."""
-    numbers = [flattened(changed.model_dump()).get(key) for changed in scenarios]
+    numbers = [value_at(changed.model_dump(), key) for changed in scenarios]
     if not all(isinstance(number, int | float) for number in numbers):
         return [str(value) for value in values], {}
     return numbers, {"units": getattr(numbers[0], "unit", "1")}

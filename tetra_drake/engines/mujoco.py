@@ -148,11 +148,14 @@ def make_mjcf(robot: Robot) -> str:
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
     world = _add(model, "worldbody")
-    _add_floor(world, robot)
+    if scenario.terrain.is_ground:
+        _add_floor(world, robot)
+    _add_fixed_nodes(world, robot.structure)
     _add_bodies(model, world, robot)
     if robot.model.strut_contact.acts:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot.structure)
+    _add_pushes(model, world, robot.structure)
     return tostring(model, encoding="unicode")
 
 
@@ -183,6 +186,8 @@ class _Simulator:
         self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(nodes)}
         driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # index of each motor's signal
+        names = np.array(robot.structure.node_names)[robot.structure.contacts]
+        self._contacts = [self._model.site(name).id for name in names]
 
     def run(self, signals: Array, steps_kept: Array, observer: Observer) -> Array:
         """Simulates and returns MuJoCo's states (time, qpos, qvel) after the steps `steps_kept`.
@@ -201,7 +206,7 @@ class _Simulator:
         with Rollout(nthread=0) as rollout:
             for first in range(0, len(signals), _STRETCH):
                 check_time()
-                forces = signals[first : first + _STRETCH, self._motors]
+                forces = self._controls(signals[first : first + _STRETCH])
                 (states,), _ = rollout.rollout(self._model, [data], state, forces)
                 here = (first < steps_kept) & (steps_kept <= first + len(states))
                 kept[here] = states[steps_kept[here] - first - 1]
@@ -209,6 +214,13 @@ class _Simulator:
                 self._observe(observer, states, signals, first)
                 self._check(states, first)
         return kept
+
+    def _controls(self, signals: Array) -> Array:
+        """MuJoCo's controls (steps, actuators) for signals (steps, n). Anchors and loads have the
+        control 0."""
+        controls = np.zeros((len(signals), self._model.nu))
+        controls[:, : self._motors.size] = signals[:, self._motors]
+        return controls
 
     def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
         """Passes states to an observer: every _OBSERVED-th one, and the state at the end of the
@@ -264,7 +276,7 @@ class _Simulator:
         """MuJoCo's contact forces on the nodes along t1, t2 and n (contacts, 3), in N."""
         mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        data.ctrl[:] = signals[self._motors]
+        data.ctrl[:] = self._controls(signals[np.newaxis])[0]
         mujoco.mj_forward(model, data)
         forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
@@ -272,7 +284,7 @@ class _Simulator:
             if contact.geom[0] == _FLOOR:
                 node = self._contact_of_geom[contact.geom[1]]
                 forces[node] += contact.frame.reshape(3, 3).T @ wrench[:3]
-        nodes = data.site_xpos[self._robot.structure.contacts]
+        nodes = data.site_xpos[self._contacts]
         axes = ground_axes(nodes, self._robot.ground)
         return (axes @ forces[:, :, None])[:, :, 0]
 
@@ -283,6 +295,12 @@ def _add_floor(world: Element, robot: Robot) -> None:
     pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
     quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
     _add(world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE)
+
+
+def _add_fixed_nodes(world: Element, structure: Structure) -> None:
+    """Adds a site of the world for each fixed node."""
+    for node in range(structure.first_node[-1], len(structure.node_names)):
+        _add(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
@@ -374,6 +392,32 @@ def _add_cables(model: Element, structure: Structure) -> None:
             _add(tendon, "site", site=structure.node_names[node])
         if cable["signal"] != PASSIVE:  # a motor's force lengthens its tendon, ours shortens it
             _add(actuators, "motor", name=name, tendon=name, gear="-1")
+
+
+def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
+    """Adds an actuator for each axis of an anchor, a spring with damping, and for each component of
+    a load, a constant force."""
+    actuators, anchors, loads = _add(model, "actuator"), structure.anchors, structure.loads
+    laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
+    for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
+        _add_push(actuators, world, f"anchor {structure.node_names[node]}", place, of_axes)
+    for node, force in zip(loads.nodes, loads.forces, strict=True):
+        of_axes = np.outer(force, [1.0, 0.0, 0.0])
+        _add_push(actuators, world, f"load {structure.node_names[node]}", np.zeros(3), of_axes)
+
+
+def _add_push(actuators: Element, world: Element, name: str, place: Array, laws: Array) -> None:
+    """Adds an actuator along each axis of the world that pushes the node after the blank of `name`.
+
+    The three numbers of each law are a constant force, and the force per displacement from `place`
+    and per velocity.
+    """
+    _add(world, "site", name=name, pos=place)
+    ends = {"site": name.partition(" ")[2], "refsite": name}
+    for axis, gear, law in zip("xyz", np.eye(3, 6), laws, strict=True):
+        if law.any():
+            force = {"gear": gear, "gainprm": "0", "biastype": "affine", "biasprm": law}
+            _add(actuators, "general", name=f"{name} {axis}", **ends, **force)
 
 
 def _add(parent: Element, tag: str, **attributes: Any) -> Element:

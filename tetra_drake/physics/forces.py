@@ -1,4 +1,4 @@
-"""Forces of cables, ground and gravity on a robot in a given state."""
+"""Forces of cables, ground, anchors, loads and gravity on a robot in a given state."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from tetra_drake.physics import actuator, cable, capsules, contact, kinematics, 
 from tetra_drake.physics.friction import friction_force
 from tetra_drake.physics.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
 from tetra_drake.physics.model import Model
+from tetra_drake.physics.node_forces import add_anchor_forces, add_loads
 from tetra_drake.physics.vectors import (
     add_vector,
     difference,
@@ -160,7 +161,8 @@ def compute_forces(
     forces: Forces,
     generalized: Table,
 ) -> None:
-    """Writes the generalized force (6 bodies,) of cables, ground, gravity and gyroscopic torques.
+    """Writes the generalized force (6 bodies,) of cables, ground, anchors, loads, gravity and
+    gyroscopic torques.
 
     move_robot() must have been called for the same state. With `write_parts`, also writes
     `cable_forces` and `ground_forces`.
@@ -168,6 +170,8 @@ def compute_forces(
     add_cable_forces(robot, signals, write_parts, forces)
     add_ground_forces(robot, modes, write_parts, forces)
     add_strut_forces(robot, state, forces)
+    add_anchor_forces(robot.anchors, forces.nodes)
+    add_loads(robot.loads, forces.nodes)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
     bodies = generalized.size // 6
     for body in range(bodies):
@@ -231,6 +235,26 @@ def compute_strut_forces(parts: Parts, state: Table, generalized: Table) -> None
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_strut_forces(robot, state, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+
+
+@compiled
+def compute_anchor_forces(parts: Parts, state: Table, generalized: Table) -> None:
+    """Writes the generalized force of all anchors (6 bodies,): [t_W; f_W] at each body's origin.
+    Also writes nodes."""
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_anchor_forces(robot.anchors, forces.nodes)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+
+
+@compiled
+def compute_loads(parts: Parts, state: Table, generalized: Table) -> None:
+    """Writes the generalized force of all loads (6 bodies,): [t_W; f_W] at each body's origin. Also
+    writes nodes."""
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_loads(robot.loads, forces.nodes)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
 
 

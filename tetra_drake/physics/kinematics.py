@@ -13,7 +13,8 @@ Array = np.ndarray
 P_BN_W, P_WN, V_WN, FORCE, NODE_COLUMNS = 0, 3, 6, 9, 12
 """Columns of the table `nodes` (nodes, 12), and their number: vector from the body's origin to the
 node (m), position (m), velocity (m/s), force on the node (N), all in the world frame. The nodes of
-a body are consecutive rows."""
+a body are consecutive rows. The last rows are fixed nodes, which belong to no body; the forces on
+them move nothing."""
 
 
 @compiled
@@ -22,9 +23,10 @@ def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> No
 
     Args:
         state: [q; v] of the bodies, 13 numbers per body.
-        p_BN: positions of the nodes (nodes, 3) in the frames of their bodies, in m.
-        first_node: index of each body's first node (bodies + 1,); the last number is the number of
-            nodes.
+        p_BN: positions of the nodes (nodes, 3) in the frames of their bodies, in m; then positions
+            of fixed nodes in the world.
+        first_node: index of each body's first node (bodies + 1,); the last number is the index of
+            the first fixed node.
         nodes: the table to write.
     """
     bodies = state.size // 13
@@ -45,6 +47,12 @@ def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> No
             nodes[node, V_WN + 1] = v_y + w_z * p_x - w_x * p_z
             nodes[node, V_WN + 2] = v_z + w_x * p_y - w_y * p_x
             put_vector((0.0, 0.0, 0.0), node, FORCE, nodes)
+    for node in range(first_node[bodies], p_BN.shape[0]):
+        place = vector_at(p_BN, node, 0)
+        put_vector(place, node, P_BN_W, nodes)
+        put_vector(place, node, P_WN, nodes)
+        put_vector((0.0, 0.0, 0.0), node, V_WN, nodes)
+        put_vector((0.0, 0.0, 0.0), node, FORCE, nodes)
 
 
 @inlined

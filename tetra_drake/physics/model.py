@@ -8,6 +8,7 @@ from tetra_drake.physics.actuator import Actuator
 from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.capsules import StrutContact
 from tetra_drake.physics.contact import Ground
+from tetra_drake.physics.node_forces import Anchors, Loads
 from tetra_drake.physics.struts import Struts
 from tetra_drake.simd.lanes import Table
 
@@ -27,7 +28,7 @@ class Bodies(NamedTuple):
 
 class Couplings(NamedTuple):
     """Pairs of bodies joined by cables. The cables of a pair are consecutive. They run from the
-    first body, with the lower index, to the second body."""
+    first body, with the lower index, to the second body. Cables from fixed nodes come first."""
 
     first: Table
     """Index of the first body of each pair (pairs,)."""
@@ -36,20 +37,25 @@ class Couplings(NamedTuple):
     first_cable: Table
     """Index of the first cable of each pair (pairs + 1,); the last number is the number of
     cables."""
+    held: Table
+    """Index of the body of each cable from a fixed node (fixed cables,)."""
 
 
 class Model(NamedTuple):
     """Constants of a robot: its structure and its physical laws; SI units."""
 
     p_BN: Table
-    """Positions of the nodes (nodes, 3) in the frames of their bodies, in the order of the
-    bodies."""
+    """Positions of the nodes (nodes, 3) in the frames of their bodies, in the order of the bodies;
+    then positions of fixed nodes in the world."""
     first_node: Table
-    """Index of each body's first node (bodies + 1,); the last number is the number of nodes."""
+    """Index of each body's first node (bodies + 1,); the last number is the index of the first
+    fixed node."""
     cables: Cables
     actuator: Actuator
     couplings: Couplings
     ground: Ground
+    anchors: Anchors
+    loads: Loads
     bodies: Bodies
     struts: Struts
     strut_contact: StrutContact

@@ -95,7 +95,8 @@ def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
     ]
     if result.robot.structure.signals:
         pictures.append((forces.signals_and_tensions, result))
-    pictures.append((forces.ground_forces, result))
+    if len(result.robot.structure.contacts):
+        pictures.append((forces.ground_forces, result))
     return _save(folder, *pictures)
 
 

@@ -44,28 +44,39 @@ def structure_text(study: EquilibriumStudy) -> str:
     robot, statics = study.robot, study.statics
     structure = robot.structure
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
+    on_ground = " on the ground" if structure.contacts.size else ""
     count = f"{len(structure.bodies)} bodies, {len(structure.node_names)} nodes"
     lines = [
         f"{robot.scenario.name}: {count}, {len(structure.cables)} cables, "
         f"{structure.signals} oscillators, {rounded(1e3 * structure.mass.sum(), 4)} g",
         f"Without weight: self-stress states {len(statics.self_stresses)}, "
         f"infinitesimal mechanisms {statics.mechanisms}.",
-        f"Lowest natural frequencies on the ground, undamped: {lowest or 'none'} Hz.",
+        f"Lowest natural frequencies{on_ground}, undamped: {lowest or 'none'} Hz.",
         "At rest, without actuation:",
         _bodies_table(study).text(),
     ]
     if len(structure.cables):
         lines.append(_cables_table(study).text())
+    if structure.held.any():
+        lines.append(_anchors_table(study).text())
     return "\n\n".join(lines)
 
 
 def _bodies_table(study: EquilibriumStudy) -> Table:
-    rows, bodies = [], study.nodes.groupby("body", sort=False)
-    for (body, nodes), mass in zip(bodies, study.robot.structure.mass, strict=True):
+    rows, structure = [], study.robot.structure
+    for body, mass in zip(structure.bodies, structure.mass, strict=True):
+        nodes = study.nodes[study.nodes["body"] == body]
         heights = _range(nodes["z"] / INCH, fixed)
         load = rounded(nodes["load"].sum() / POUND_FORCE)
-        rows.append([str(body), rounded(1e3 * mass, 4), heights, load])
+        rows.append([body, rounded(1e3 * mass, 4), heights, load])
     return Table(["body", "mass (g)", "heights of nodes (in)", "load on the ground (lbf)"], rows)
+
+
+def _anchors_table(study: EquilibriumStudy) -> Table:
+    forces = study.nodes.loc[study.robot.structure.held.any(axis=1), "anchor_x":"anchor_z"]
+    pounds = (forces / POUND_FORCE).itertuples()
+    rows = [[str(node), *map(rounded, pushes)] for node, *pushes in pounds]
+    return Table(["anchor", *(f"force along {axis} (lbf)" for axis in "xyz")], rows)
 
 
 def _cables_table(study: EquilibriumStudy) -> Table:

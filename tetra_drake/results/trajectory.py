@@ -151,7 +151,7 @@ def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
     """Dimension and values of each coordinate except time."""
     oscillators, cables = structure.oscillators, structure.cables
     driving = ["" if i == cable.PASSIVE else oscillators[i] for i in cables["signal"]]
-    body_of_node = [structure.bodies[body] for body in structure.carriers]
+    body_of_node = list(structure.body_of_node)
     joined = [f"{body_of_node[a]}-{body_of_node[b]}" for a, b in cables[["node_a", "node_b"]]]
     contacts = structure.contacts
     return {

@@ -13,8 +13,10 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.physics import cable, contact
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
-from tetra_drake.physics.kinematics import move_bodies
+from tetra_drake.physics.kinematics import P_WN, move_bodies
 from tetra_drake.physics.model import Model
+from tetra_drake.physics.rigid_motions import rigid_motions
+from tetra_drake.robot.statics import null_space
 from tetra_drake.simd.compiling import LOGGER, compiled
 from tetra_drake.simd.lanes import Table
 
@@ -36,6 +38,9 @@ OVERSHOOT = 0.9
 beginning. A step beyond the limit is too long."""
 DIFFERENCE = 1e-7
 """Displacement for finite differences, as a share of the largest body's radius."""
+
+RESISTED = 1e-6
+"""Least share of the greatest displacement of an anchored node by which a motion is resisted."""
 
 LEAST_STIFFNESS = 1e-9
 """Least stiffness of a stable mode, as a share of the ground's stiffness."""
@@ -84,6 +89,8 @@ def find_equilibrium(
     """
     robot, state = Unactuated.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
+    # Anchors turn the rounding of positions into forces.
+    borne = max(weight, 1e-4 * radius * model.anchors.stiffness.max(initial=0.0))
     descent = _Descent(robot)
     reach, announce_at = FIRST_REACH * radius, math.inf
     most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
@@ -92,7 +99,7 @@ def find_equilibrium(
         if not np.isfinite(force).all():
             break
         tensions = np.abs(robot.forces.cable_forces[:, cable.TENSION])
-        greatest = max(tensions.max(initial=weight), LEAST_FORCE)
+        greatest = max(tensions.max(initial=borne), LEAST_FORCE)
         if np.abs(force).max() <= TOLERANCE * greatest:
             lengths = np.round(robot.forces.cable_forces[:, cable.LENGTH], LENGTH_DIGITS)
             feet = int(np.count_nonzero(robot.forces.ground_forces[:, contact.NORMAL]))
@@ -139,7 +146,7 @@ class _Descent:
         If the potential energy is not convex, the displacements lead downhill. The robot as a whole
         does not move. None if the derivatives of the forces are not finite.
         """
-        stiffness, held = stiffness_at_rest(self._robot, state), _free_motions(self._robot, state)
+        held, stiffness = _free_motions(self._robot, state), stiffness_at_rest(self._robot, state)
         stiffness = 0.5 * (stiffness + stiffness.T) + self._hard * held @ held.T
         before = self._index
         while (step := self._solved(stiffness, force, self._index)) is None:
@@ -161,13 +168,28 @@ class _Descent:
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Displacements (6 n, 3) of the whole robot along x, along y, and about z."""
-    motions = np.zeros((len(state) // 13, 6, 3))
-    p_WB = state[: 7 * len(motions)].reshape(-1, 7)[:, 4:]
-    x, y = ((p_WB - p_WB.mean(axis=0)) / robot.model.bodies.radius.max())[:, :2].T
-    motions[:, 3, 0] = motions[:, 4, 1] = motions[:, 2, 2] = 1.0
-    motions[:, 3, 2], motions[:, 4, 2] = -y, x
-    return motions.reshape(-1, 3)
+    """Displacements (6 n, motions) of the whole robot that change no energy: along x, along y and
+    about z, and the other three for a robot without weight and contacts. Motions that anchors or
+    loads resist are left out. The forces of the state must have been computed."""
+    model, nodes = robot.model, robot.forces.nodes
+    floats = not model.bodies.weight.any() and not model.ground.contacts.size
+    kept = [3, 4, 2, 5, 0, 1] if floats else [3, 4, 2]  # in the order of rigid_motions()
+    p_WB = state[: 7 * model.bodies.mass.size].reshape(-1, 7)[:, 4:]
+    centre, radius = p_WB.mean(axis=0), model.bodies.radius.max()
+    turns = np.broadcast_to(np.eye(3, 6), (len(p_WB), 3, 6))
+    motions = np.concatenate([turns, rigid_motions((p_WB - centre) / radius)], axis=1)[:, :, kept]
+    of_nodes = rigid_motions((nodes[:, P_WN : P_WN + 3] - centre) / radius)
+    turned = rigid_motions(model.loads.forces)  # a load does not turn with the robot
+    turned[..., 3:] = 0.0
+    resisted = np.concatenate(
+        [
+            of_nodes[model.first_node[-1] :].reshape(-1, 6),
+            of_nodes[model.anchors.nodes][model.anchors.stiffness > 0.0],
+            turned.reshape(-1, 6) / np.abs(model.loads.forces).max(initial=LEAST_FORCE),
+        ]
+    )[:, kept]
+    free = null_space(resisted, RESISTED)
+    return (motions @ free).reshape(6 * len(p_WB), free.shape[1])
 
 
 @compiled

@@ -27,7 +27,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     or with a contact node in the ground.
     """
     start = node_positions(structure, structure.initial_state)[structure.contacts]
-    ahead = start[:, 0].max() + STEP_AHEAD
+    ahead = start[:, 0].max(initial=-np.inf) + STEP_AHEAD  # not used without contact nodes
     grid = scenario.terrain.grid(ahead=ahead, source=scenario.name)
     made = Ground(
         contacts=structure.contacts,

@@ -189,8 +189,14 @@ def make_structure(scenario: Scenario) -> Structure:
     with an incline. Raises InputError if it cannot start there."""
     structure = undisturbed_structure(scenario)
     p_WB, slope = structure.p_WB, scenario.terrain.plane_slope or 0.0
+    if slope and structure.held.any():
+        problem = "found an incline under a robot with anchors, expected level ground"
+        raise InputError(scenario.name, "terrain", problem)
     if scenario.robot.offsets:
-        p_WB = p_WB + np.array(scenario.robot.offsets)
+        offsets = np.array(scenario.robot.offsets)
+        anchors = structure.anchors
+        np.multiply.at(offsets, anchors.carriers, anchors.stiffness == 0.0)
+        p_WB = p_WB + offsets
         check_apart(scenario, dataclasses.replace(structure, p_WB=p_WB))
     p_WB, q_WB = turn_with_slope(p_WB, structure.q_WB, slope)
     return dataclasses.replace(structure, p_WB=p_WB, q_WB=q_WB)
@@ -199,6 +205,8 @@ def make_structure(scenario: Scenario) -> Structure:
 def undisturbed_structure(scenario: Scenario) -> Structure:
     """The structure of a scenario's robot at its start on flat ground, without offsets."""
     blueprint = scenario.robot.blueprint()
+    if not scenario.terrain.is_ground:
+        blueprint = dataclasses.replace(blueprint, contacts=np.array([], dtype=np.int64))
     placed = Structure.of(blueprint)
     check_apart(scenario, placed)
     if not blueprint.settles:
@@ -212,8 +220,10 @@ def undisturbed_structure(scenario: Scenario) -> Structure:
 
 
 def _lift(scenario: Scenario, placed: Structure) -> float:
-    """Distance (m) to move a structure up so that it stands on the ground. Raises InputError if the
-    structure is clearly below the ground."""
+    """Distance (m) to move a structure up so that it stands on the ground. A structure with anchors
+    or without ground is not moved. Raises InputError if it is clearly below the ground."""
+    if not placed.contacts.size:
+        return 0.0
     heights = placed.p_WN[:, 2]
     lowest = placed.contacts[heights[placed.contacts].argmin()]
     depth = -heights[lowest]
@@ -221,7 +231,7 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
         key = f"robot.nodes.{placed.node_names[lowest]}"
         problem = f"starts {depth:.3g} m below the ground, expected on it or above"
         raise InputError(scenario.name, key, problem)
-    return float(depth)
+    return 0.0 if placed.held.any() else float(depth)
 
 
 def check_apart(scenario: Scenario, structure: Structure) -> None:
@@ -247,9 +257,11 @@ def check_apart(scenario: Scenario, structure: Structure) -> None:
 def equilibrium_of(
     scenario: Scenario, structure: Structure, start: np.ndarray | None = None
 ) -> Equilibrium:
-    """Equilibrium of a structure on flat ground without actuation. The search begins at the state
-    `start` (13 bodies,), by default the structure's initial state. Raises InputError if there is no
-    equilibrium."""
+    """Equilibrium of a structure without actuation, on flat ground if it has contact nodes.
+
+    The search begins at the state `start` (13 bodies,), by default the structure's initial state.
+    Raises InputError if there is no equilibrium.
+    """
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
     start = structure.initial_state if start is None else start
     return find_equilibrium(model, start, bodies=structure.bodies, source=scenario.name)
@@ -264,6 +276,8 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         actuator=scenario.actuation.actuator(),
         couplings=structure.couplings,
         ground=make_ground(scenario, structure),
+        anchors=structure.anchors,
+        loads=structure.loads,
         bodies=Bodies(
             mass=structure.mass,
             inertia=structure.mass[:, np.newaxis] * structure.unit_inertia,

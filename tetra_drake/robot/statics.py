@@ -2,7 +2,7 @@
 
 The method is from S. Pellegrino, "Structural computations with the singular value decomposition of
 the equilibrium matrix", International Journal of Solids and Structures 30 (1993). Here the joined
-parts are rigid bodies.
+parts are rigid bodies. Anchors leave the motions that move no node along an axis that is held.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+
+from tetra_drake.physics.rigid_motions import rigid_motions
 
 TOLERANCE = 1e-6
 """Singular values below this share of the greatest count as zero. Lengths are in units of the
@@ -20,25 +22,42 @@ class Statics(NamedTuple):
     """Self-stress states and mechanisms of a structure."""
 
     self_stresses: np.ndarray
-    """Orthonormal basis (s, cables) of the tensions that are in balance without loads."""
+    """Orthonormal basis (s, cables) of the tensions that are in balance without loads, other than
+    the forces of anchors."""
     mechanisms: int
-    """Number of infinitesimal motions that change no cable's length to first order. Motions of the
-    whole structure do not count, nor does the spin of a straight body about its axis."""
+    """Number of infinitesimal motions that change no cable's length to first order. Motions of a
+    whole structure without anchors do not count, nor does the spin of a straight body about its
+    axis."""
 
 
-def find_statics(*, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray) -> Statics:
-    """Statics of rigid bodies joined by cables. For the arguments see cable_wrenches()."""
-    bodies = int(body_of_node.max()) + 1
+def find_statics(
+    *, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray, held: np.ndarray
+) -> Statics:
+    """Statics of rigid bodies joined by cables.
+
+    `held` (nodes, 3) is True for each axis of a node along which the world holds it. For the other
+    arguments see cable_wrenches().
+    """
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
     wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
-    _, singular_values, tensions = np.linalg.svd(wrenches)
+    allowed = null_space(_motions_of_nodes(p_WN, body_of_node)[held], TOLERANCE)
+    self_stresses = null_space(allowed.T @ wrenches, TOLERANCE)
+    rank = len(cable_ends) - self_stresses.shape[1]
+    idle = _spins(p_WN, body_of_node)
+    if not held.any():
+        whole = np.tile(np.eye(6), (idle.shape[0] // 6, 1))
+        idle = np.hstack([idle, whole])  # a structure on one line spins as its bodies do
+    uncounted = np.linalg.matrix_rank(idle, tol=TOLERANCE) if idle.size else 0
+    return Statics(self_stresses.T, mechanisms=int(allowed.shape[1] - rank - uncounted))
+
+
+def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
+    """Orthonormal basis (n, vectors) of the vectors that a matrix (m, n) maps to 0. Singular values
+    up to a share `tolerance` of the greatest count as 0."""
+    _, singular_values, rows = np.linalg.svd(matrix)
     greatest = singular_values.max(initial=0.0)
-    rank = int(np.count_nonzero(singular_values > TOLERANCE * greatest))
-    straight = sum(_is_straight(p_WN[body_of_node == body]) for body in range(bodies))
-    # A structure on one line has 5 motions as a whole: its spin is the spin of its bodies.
-    of_whole = 5 if _is_straight(p_WN) else 6
-    mechanisms = 6 * bodies - of_whole - straight - rank
-    return Statics(self_stresses=tensions[rank:], mechanisms=mechanisms)
+    basis: np.ndarray = rows[np.count_nonzero(singular_values > tolerance * greatest) :].T
+    return basis
 
 
 def cable_wrenches(
@@ -51,7 +70,7 @@ def cable_wrenches(
 
     Args:
         p_WN: positions of the nodes (nodes, 3) in m.
-        body_of_node: index of the body of each node (nodes,).
+        body_of_node: index of the body of each node (nodes,); -1 for a fixed node.
         cable_ends: indices of the two nodes of each cable (cables, 2).
     """
     cables, (node_a, node_b) = np.arange(len(cable_ends)), cable_ends.T
@@ -59,12 +78,30 @@ def cable_wrenches(
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     wrench = np.hstack([np.cross(p_WN[node_a], force), force])
     bodies = body_of_node.max() + 1
-    wrenches = np.zeros((bodies, 6, len(cables)))
+    wrenches = np.zeros((bodies + 1, 6, len(cables)))  # the last wrenches are on the world
     wrenches[body_of_node[node_a], :, cables] = wrench
     wrenches[body_of_node[node_b], :, cables] = -wrench
-    return wrenches.reshape(6 * bodies, len(cables))
+    return wrenches[:bodies].reshape(6 * bodies, len(cables))
 
 
-def _is_straight(p_WN: np.ndarray) -> bool:
-    """True if the nodes (n, 3) of a body lie on a line."""
-    return bool(np.linalg.matrix_rank(p_WN - p_WN[0], tol=TOLERANCE) < 2)
+def _motions_of_nodes(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
+    """Velocities (nodes, 3, 6 B) of the nodes for the motions of B bodies. The six motions of a
+    body are in the order of rigid_motions(), about the world's origin."""
+    bodies = body_of_node.max() + 1
+    motions = np.zeros((len(p_WN), 3, bodies + 1, 6))
+    motions[np.arange(len(p_WN)), :, body_of_node] = rigid_motions(p_WN)
+    return motions[:, :, :bodies].reshape(len(p_WN), 3, 6 * bodies)
+
+
+def _spins(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
+    """Spins (6 B, straight bodies) of the straight ones of B bodies about their axes."""
+    bodies = body_of_node.max() + 1
+    spins = []
+    for body in range(bodies):
+        p = p_WN[body_of_node == body]
+        _, sizes, axes = np.linalg.svd(p - p[0])
+        if sizes[1:].max(initial=0.0) <= TOLERANCE:
+            spin = np.zeros((bodies, 6))
+            spin[body] = np.concatenate([axes[0], np.cross(p[0], axes[0])])
+            spins.append(spin.ravel())
+    return np.array(spins).reshape(-1, 6 * bodies).T

@@ -15,10 +15,11 @@ from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 from tetra_drake.physics import cable, kinematics
 from tetra_drake.physics.capsules import Search
 from tetra_drake.physics.model import Couplings
+from tetra_drake.physics.node_forces import Anchors, Loads
 from tetra_drake.physics.struts import Struts
 from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import Equilibrium
-from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.scenario.blueprint import WORLD, Blueprint
 
 SKIN = 0.05
 """Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
@@ -30,8 +31,8 @@ class Structure(Blueprint):
     """Rigid bodies joined by cables; SI units. A body consists of struts between nodes."""
 
     p_BN: np.ndarray
-    """Positions of the nodes (nodes, 3) in the frames of their bodies. The origin of a frame is the
-    body's centre of mass."""
+    """Positions of the nodes (nodes, 3) in the frames of their bodies; of fixed nodes in the world.
+    The origin of a frame is the body's centre of mass."""
     mass: np.ndarray
     """Masses (bodies,)."""
     unit_inertia: np.ndarray
@@ -53,7 +54,7 @@ class Structure(Blueprint):
         given = {one.name: getattr(blueprint, one.name) for one in dataclasses.fields(Blueprint)}
         return cls(
             **given,
-            p_BN=blueprint.p_FN - p_FB[blueprint.carriers],
+            p_BN=blueprint.p_FN - np.vstack([p_FB, np.zeros(3)])[blueprint.carriers],
             mass=mass,
             unit_inertia=unit_inertia,
             p_WB=blueprint.p_WF + p_FB,
@@ -95,7 +96,7 @@ class Structure(Blueprint):
     @property
     def radius(self) -> np.ndarray:
         """Largest distance of a node from the centre of mass of each body (bodies,), in m."""
-        distances = np.linalg.norm(self.p_BN, axis=1)
+        distances = np.linalg.norm(self.p_BN[: self.first_node[-1]], axis=1)
         radius: np.ndarray = np.maximum.reduceat(distances, self.first_node[:-1])
         return radius
 
@@ -108,23 +109,45 @@ class Structure(Blueprint):
         """Pairs of bodies that cables join, in the order of the cables. Raises ValueError if the
         cables of a pair are not next to each other."""
         pairs = self.carriers[self.cable_ends]
-        begins = np.flatnonzero(np.any(np.diff(pairs, axis=0, prepend=-1), axis=1))
+        held = int(np.count_nonzero(pairs[:, 0] == WORLD))
+        begins = held + np.flatnonzero(np.any(np.diff(pairs[held:], axis=0, prepend=-1), axis=1))
         first, second = pairs[begins].T
-        if (first >= second).any() or len(np.unique(pairs, axis=0)) < len(begins):
+        is_ordered = (pairs[:held, 0] == WORLD).all() and (first < second).all()
+        if not is_ordered or len(np.unique(pairs[held:], axis=0)) < len(begins):
             raise ValueError("the cables are not in the order of the bodies that they join")
-        return Couplings(first.copy(), second.copy(), np.append(begins, len(pairs)))
+        first_cable, held_bodies = np.append(begins, len(pairs)), pairs[:held, 1].copy()
+        return Couplings(first.copy(), second.copy(), first_cable, held_bodies)
+
+    @property
+    def anchors(self) -> Anchors:
+        """The anchors of the bodies' nodes. They hold the nodes where the blueprint has them."""
+        nodes = np.flatnonzero(self.anchor_stiffness.any(axis=1))
+        return Anchors(
+            nodes,
+            carriers=self.carriers[nodes],
+            places=self.p_WN[nodes],
+            stiffness=self.anchor_stiffness[nodes],
+            damping=self.anchor_damping[nodes],
+        )
+
+    @property
+    def loads(self) -> Loads:
+        """The constant forces on nodes."""
+        nodes = np.flatnonzero(self.node_load.any(axis=1))
+        return Loads(nodes, self.node_load[nodes])
 
     @functools.cached_property
     def node_shares(self) -> np.ndarray:
         """Weights of the nodes (nodes,): the weighted sum of node positions is the centre of mass
-        in every pose of the bodies."""
+        in every pose of the bodies. Fixed nodes have the weight 0."""
+        *of_bodies, fixed = np.split(self.p_BN, self.first_node[1:])
         shares = []
-        for p_BN, mass in zip(np.split(self.p_BN, self.first_node[1:-1]), self.mass, strict=True):
+        for p_BN, mass in zip(of_bodies, self.mass, strict=True):
             # The weighted sum of the nodes of a body is its origin, the centre of mass.
             conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max())])
             origin = [0.0, 0.0, 0.0, conditions[3, 0]]
             shares.append(mass * np.linalg.lstsq(conditions, origin)[0])
-        return np.concatenate(shares) / self.mass.sum()
+        return np.concatenate([*shares, np.zeros(len(fixed))]) / self.mass.sum()
 
     @property
     def isotropic(self) -> bool:

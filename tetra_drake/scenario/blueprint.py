@@ -10,6 +10,9 @@ from typing import Self
 
 import numpy as np
 
+WORLD = -1
+"""Index that fixed nodes have in place of the index of a body."""
+
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
 
@@ -18,7 +21,8 @@ TOLERANCE = 1e-6
 class Blueprint:
     """A robot at the positions of its settings; SI units.
 
-    Nodes and struts are in the order of the bodies. Left and right are the two sides of the plane
+    Nodes and struts are in the order of the bodies. Then come fixed nodes, which belong to no body:
+    the world holds them where they are. Left and right are the two sides of the plane
     y = 0; mirror images are with respect to this plane.
     """
 
@@ -27,11 +31,12 @@ class Blueprint:
     node_names: tuple[str, ...]
     """Names of the nodes, such as "T1 tip"."""
     first_node: np.ndarray
-    """Index of each body's first node (bodies + 1,); the last number is the number of nodes."""
+    """Index of each body's first node (bodies + 1,); the last number is the index of the first
+    fixed node."""
     p_WF: np.ndarray
     """Origins (bodies, 3) of the frames F of the bodies. Their axes are the world's."""
     p_FN: np.ndarray
-    """Positions of the nodes (nodes, 3) in the frames F."""
+    """Positions of the nodes (nodes, 3) in the frames F; of fixed nodes in the world."""
     struts: np.ndarray
     """Indices of the two nodes of each strut (struts, 2)."""
     strut_radius: np.ndarray
@@ -44,10 +49,18 @@ class Blueprint:
     """Densities of the spheres at the nodes (nodes,), which are solid."""
     node_mass: np.ndarray
     """Point masses at the nodes (nodes,)."""
+    node_load: np.ndarray
+    """Constant forces on the nodes (nodes, 3) in the world frame."""
+    anchor_stiffness: np.ndarray
+    """Stiffness (nodes, 3) of the springs that hold the nodes of bodies along x, y and z; 0 along a
+    free axis."""
+    anchor_damping: np.ndarray
+    """Damping (nodes, 3) beside `anchor_stiffness`."""
     payload: np.ndarray
     """Point masses at the centres of mass (bodies,)."""
     cable_names: tuple[str, ...]
-    """Names of the cables, such as "T1-T2 outer bottom_left", in the order of pairs of bodies."""
+    """Names of the cables, such as "T1-T2 outer bottom_left", in the order of pairs of bodies.
+    Cables from fixed nodes come first."""
     cable_groups: tuple[str, ...]
     """Group of each cable, such as "outer"."""
     cable_ends: np.ndarray
@@ -76,13 +89,29 @@ class Blueprint:
 
     @functools.cached_property
     def carriers(self) -> np.ndarray:
-        """Index of the body of each node (nodes,)."""
-        return np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
+        """Index of the body of each node (nodes,); WORLD for a fixed node."""
+        carriers = np.full(len(self.node_names), WORLD)
+        carriers[: self.first_node[-1]] = np.repeat(
+            np.arange(len(self.bodies)), np.diff(self.first_node)
+        )
+        return carriers
+
+    @property
+    def body_of_node(self) -> tuple[str, ...]:
+        """Name of the body of each node; "world" for a fixed node."""
+        names = *self.bodies, "world"
+        return tuple(names[body] for body in self.carriers)
+
+    @property
+    def held(self) -> np.ndarray:
+        """True for each axis of a node along which the world holds it (nodes, 3)."""
+        is_fixed = self.carriers == WORLD
+        return is_fixed[:, np.newaxis] | (self.anchor_stiffness > 0.0)
 
     @property
     def p_WN(self) -> np.ndarray:
         """Positions of the nodes (nodes, 3) in the world frame."""
-        return self.p_WF[self.carriers] + self.p_FN
+        return np.vstack([self.p_WF, np.zeros(3)])[self.carriers] + self.p_FN
 
     @property
     def signals(self) -> int:

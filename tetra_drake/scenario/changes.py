@@ -7,7 +7,7 @@ from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.refusals import TAG
-from tetra_drake.scenario.section import Section, Tree, joined, python_value
+from tetra_drake.scenario.section import Section, Tree, joined, parts_of, python_value
 from tetra_drake.scenario.yaml_text import parse_yaml
 
 REPLACED = ("objective", "require", "robot.actuated")
@@ -15,7 +15,8 @@ REPLACED = ("objective", "require", "robot.actuated")
 
 
 class Part(Tree):
-    """A mapping made from dotted keys. It changes a part of a mapping, never all of it."""
+    """A mapping made from dotted keys. It changes a part of a mapping, or items of a list by their
+    indices."""
 
 
 def merged(base: Any, changes: Any, key: str = "") -> Any:
@@ -26,10 +27,13 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
       without a tag, it changes keys.
     - `objective`, `require` and `robot.actuated` are replaced as a whole. Only dotted keys from
       Python, such as "objective.speed", change a part of them.
-    - Numbers, texts, lists, and sections from Python replace the base's value.
+    - Numbers, texts, lists, and sections from Python replace the base's value. Only keys from
+      Python, such as "robot.loads.n3[2]", change an item of a list.
     """
     if not isinstance(changes, dict):
         return changes
+    if isinstance(base, list) and isinstance(changes, Part):
+        return _with_items(base, changes, key)
     is_whole = key in REPLACED and not isinstance(changes, Part)
     if not isinstance(base, dict) or is_whole or changes.get(TAG, base.get(TAG)) != base.get(TAG):
         base = {}
@@ -39,12 +43,23 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
     return tree
 
 
+def _with_items(base: list[Any], changes: Part, key: str) -> list[Any]:
+    """A list with other items, by their indices. Raises InputError for an index that is none."""
+    items = list(base)
+    for index, value in changes.items():
+        inner = joined(key, f"[{index}]" if isinstance(index, int) else index)
+        if not isinstance(index, int) or index >= len(items):
+            raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
+        items[index] = merged(items[index], value, inner)
+    return items
+
+
 def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
     """Converts changes by dotted keys from Python to the tree of a file. The tree may also contain
     sections."""
     tree: Tree = Part()
-    for key in sorted(changes, key=lambda key: key.count(".")):  # "robot" before "robot.gravity"
-        *sections, name = key.split(".")
+    for key in sorted(changes, key=lambda key: len(parts_of(key))):  # "robot" before "robot.name"
+        *sections, name = parts_of(key)
         place: Any = tree
         for section in sections:
             if isinstance(place, dict):

@@ -6,6 +6,7 @@ the world frame (x forward, y left, z up), near a static equilibrium.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
@@ -15,7 +16,8 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.physics.rigid_motions import rigid_motions
+from tetra_drake.scenario.blueprint import WORLD, Blueprint
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.quantities import (
     Acceleration,
@@ -25,6 +27,7 @@ from tetra_drake.scenario.quantities import (
     Mass,
     Position,
     Stiffness,
+    Time,
 )
 from tetra_drake.scenario.refusals import described, hint, refuse
 from tetra_drake.scenario.robot_tetrahedra import (
@@ -44,13 +47,21 @@ LEAST_DISTANCE = 1e-3
 
 
 def _check_name(name: object) -> object:
-    """Checks the name of a node, group or oscillator. Blanks, dots and commas are refused: they
-    separate the parts of cable names, the parts of keys, and keys."""
+    """Checks the name of a node, group or oscillator. Blanks, dots, brackets and commas are
+    refused: they separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
-    if re.search(r"[\s.,]", name):
-        refuse("", f"found the name '{name}', expected one without blanks, dots and commas")
+    if re.search(r"[\s.,\[\]]", name):
+        refuse("", f"found the name '{name}', expected one without blanks, dots, commas, brackets")
     return name
+
+
+def _check_axes(axes: object) -> object:
+    """Checks the axes along which an anchor holds a node."""
+    letters = list(axes) if isinstance(axes, str) else []
+    if not letters or sorted(letters) != sorted({"x", "y", "z"} & set(letters)):
+        refuse("", f"found {described(axes)}, expected some of the axes x, y and z, such as xyz")
+    return axes
 
 
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
@@ -144,12 +155,23 @@ class StructureFile(Section):
     """Names of the cables that each oscillator drives, their nodes in either order."""
     masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors."""
+    loads: dict[str, Annotated[list[Force], Field(min_length=3, max_length=3)]] = Field(default={})
+    """Constant forces [x, y, z] on nodes, in the world frame."""
+    anchors: dict[str, Annotated[str, pydantic.BeforeValidator(_check_axes)]] = Field(default={})
+    """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
+    and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
+    anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
+    """Stiffness that holds a node of a strut along each axis of its anchor."""
+    anchor_time_constant: Time = Field(default=1e-3, ge=0)
+    """Damping beside `anchor_stiffness`, divided by it. With less than 1 ms, a stiff anchor
+    vibrates, and steps are short."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
     gravity: Acceleration = Field(default=9.80665, ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
-    """Displacement [x, y, z] of each body at t = 0; none if empty."""
+    """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
+    its anchors."""
 
     def __copy__(self) -> Self:
         # The copy has no cached properties, because it may get other values.
@@ -172,25 +194,30 @@ class StructureFile(Section):
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file."""
-        number = {node: place for place, node in enumerate(self.body_of_node)}
+        nodes = tuple(self.body_of_node)
+        number = {node: place for place, node in enumerate(nodes)}
         struts = sorted(self.all_struts, key=lambda strut: self.body_of_node[strut.nodes[0]])
         groups = [self.struts[strut.group] for strut in struts]
-        spheres = [self.sphere_of_node[node] for node in number]
+        spheres = [self.sphere_of_node.get(node) for node in nodes]
+        held = np.array([[axis in self._held(node) for axis in "xyz"] for node in nodes])
         cables = self.all_cables
         ends = [sorted(cable.nodes, key=self.body_of_node.__getitem__) for cable in cables]
         laws = zip(cables, self.free_lengths, strict=True)
         return Blueprint(
             bodies=self.body_names,
-            node_names=tuple(number),
+            node_names=nodes,
             first_node=np.append(0, np.cumsum([len(body) for body in self.bodies])),
             p_WF=np.zeros((self.body_count, 3)),
-            p_FN=np.array([self.nodes[node] for node in number]),
+            p_FN=np.array([self.nodes[node] for node in nodes]),
             struts=np.array([[number[node] for node in strut.nodes] for strut in struts]),
             strut_radius=np.array([group.diameter / 2 for group in groups]),
             strut_density=np.array([group.density for group in groups]),
-            node_radius=np.array([sphere.node_diameter / 2 for sphere in spheres]),
-            node_density=np.array([sphere.density for sphere in spheres]),
-            node_mass=np.array([self.masses.get(node, 0.0) for node in number]),
+            node_radius=np.array([one.node_diameter / 2 if one else 0.0 for one in spheres]),
+            node_density=np.array([one.density if one else 0.0 for one in spheres]),
+            node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
+            node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
+            anchor_stiffness=self.anchor_stiffness * held,
+            anchor_damping=self.anchor_stiffness * self.anchor_time_constant * held,
             payload=np.zeros(self.body_count),
             cable_names=tuple(cable.name for cable in cables),
             cable_groups=tuple(cable.group for cable in cables),
@@ -216,7 +243,8 @@ class StructureFile(Section):
 
     @cached_property
     def all_cables(self) -> tuple[Member, ...]:
-        """All cables, in the order of the pairs of bodies. This order numbers them everywhere."""
+        """All cables, in the order of the pairs of bodies; cables from fixed nodes come first. This
+        order numbers them everywhere."""
         return tuple(sorted(_members("cables", self.cables), key=self._bodies_joined))
 
     @cached_property
@@ -235,8 +263,9 @@ class StructureFile(Section):
 
     @cached_property
     def body_of_node(self) -> dict[str, int]:
-        """Index of the body of each node."""
-        return {node: body for body, nodes in enumerate(self.bodies) for node in nodes}
+        """Index of the body of each node; fixed nodes come last and have WORLD."""
+        of_bodies = {node: body for body, nodes in enumerate(self.bodies) for node in nodes}
+        return of_bodies | {node: WORLD for node in self.nodes if node not in of_bodies}
 
     @cached_property
     def sphere_of_node(self) -> dict[str, StrutGroup]:
@@ -272,11 +301,16 @@ class StructureFile(Section):
     @property
     def contact_nodes(self) -> tuple[str, ...]:
         """Names of the nodes that the ground can touch, in the order of `nodes`."""
-        touching = self.nodes if self.contacts == "all" else self.contacts
+        touching = self.sphere_of_node if self.contacts == "all" else self.contacts
         return tuple(node for node in self.nodes if node in touching)
 
+    def _held(self, node: str) -> str:
+        """Axes along which an anchor holds the node of a strut."""
+        return "" if self.body_of_node[node] == WORLD else self.anchors.get(node, "")
+
     def _bodies_joined(self, cable: Member) -> tuple[int, int]:
-        """Indices of the two bodies that a cable joins, the lower one first."""
+        """Indices of the two bodies that a cable joins, the lower one first; WORLD for a fixed
+        node."""
         first, second = (self.body_of_node[node] for node in cable.nodes)
         return min(first, second), max(first, second)
 
@@ -330,11 +364,14 @@ class StructureFile(Section):
         self._check_bodies()
         self._check_tensions()
         self._check_actuated()
+        self._check_anchors()
         for node in self.masses:
-            self._check_node(f"masses.{node}", node)
+            self._check_moving(f"masses.{node}", node)
+        for node in self.loads:
+            self._check_moving(f"loads.{node}", node)
         if self.contacts != "all":
             for place, node in enumerate(self.contacts):
-                self._check_node(f"contacts[{place}]", node)
+                self._check_moving(f"contacts[{place}]", node)
         if not self.contact_nodes:
             refuse("contacts", "found none, expected one node at least")
         check_one_per_body("offsets", self.offsets, self.body_count)
@@ -343,6 +380,26 @@ class StructureFile(Section):
     def _check_node(self, key: str, node: str) -> None:
         if node not in self.nodes:
             refuse(key, f"found unknown node '{node}'; {hint(node, self.nodes)}")
+
+    def _check_moving(self, key: str, node: str) -> None:
+        self._check_node(key, node)
+        if self.body_of_node[node] == WORLD:
+            refuse(key, f"found the fixed node '{node}', expected a node of a strut")
+
+    def _check_anchors(self) -> None:
+        for node in self.anchors:
+            self._check_node(f"anchors.{node}", node)
+        if not any(map(self._can_move, self.bodies)):
+            refuse("anchors", "hold every body, expected one that can move")
+
+    def _can_move(self, body: tuple[str, ...]) -> bool:
+        """True if a body with these nodes can move in spite of its anchors. The spin of a straight
+        body does not count."""
+        p = np.array([self.nodes[node] for node in body])
+        motions = rigid_motions((p - p[0]) / np.ptp(p, axis=0).max())
+        held = np.array([[axis in self._held(node) for axis in "xyz"] for node in body])
+        ways = np.linalg.matrix_rank(motions.reshape(-1, 6), tol=LEAST_DISTANCE)
+        return bool(np.linalg.matrix_rank(motions[held], tol=LEAST_DISTANCE) < ways)
 
     def _check_pairs(self) -> None:
         keys: dict[frozenset[str], str] = {}
@@ -375,15 +432,21 @@ class StructureFile(Section):
                 refuse(f"nodes.{names[i]}", f"{problem}, expected nodes {least:.3g} m apart")
 
     def _check_bodies(self) -> None:
-        for node in self.nodes:
-            if node not in self.body_of_node:
-                refuse(f"nodes.{node}", "is on no strut, expected a node of a strut")
+        for node, body in self.body_of_node.items():
+            if body == WORLD and len(self.anchors.get(node, "")) < len("xyz"):
+                expected = "a node of a strut, or an anchor along xyz"
+                refuse(f"nodes.{node}", f"is on no strut, expected {expected}")
         for cable in self.all_cables:
             first, second = self._bodies_joined(cable)
+            if first == second == WORLD:
+                refuse(cable.key, "joins two fixed nodes, expected a node of a strut")
             if first == second:
                 problem = f"joins the body '{self.body_names[first]}' to itself"
                 refuse(cable.key, f"{problem}, expected nodes of two bodies")
-        joined = _components((*self.all_struts, *self.all_cables))
+        # Anchored nodes are joined by the world.
+        anchored = [Member("", "", pair) for pair in itertools.pairwise(self.anchors)]
+        components = _components((*self.all_struts, *self.all_cables, *anchored))
+        joined = [nodes for nodes in components if self.body_of_node[nodes[0]] != WORLD]
         if len(joined) > 1:
             one, other = (self.body_names[self.body_of_node[nodes[0]]] for nodes in joined[:2])
             problem = f"no cables lead from the body '{other}' to '{one}'"

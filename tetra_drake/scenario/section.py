@@ -7,6 +7,7 @@ TAG.
 
 from __future__ import annotations
 
+import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -241,6 +242,31 @@ _LIMITS = {
 def joined(key: str, inner: str) -> str:
     """Joins a key and an inner key, such as "robot" and "gravity", or "pairs" and "[0]"."""
     return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
+
+
+def parts_of(key: str) -> list[str | int]:
+    """Names in a dotted key, and indices of list items: "loads.n3[2]" has "loads", "n3" and 2."""
+    parts: list[str | int] = []
+    for part in key.split("."):
+        name, _, indices = part.partition("[") if _ITEMS.search(part) else (part, "", "")
+        parts += [name, *map(int, re.findall(r"\d+", indices))]
+    return parts
+
+
+_ITEMS = re.compile(r"[^\[](\[\d+\])+$")
+"""Indices at the end of a key, such as "[2]"."""
+
+
+def value_at(tree: Any, key: str) -> Any:
+    """Value of a tree at a dotted key; None if there is none."""
+    for part in parts_of(key):
+        if isinstance(tree, dict):
+            tree = tree.get(part)
+        elif isinstance(tree, list) and isinstance(part, int) and part < len(tree):
+            tree = tree[part]
+        else:
+            return None
+    return tree
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:

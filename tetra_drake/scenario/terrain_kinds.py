@@ -42,6 +42,8 @@ class Relief(Section):
 
     is_flat: ClassVar[bool] = False
     """True if h = 0 everywhere. The kernels are faster then."""
+    is_ground: ClassVar[bool] = True
+    """False if there is nothing that nodes could touch."""
     uneven: ClassVar[str] = "on uneven ground"
     """Words for where a robot walks on this kind of uneven ground."""
 
@@ -93,6 +95,20 @@ class Flat(Relief):
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         return Grid(np.zeros((3, 3)), (-ASIDE, -ASIDE), (ASIDE, ASIDE))
+
+
+class Nothing(Flat):
+    """No ground: nodes touch nothing. For structures that float or hang."""
+
+    is_ground = False
+
+    @property
+    def where(self) -> str:
+        return "without ground"
+
+    @property
+    def text(self) -> str:
+        return "no ground"
 
 
 class Incline(Relief):
@@ -238,7 +254,7 @@ class HeightField(Relief):
         return Grid(heights, (x, y), (self.cell, self.cell))
 
 
-Terrain = Annotated[Flat | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
+Terrain = Annotated[Flat | Nothing | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
 
 
 def _check_size(cell: tuple[float, float], source: object, key: str) -> None:

@@ -1,7 +1,9 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
 
 from tetra_drake.systems.actuators import Actuators
+from tetra_drake.systems.anchors import Anchors
 from tetra_drake.systems.cable_network import CableNetwork
+from tetra_drake.systems.constant_loads import Loads
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
@@ -11,9 +13,11 @@ from tetra_drake.systems.strut_contact import StrutContact
 
 __all__ = [
     "Actuators",
+    "Anchors",
     "CableNetwork",
     "Feedback",
     "GroundContact",
+    "Loads",
     "MatsuokaCpg",
     "StartUpGate",
     "Steering",

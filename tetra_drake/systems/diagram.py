@@ -15,9 +15,11 @@ from tetra_drake.robot.structure import AddBodies
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import (
     Actuators,
+    Anchors,
     CableNetwork,
     Feedback,
     GroundContact,
+    Loads,
     MatsuokaCpg,
     StartUpGate,
     Steering,
@@ -40,13 +42,16 @@ def MakeTensegrityDiagram(
 
         actuators ←──→ cables
 
+        anchors, loads ──→ forces
+
     Subsystems:
 
     - cpg: with `cpg.signals: live` the network, otherwise its signals, computed beforehand. A robot
       without oscillators has no cpg.
     - feedback: only if `cpg.feedback` is not empty
     - actuators: only if the kind of actuators has states, as winches have
-    - strut_contact: from state to forces, only if struts touch
+    - strut_contact: only if struts touch
+    - anchors, loads: only if nodes of bodies are held, or loaded
 
     `steering` replaces the gait's turn. Input port: turn (of a live network). Output ports: state
     (from plant), signals (start_up), drives (actuators), tensions and lengths (cables),
@@ -66,17 +71,20 @@ def MakeTensegrityDiagram(
     cables = builder.AddNamedSystem("cables", CableNetwork(robot))
     witness = isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness"
     ground = builder.AddNamedSystem("ground", GroundContact(robot, witness=witness))
-    pushing: list[System] = [cables, ground]
+    acting: list[System] = [cables, ground]
     if robot.model.strut_contact.acts:
-        pushing.append(builder.AddNamedSystem("strut_contact", StrutContact(robot)))
-    forces = builder.AddNamedSystem("forces", Adder(len(pushing), 6 * len(structure.bodies)))
+        acting.append(builder.AddNamedSystem("strut_contact", StrutContact(robot)))
+    if structure.anchors.nodes.size:
+        acting.append(builder.AddNamedSystem("anchors", Anchors(robot)))
+    if structure.loads.nodes.size:
+        acting.append(builder.AddNamedSystem("loads", Loads(robot)))
+    forces = builder.AddNamedSystem("forces", Adder(len(acting), 6 * len(structure.bodies)))
 
     state, signals = plant.get_state_output_port(), start_up.get_output_port()
     builder.Connect(signals, cables.GetInputPort("signals"))
-    for number, system in enumerate(pushing):
+    for i, system in enumerate(acting):
         builder.Connect(state, system.GetInputPort("state"))
-        force = system.GetOutputPort("generalized_force")
-        builder.Connect(force, forces.get_input_port(number))
+        builder.Connect(system.GetOutputPort("generalized_force"), forces.get_input_port(i))
     builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
     if len(robot.starting_drives()):
         actuators = builder.AddNamedSystem("actuators", Actuators(robot))

@@ -51,8 +51,10 @@ window.addEventListener("load", () => {
   }
   function node_places() {
     const placed = bodies.map((_, body) => pose(body));
-    return nodes.map(({body, place}) =>
-      new Vector3(...place).applyQuaternion(placed[body].turn).add(placed[body].position));
+    return nodes.map(({body, place}) => {
+      const point = new Vector3(...place);  // of a fixed node, whose body is -1, in World
+      return body < 0 ? point : point.applyQuaternion(placed[body].turn).add(placed[body].position);
+    });
   }
   const mean = (points) =>
     points.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(points.length);
@@ -112,7 +114,7 @@ window.addEventListener("load", () => {
     });
     contacts.forEach((node, contact) => {
       const stands = touches[contact][frame] > 0;
-      feet[contact].material.color.set(stands ? colours.stance : colours.node);
+      feet[contact].material.color.set(stands ? colours.stance : nodes[node].colour);
       find(...nodes[node].path).scale.setScalar(stands ? 1.5 : 1);
       point_arrow(force_arrows[contact], places[node], vector(arrows, 3 * contact));
       force_arrows[contact].visible = element("forces").checked;

@@ -32,6 +32,7 @@ from tetra_drake.visualization.scene import (
     cable_paths,
     cable_radii,
     drawn_radii,
+    node_colours,
     node_paths,
     radius_per_newton,
     set_surroundings,
@@ -107,7 +108,8 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     tension, force = frames["tension"].values, ground_forces(robot, frames)
     greatest = np.percentile(tension, _USUAL) if tension.size else 0.0
     per_newton = radius_per_newton(structure, greatest)
-    usual_force = float(np.percentile(np.linalg.norm(force, axis=-1), _USUAL))
+    sizes = np.linalg.norm(force, axis=-1)
+    usual_force = float(np.percentile(sizes, _USUAL)) if sizes.size else 0.0
     inches = LONG_ARROW * float(np.ptp(frames["p_WN"].values[0, :, 2])) / INCH
     inch_of_arrow = round_force(usual_force / max(inches, 1.0))
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
@@ -119,7 +121,10 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "named": len(bodies) <= MOST_NAMES and not any(" " in name for name in bodies),
         "nodes": [
             {"path": _parts(path), "body": int(body), "place": place.round(6).tolist()}
-            for path, body, place in zip(paths, structure.carriers, structure.p_BN, strict=True)
+            | {"colour": COLOURS[colour]}
+            for path, body, place, colour in zip(
+                paths, structure.carriers, structure.p_BN, node_colours(structure), strict=True
+            )
         ],
         "cables": [
             {"path": _parts(path), "nodes": nodes}
@@ -127,6 +132,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         ],
         "contacts": contacts.tolist(),
         "colours": COLOURS,
+        "anchored": bool(structure.held.any()),
         "strut": float(size),
         "poses": _steps(poses),
         "radii": _steps(cable_radii(structure, frames, per_newton)),

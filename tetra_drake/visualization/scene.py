@@ -26,6 +26,7 @@ COLOURS = {
     "lead": "#86bbe0",
     "node": "#20262e",
     "stance": "#f57c00",
+    "anchor": "#7b1fa2",
     "actuated": "#c2185b",
     "passive": "#009e73",
     "force": "#111111",
@@ -39,7 +40,7 @@ COLOURS = {
     "sky": "#eef2f6",
 }
 """Colours of the scene. Bodies range from `rear` to `lead`, uneven ground from `low` to `high`. A
-node on the ground has the colour `stance`."""
+node on the ground has the colour `stance`, a node that the world holds the colour `anchor`."""
 SLENDERNESS = 60.0
 """Length of the longest strut divided by the least drawn radius. Thinner struts are hard to see."""
 THICKEST, THINNEST = 0.7, 0.15
@@ -79,8 +80,9 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
         strut = Cylinder(radius, float(np.linalg.norm(p_BN[b] - p_BN[a])))
         meshcat.SetObject(path, strut, Rgba(*shades[body]))
         meshcat.SetTransform(path, strut_pose(p_BN[a], p_BN[b]))
+    colours = node_colours(structure)
     for node, path in enumerate(node_paths(structure)):
-        meshcat.SetObject(path, Sphere(node_radius[node]), rgba("node"))
+        meshcat.SetObject(path, Sphere(node_radius[node]), rgba(colours[node]))
         meshcat.SetTransform(path, RigidTransform(p_BN[node]))
     for path in cable_paths(structure):
         meshcat.SetObject(path, Cylinder(1.0, 1.0), rgba(path.split("/")[2]))
@@ -102,16 +104,22 @@ def place_robot(
         matrix[:3, :3] *= radius, radius, np.linalg.norm(p_WB - p_WA)
         matrix[:3, 3] = (p_WA + p_WB) / 2
         meshcat.SetTransform(path, matrix)
-    paths = node_paths(structure)
+    paths, colours = node_paths(structure), node_colours(structure)
     for node, touches in zip(structure.contacts, frame["in_contact"].values[0], strict=True):
-        colour = [*_rgb("stance" if touches else "node"), 1.0]
+        colour = [*_rgb("stance" if touches else colours[node]), 1.0]
         meshcat.SetProperty(paths[node], "color", colour)
 
 
 def node_paths(structure: Structure) -> list[str]:
     """Path of each node in the scene."""
-    named = zip(structure.carriers, structure.node_names, strict=True)
-    return [f"/robot/{structure.bodies[body]}/node {name}" for body, name in named]
+    named = zip(structure.body_of_node, structure.node_names, strict=True)
+    return [f"/robot/{body}/node {name}" for body, name in named]
+
+
+def node_colours(structure: Structure) -> list[str]:
+    """Name of each node's colour off the ground."""
+    colours: list[str] = np.where(structure.held.any(axis=1), "anchor", "node").tolist()
+    return colours
 
 
 def cable_paths(structure: Structure) -> list[str]:
@@ -149,23 +157,16 @@ def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float)
 def set_surroundings(
     meshcat: Meshcat, robot: Robot, points: np.ndarray, *, seen: np.ndarray
 ) -> None:
-    """Adds floor and light and sets the camera.
+    """Adds floor and light and sets the camera. Without ground there is no floor.
 
     The floor surrounds `points` (..., 3), and the camera sees all of `seen` (..., 3), both in m.
     The ground acts on the centres of nodes. Therefore the floor is drawn lower than the ground, by
     the least drawn radius of a node.
     """
-    ground = robot.ground
     middle = (seen.reshape(-1, 3).min(axis=0) + seen.reshape(-1, 3).max(axis=0)) / 2
     reach = float(np.linalg.norm(seen.reshape(-1, 3) - middle, axis=1).max())
-    corners = floor_corners(points, (MARGIN if ground.flat else UNEVEN_MARGIN) * reach)
-    floor = floor_points(ground, corners)
-    floor[..., 2] -= drawn_radii(robot.structure)[1].min()
-    if ground.flat:
-        _add_slab(meshcat, floor)
-    else:
-        _add_relief(meshcat, floor)
-    _add_grid(meshcat, floor, inch="inch" if ground.flat else "inch_on_relief")
+    if robot.scenario.terrain.is_ground:
+        _add_floor(meshcat, robot, points, reach=reach)
     for unused in ("/Grid", "/Axes"):
         meshcat.SetProperty(unused, "visible", False)
     for part in ("top_color", "bottom_color"):
@@ -174,6 +175,19 @@ def set_surroundings(
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     meshcat.SetCameraPose(position, middle)
     _set_lights(meshcat, reach=reach)
+
+
+def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
+    """Adds the floor around `points` (..., 3). `reach` (m) is half of the robot's length."""
+    ground = robot.ground
+    corners = floor_corners(points, (MARGIN if ground.flat else UNEVEN_MARGIN) * reach)
+    floor = floor_points(ground, corners)
+    floor[..., 2] -= drawn_radii(robot.structure)[1].min()
+    if ground.flat:
+        _add_slab(meshcat, floor)
+    else:
+        _add_relief(meshcat, floor)
+    _add_grid(meshcat, floor, inch="inch" if ground.flat else "inch_on_relief")
 
 
 def _set_lights(meshcat: Meshcat, *, reach: float) -> None:

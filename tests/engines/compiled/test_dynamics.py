@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.anchored import scenario_of
 from helpers.kernels import forces_at, make_step
 from helpers.states import disturbed, mass_matrix
 
@@ -17,6 +18,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -162,3 +164,45 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
         # Turned levers change torques, too: by the force, k times 1 mm, that is 0.001 k.
         upper = np.triu(stiffness[place, place]), np.triu(-jacobian[place, place])
         np.testing.assert_allclose(*upper, atol=0.003 * k)
+
+
+HELD = {"top": [0.3, 0.0, 0.4], "side": [-0.3, 0.1, 0.1]}
+"""Places of fixed nodes beside a prism."""
+
+
+def held_robot() -> tuple[Model, np.ndarray, np.ndarray]:
+    """A prism with anchors and cables from fixed nodes, its state at rest and slightly displaced,
+    and no contact modes."""
+    tree = read_structure("prism").model_dump()
+    rope = {"pairs": [["top", "n3"], ["side", "n1"], ["side", "n4"]], "stiffness": 10.0}
+    tree["cables"]["rope"] = rope | {"damping": 0.7, "free_length": 0.1}
+    tree["nodes"] |= HELD
+    anchors = dict.fromkeys(HELD, "xyz") | {"n0": "xyz", "n2": "yz", "n5": "x"}
+    robot = Robot.of(scenario_of(tree | {"anchors": anchors}))
+    state = disturbed(robot.structure, 0, pose=1e-3, speed=0.0)
+    return robot.model, state, np.zeros((0, MODE_COLUMNS))
+
+
+def test_the_implicit_matrix_has_the_damping_of_anchors_and_of_cables_from_fixed_nodes():
+    robot, state, modes = held_robot()
+
+    def force_at(velocity: np.ndarray) -> np.ndarray:
+        return forces_of(robot, np.append(state[:21], velocity), modes)[1]
+
+    jacobian = np.array([force_at(v) - force_at(-v) for v in 1e-4 * np.eye(18)]).T / 2e-4
+    damping = damping_matrix_of(robot, state, modes)
+    # The stiffness of anchors, times 1e-9 s, is 1e-4 N s/m; ropes have a damping of 0.7.
+    np.testing.assert_allclose(damping, -jacobian, atol=3e-4)
+
+
+def test_the_implicit_matrix_has_the_stiffness_of_anchors():
+    robot, state, modes = held_robot()
+    matrices = [implicit_matrix_of(robot, state, modes, time) for time in (0.0, 1.0, 2.0)]
+    stiffness = (matrices[2] - 2.0 * matrices[1] + matrices[0]) / 2.0
+    damping = matrices[1] - matrices[0] - stiffness
+    # The damping of an anchor is 1 ms times its stiffness; ropes have damping alone.
+    anchors = robot.anchors._replace(stiffness=0.0 * robot.anchors.stiffness)
+    without = robot._replace(anchors=anchors._replace(damping=anchors.stiffness))
+    others = damping_matrix_of(without, state, modes)
+    np.testing.assert_allclose(1e-3 * stiffness, damping - others, atol=1e-4)
+    assert stiffness.max() == pytest.approx(1e5)

@@ -18,6 +18,7 @@ from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.friction import friction_damping
 from tetra_drake.physics.kinematics import P_BN_W
 from tetra_drake.physics.model import Model
+from tetra_drake.physics.node_forces import Anchors
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.physics.vectors import cross, put_vector, vector_at
 from tetra_drake.simd.compiling import inlined, merged
@@ -124,7 +125,8 @@ def implicit_matrix(
     lines: Table,
     rows: Table,
 ) -> None:
-    """Writes the implicit matrix: mass matrix + time * damping matrix + time² * contact stiffness.
+    """Writes the implicit matrix: mass matrix + time * damping matrix + time² * stiffness of
+    contacts and anchors.
 
     `rows` has the form of block_sparse; `time` is in s. The damping of cables, normal forces and
     stiction makes the equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
@@ -143,10 +145,14 @@ def implicit_matrix(
         first, last = couplings.first_cable[pair], couplings.first_cable[pair + 1]
         for cable in range(first, last, CABLES_AT_ONCE):
             add_cables(robot, solver, forces, time, pair, cable, lines, rows)
+    for i in range(couplings.held.size):
+        add_held_cable(robot, forces, i, time, rows)
     add_masses(robot, forces.inertia, rows)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, contact.CONTACT] != 0.0):
             add_contact(modes, forces, robot.ground, i, time, rows)
+    for i in range(robot.anchors.nodes.size):
+        add_anchor(robot.anchors, forces.nodes, i, time, rows)
 
 
 @inlined
@@ -298,6 +304,27 @@ def add_contact(
     xy, xz, yz = x[1], x[2], y[2]
     if any_lane((xy != 0.0) | (xz != 0.0) | (yz != 0.0)):
         add_off_diagonal(nodes, node, body, (xy, xz, yz), rows)
+
+
+@inlined
+def add_held_cable(robot: Model, forces: Forces, i: int, time: Real, rows: Table) -> None:
+    """Adds time * damping of cable i, which runs from a fixed node."""
+    node, body = robot.cables.node_b[i], robot.couplings.held[i]
+    damping = time * forces.cable_forces[i, TENSION_PER_RATE]
+    x, y, z = vector_at(forces.cable_forces, i, DIRECTION)
+    diagonal = damping * x * x, damping * y * y, damping * z * z
+    add_diagonal(forces.nodes, node, body, diagonal, rows)
+    across = damping * x * y, damping * x * z, damping * y * z
+    add_off_diagonal(forces.nodes, node, body, across, rows)
+
+
+@inlined
+def add_anchor(anchors: Anchors, nodes: Table, i: int, time: Real, rows: Table) -> None:
+    """Adds time * damping + time² * stiffness of an anchor."""
+    k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
+    c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
+    k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
+    add_diagonal(nodes, anchors.nodes[i], anchors.carriers[i], k, rows)
 
 
 @inlined

@@ -73,6 +73,9 @@ class Prepared:
             structure.contacts.tobytes(),
             # One field at a time, because the bytes of a multi-field view include all fields.
             *(cables[name].tobytes() for name in ("node_a", "node_b", "signal")),
+            len(structure.node_names),
+            self.robot.model.anchors.nodes.tobytes(),
+            self.robot.model.loads.nodes.tobytes(),
             structure.isotropic,
             self.robot.model.slack,
             self.live,
