@@ -173,7 +173,6 @@ COUNTED = ("evaluations", "best_fitness", "best_evaluation")
         ("evaluations", 20, "genome", with_value(20, "genome", [2.0] * 26)),
         ("evaluations", 20, "placed", with_value(20, "placed", 7)),
         ("evaluations", 43, "ends before", with_one_more),
-        ("iterations", 2, "evaluations", with_value(2, "evaluations", 15)),
     ],
 )
 def test_a_damaged_or_changed_line_is_reported(run_small, refused, name, line, problem, damage):
@@ -221,21 +220,6 @@ def test_no_value_that_was_changed_is_taken_over(run_small, refused):
         path.write_bytes(b"".join(lines[: len(lines) // 2]))
         run_small(resume=True)
         assert read_record(run) == whole
-
-
-def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
-    run = run_small(population=4, iterations=1, trials=1)
-    for name in ("trial_00/evaluations.jsonl", "manifest.json"):
-        (run / name).rename(run / "away")
-        (run / name).mkdir()
-        with refused(run / name, "", "irectory"):
-            load_run(run)
-        (run / name).rmdir()
-        (run / "away").rename(run / name)
-    (run / "trial_00").rename(run / "away")
-    (run / "trial_00").touch()
-    with refused(run / "trial_00" / "evaluations.jsonl", "", "ot a directory"):
-        run_small(resume=True)
 
 
 # Lines of other runs and trials, lines that contradict each other

@@ -99,11 +99,3 @@ def test_the_last_batch_is_cut_to_the_evaluations_that_are_left(tmp_path):
     statuses = record_run(tmp_path / "run", scenario, optimizer=RandomSearch)
     ends = [(status.evaluations, status.stop) for status in statuses]
     assert ends == [(6, "all evaluations done")] * 2
-
-
-def test_an_error_in_the_program_is_no_failed_evaluation(run_small):
-    def evaluate(vector):
-        raise TypeError("a bug")
-
-    with pytest.raises(TypeError, match="a bug"):
-        run_small(evaluate=evaluate)
