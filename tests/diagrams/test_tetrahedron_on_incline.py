@@ -40,30 +40,6 @@ def slips(motion):
     return (motion.modes[:, :, 1:] != 0.0).any(axis=2).all(axis=1)
 
 
-def energy(motion, scenario):
-    """(samples,): of motion, weight, ground, and the bristles that stick."""
-    structure = make_standing_tetrahedron(scenario).structure
-    mass, law = structure.mass[0], scenario.friction
-    t1, t2, n = start_axes(structure)
-    v_WB, p_WB = motion.v_WN.mean(axis=1), motion.p_WN.mean(axis=1)
-    # The angular velocity from the nodes: sum |w x r|^2 = 2/3 |w|^2 sum r^2.
-    moment = structure.unit_inertia[0, 0] / (structure.p_BN**2).sum() * 3 / 2
-    turning = moment * ((motion.v_WN - v_WB[:, None]) ** 2).sum(axis=(1, 2))
-    kinetic = 0.5 * mass * ((v_WB**2).sum(axis=1) + turning)
-    depth = np.maximum(-motion.p_WN[:, BASE] @ n, 0.0)
-    ground = 0.5 * scenario.ground.stiffness * (depth**2).sum(axis=1)
-    total = kinetic + weight(scenario) * p_WB[:, 2] + ground
-    if isinstance(law, Coulomb) and law.stiffness:
-        # A node sticks where it was at the last sample at which it did not, or at first.
-        sticks = (motion.modes[:, :, 0] == 1.0) & (motion.modes[:, :, 1:] == 0.0).all(axis=2)
-        since = np.where(sticks, 0, np.arange(len(sticks))[:, None])
-        p_WN = motion.p_WN[:, BASE] @ np.array([t1, t2]).T
-        stick_point = p_WN[np.maximum.accumulate(since), np.arange(len(BASE))]
-        stretch = ((p_WN - stick_point) ** 2).sum(axis=2)
-        total += 0.5 * law.stiffness * (sticks * stretch).sum(axis=1)
-    return total
-
-
 def test_below_the_coefficient_it_stays():
     # What is left after t decays with k / c: exp(-62.5 / s t), 1e-8 in 0.3 s.
     scenario = on_incline(GENTLE)
@@ -147,18 +123,3 @@ def test_friction_has_the_factor_of_the_direction_of_slip(degrees, factor):
     np.testing.assert_allclose(v @ way + mu * v[:, 2], expected, atol=1e-9 * SPEED)
     sideways = v @ np.array([-way[1], way[0], 0.0])
     np.testing.assert_allclose(sideways, 0.0, atol=1e-7 * SPEED)
-
-
-@pytest.mark.parametrize(
-    ("slope", "changes", "speed"),
-    [
-        (GENTLE, {}, SPEED),
-        (GENTLE, {"friction.stiffness": "0 N/m"}, SPEED),
-        (STEEP, {"friction": load_scenario("thesis").friction}, 0.0),
-    ],
-)
-def test_energy_never_rises(slope, changes, speed):
-    scenario = on_incline(slope).with_changes(changes)
-    motion = simulate(scenario, speed=speed, duration=0.2)
-    total = energy(motion, scenario)
-    assert np.diff(total).max() < 1e-12 * np.ptp(total)

@@ -9,7 +9,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 
-from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.kinematics import V_WN
 from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes, node_positions
@@ -106,17 +105,6 @@ def test_each_junction_has_three_outer_and_three_inner_cables_named_by_their_end
         kind = "inner" if a[1] == "tip" else "outer"
         assert name == f"{a[0]}-{b[0]} {kind} {b[1]}"
         assert kind == "inner" or a[1] == b[1]
-
-
-def test_signal_i_drives_the_two_bottom_outer_cables_of_junction_i(row):
-    signals = zip(row.cable_names, row.cables["signal"].tolist(), strict=True)
-    driven = {name: signal for name, signal in signals if signal != PASSIVE}
-    assert row.signals == len(row.bodies) - 1
-    assert driven == {
-        f"T{i + 1}-T{i + 2} outer {node}": i
-        for i in range(len(row.bodies) - 1)
-        for node in ("bottom_left", "bottom_right")
-    }
 
 
 def test_outer_and_inner_cables_have_their_own_stiffness_and_length(row, scenario):
