@@ -48,8 +48,8 @@ WALKS = {
     "witnessed": ("thesis", {"engine": Drake(mode_changes="witness")}, ["drake"]),
     "rough": ("thesis", ROUGH, ["compiled"]),
     "feedback": ("thesis", FEELS, ["drake", "compiled"]),
-    "winch": ("six_bar", {"actuation": LIMITED["winch"]}, ["drake", "compiled"]),
-    "motor": ("six_bar", {"actuation": LIMITED["motor"]}, ["drake", "compiled"]),
+    "winch": ("prism", {"actuation": LIMITED["winch"]}, ["drake", "compiled"]),
+    "motor": ("prism", {"actuation": LIMITED["motor"]}, ["drake", "compiled"]),
     "command": ("coulomb", {}, ["drake", "compiled"]),
 }
 """A shipped scenario, its changes, and engines that simulate it."""
