@@ -21,21 +21,13 @@ from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import WALKING_SEED, Gains, Gait, seeded_gait
+from tetra_drake.scenario import terrain_kinds
 from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import (
-    Flat,
-    HeightField,
-    Incline,
-    Obstacles,
-    Relief,
-    Rough,
-    Steps,
-)
 
 Changes = Mapping[str, Any]
 Engine = Compiled | Drake | Mujoco
@@ -62,14 +54,14 @@ NO_BRISTLES = {"friction.stiffness": "0 N/m"}
 """Coulomb friction as in MuJoCo."""
 
 COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
-FIELD = Relief()
+FIELD = terrain_kinds.Relief()
 """Stands for waves of 8 in, 0.1 in high, that lie across the way at an angle."""
 TERRAINS = {
-    "incline": Incline(slope=np.radians(5.0)),
+    "incline": terrain_kinds.Incline(slope=np.radians(5.0)),
     # Steps are where the robot meets them at once.
-    "steps": Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
-    "rough": Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
-    "obstacles": Obstacles(
+    "steps": terrain_kinds.Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
+    "rough": terrain_kinds.Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+    "obstacles": terrain_kinds.Obstacles(
         height=0.25 * INCH, radius=1.0 * INCH, spacing=2.5 * INCH, start=14.0 * INCH
     ),
     "field": FIELD,
@@ -216,7 +208,7 @@ def changed(tmp_path) -> Callable[[Changes], Changes]:
     """Changes with the file of the height field in the place of FIELD."""
     x, y = np.meshgrid(0.02 * np.arange(100), 0.02 * np.arange(50), indexing="ij")
     np.save(tmp_path / "waves.npy", 0.0012 * (np.sin(30.0 * x + 10.0 * y) - 1.0))
-    field = HeightField(file=str(tmp_path / "waves.npy"), cell=0.02)
+    field = terrain_kinds.HeightField(file=str(tmp_path / "waves.npy"), cell=0.02)
     return lambda changes: {k: field if v is FIELD else v for k, v in changes.items()}
 
 
@@ -278,7 +270,7 @@ def sets() -> Iterable[Any]:
         "reset": Drake(scheme="runge_kutta3", accuracy=1e-4, max_step=3e-4, mode_changes="witness"),
     }
     for law, diagram in slowly.items():
-        for terrain, surface in {"flat": Flat(), **TERRAINS}.items():
+        for terrain, surface in {"flat": terrain_kinds.Flat(), **TERRAINS}.items():
             changes = {"terrain": surface, "simulation.max_evaluations": 10**8}
             changes |= {"robot.contacts": "all"} if terrain != "flat" else {}
             changes |= {"friction": COULOMB} if law == "coulomb" else {}
