@@ -118,17 +118,10 @@ def undriven(name: str) -> Scenario:
     return prism.with_sections(name="body", robot=StructureFile.from_tree(BODY, "body"))
 
 
-@pytest.mark.parametrize(
-    ("name", "engine"),
-    [
-        ("pair", "!Compiled"),
-        ("body", "!Drake"),
-        pytest.param("body", "!Compiled", marks=pytest.mark.slow),  # which is compiled for it
-    ],
-)
+@pytest.mark.parametrize("name", ["pair", "body"])
 @pytest.mark.parametrize("signals", ["listing", "live"])
-def test_a_robot_that_nothing_drives_falls_and_rests(name, engine, signals):
-    scenario = undriven(name).with_changes({"cpg.signals": signals, "engine": engine})
+def test_a_robot_that_nothing_drives_falls_and_rests(name, signals):
+    scenario = undriven(name).with_changes({"cpg.signals": signals})
     gait = seeded_gait(scenario)
     result = simulate(scenario, gait, record=True)
     robot, trajectory = Robot.of(scenario), result.trajectory
@@ -137,11 +130,10 @@ def test_a_robot_that_nothing_drives_falls_and_rests(name, engine, signals):
     load = trajectory.normal_force[-1].sum()
     assert float(load) == pytest.approx(robot.weight, rel=1e-3)
     assert result.metrics.actuator_work == result.metrics.signal_rate == 0.0
-    if engine == "!Compiled":
-        for outcome in simulate_many(scenario, [gait, gait]):
-            assert repr(outcome.metrics) == repr(result.metrics)
-        diagram = simulate(scenario.with_changes({"engine": "!Drake"}), gait, record=True)
-        np.testing.assert_allclose(diagram.trajectory.p_WN, trajectory.p_WN, atol=1e-4)
+    for outcome in simulate_many(scenario, [gait, gait]):
+        assert repr(outcome.metrics) == repr(result.metrics)
+    diagram = simulate(scenario.with_changes({"engine": "!Drake"}), gait, record=True)
+    np.testing.assert_allclose(diagram.trajectory.p_WN, trajectory.p_WN, atol=1e-4)
     if installed() and signals == "listing":
         changes = {"engine": "!Mujoco", "friction.stiffness": "0 N/m"}
         fallen = simulate(scenario.with_changes(changes), gait, record=True).trajectory
