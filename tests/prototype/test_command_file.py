@@ -54,7 +54,7 @@ def test_columns_may_stand_in_any_order(robot, load):
     assert np.array_equal(load(turned).samples, samples)
 
 
-FIRST, LAST = "T1-T2 outer bottom_left force_N", "T4-T5 outer bottom_right force_N"
+FIRST = "T1-T2 outer bottom_left force_N"
 BAD = {
     "another cable": (("T1-T2", "T1-T9"), "T1-T9 outer bottom_left force_N", "is no column"),
     "another quantity": ((FIRST, "T1-T2 outer bottom_left tension_N"), None, "is no column"),

@@ -105,8 +105,6 @@ def test_a_damaged_result_is_refused_by_its_key(folder, key, refused):
         load_result(folder)
 
 
-
-
 def test_a_result_stands_for_files_that_are_complete(folder, tiny, gait, result, monkeypatch):
     def fail(*arguments, **options):
         raise OSError("disk full")
