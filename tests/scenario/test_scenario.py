@@ -161,6 +161,8 @@ def test_differences_are_keys_and_readable_values(scenario):
         ("objective.lead", "2 /in"),
     ]
     assert scenario.differences(other) == [("actuation", "Force"), ("objective.lead", "none")]
+    last_digit = {"ground.stiffness": "4378.170881161912 N/m"}
+    assert scenario.with_changes(last_digit).differences(scenario) == [*last_digit.items()]
 
 
 DISTURBED = {"draws": 4, "spreads": {"ground.damping": 0.1}}
