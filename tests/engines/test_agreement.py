@@ -96,7 +96,8 @@ class Row:
     changes: Changes
     engines: tuple[Engine, Engine | Limit]
     within: Mapping[str, float]
-    """Largest difference by the name of a quantity, in SI units; distance_in in inches."""
+    """Largest difference by the name of a quantity, in SI units; distance_in in inches. A metric
+    that has the name of a variable is metrics.NAME."""
     drive: Callable[[Scenario], Changes]
     moves: float = 0.0
     """Least size of the first quantity's change in the walk."""
@@ -180,12 +181,12 @@ def rows() -> Iterable[Any]:
     changes |= {"simulation.steady_from": "0.5 s", "simulation.sample_period": "1e-3 s"}
     lacking, absolute = load_scenario("coulomb").lacking, {"m": 1e-5, "1/m": 1e-2}
     metrics = {name: one for name, one in METRICS.items() if one.needs not in lacking}
-    within = {name: absolute.get(one.unit, 1e-3) for name, one in metrics.items()}
+    within = {f"metrics.{name}": absolute.get(one.unit, 1e-3) for name, one in metrics.items()}
     cells = "coulomb", 2.0, changes
     yield row("all metrics", *cells, ACCURATE, within, gait(3), relative=2e-3)
     # On MuJoCo's ground with constant damping, the robot settles and slides a little otherwise. Its
     # feet chatter: they leave the ground for a step every few.
-    chatters = ("lifted", "path_curvature")
+    chatters = ("metrics.lifted", "metrics.path_curvature")
     within = {name: 50.0 * value for name, value in within.items() if name not in chatters}
     engines = Compiled(), Mujoco()
     yield row("all metrics, MuJoCo", *cells, engines, within, gait(3), relative=0.03)
@@ -227,7 +228,7 @@ def quantities(
     return {
         name: trajectory[name].values[1:]
         if name in trajectory
-        else np.array(getattr(metrics, name))
+        else np.array(getattr(metrics, name.removeprefix("metrics.")))
         for name in names
     }
 
