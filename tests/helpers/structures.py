@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.prepared import Prepared
@@ -18,9 +17,6 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario import robot_structure
-
-COMPILED_FOR = ["prism", pytest.param("six_bar", marks=pytest.mark.slow)]
-"""Structures of the independent simulation, for each of which kernels are compiled."""
 
 
 @dataclasses.dataclass(frozen=True)

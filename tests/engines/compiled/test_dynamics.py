@@ -104,7 +104,7 @@ UNEVEN = Rough(amplitude=0.0005, wavelength=0.03, seed=1)
 """Ground that slopes by some degrees under the robot, of which some nodes touch it."""
 
 
-@pytest.mark.parametrize("name", ["thesis", "prism", "mast"])
+@pytest.mark.parametrize("name", ["thesis", "six_bar", "mast"])
 @pytest.mark.parametrize("terrain", [Flat(), UNEVEN])
 @pytest.mark.parametrize(
     "friction",
