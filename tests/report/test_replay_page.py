@@ -124,12 +124,12 @@ def test_a_folder_gives_the_result_back(folder, result):
     np.testing.assert_array_equal(read.path.heading, result.path.heading)
 
 
-def test_lengths_are_written_in_inches_too(folder, result):
-    content = json.loads((folder / "result.json").read_text())
+@pytest.mark.parametrize(("curvature", "radius_in"), [(2.0, 0.5 / INCH), (0.0, None)])
+def test_lengths_are_written_in_inches_too(tmp_path, result, curvature, radius_in):
+    metrics = dataclasses.replace(result.metrics, path_curvature=curvature)
+    save_result(tmp_path / "result.json", dataclasses.replace(result, metrics=metrics))
+    content = json.loads((tmp_path / "result.json").read_text())
     lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
-    expected = {f"{name}_in": getattr(result.metrics, name) / INCH for name in lengths}
-    expected["path_radius_in"] = result.metrics.path_radius / INCH
+    expected = {f"{name}_in": getattr(metrics, name) / INCH for name in lengths}
+    expected["path_radius_in"] = radius_in
     assert {key: content[key] for key in content if key.endswith("_in")} == expected
-    straight = dataclasses.replace(result.metrics, path_curvature=0.0)
-    save_result(folder / "result.json", dataclasses.replace(result, metrics=straight))
-    assert json.loads((folder / "result.json").read_text())["path_radius_in"] is None
