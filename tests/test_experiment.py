@@ -3,10 +3,8 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-import pandas
 import pytest
 from helpers.analytic import Bowl, RandomSearch, in_threads, read_record, small_scenario
-from helpers.meshcat_page import commands, read_page
 
 import tetra_drake
 from tetra_drake import cli
@@ -98,38 +96,6 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     monkeypatch.delattr("tetra_drake.experiment.evaluator_of")
     again = tetra_drake.evolve(None, tmp_path / "run", resume=True, progress=progress)
     assert again.evaluations.equals(run.evaluations)
-
-
-def test_a_robot_of_another_length_is_evolved_and_drawn(tiny, tmp_path):
-    scenario = tiny.with_changes({"robot.tetrahedra": 2, "simulation.duration": "2.0 s"})
-    run = tetra_drake.evolve(scenario, tmp_path / "run", workers=1, reevaluate=False)
-    best = run.fittest()
-    assert len(run.vector(best["trial"], best["index"])) == 2  # no weights
-    assert run.statuses[0].failures == 0
-    assert len(list((run.directory / "figures").glob("*.svg"))) >= 9
-    replay = commands(read_page(run.directory / "replay.html"), "set_object")
-    drawn = {one["path"].split("/")[2] for one in replay if one["path"].startswith("/robot/")}
-    assert drawn == {"T1", "T2"}
-
-
-def test_gaits_side_by_side_have_the_records_of_single_ones(tiny, tmp_path, reports, monkeypatch):
-    prepared = []
-    monkeypatch.setattr("tetra_drake.engines.simulate.prepare", prepared.append)
-    several = tiny.with_changes({"evolution.trials": 3})
-    ways = {"lanes": {"workers": 1}, "threads": {"workers": 3}, "executor": {"executor": OneByOne}}
-    records = {}
-    for name, way in ways.items():
-        evolved = tetra_drake.evolve(several, tmp_path / name, seed=4, reevaluate=False, **way)
-        records[name] = evolved.evaluations.drop(columns="wall_time_s")
-    assert len(records["lanes"]) == 24
-    for name in ("threads", "executor"):
-        pandas.testing.assert_frame_equal(records[name], records["lanes"], check_exact=True)
-    assert prepared == [several], "once, for the executor"
-
-
-def OneByOne(workers):
-    """An executor with one thread."""
-    return ThreadPoolExecutor(1)
 
 
 def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
@@ -289,17 +255,6 @@ def test_a_gain_that_hardly_acts_is_named_when_a_run_begins(tiny, tmp_path):
     tetra_drake.evolve(None, out, resume=True, progress=progress, **quick)
     (warning,) = progress.warnings
     assert "cpg.gain 0.1 N" in warning
-
-
-def test_a_map_is_simulated_in_local_threads(tiny, tmp_path, reports, monkeypatch):
-    asked = []
-    monkeypatch.setattr(
-        "tetra_drake.experiment.judge_elites", lambda out, workers: asked.append(workers)
-    )
-    monkeypatch.setattr("tetra_drake.experiment.reevaluation.reevaluate", lambda *_, **__: None)
-    tetra_drake.evolve(tiny, tmp_path / "threads", workers=3)
-    tetra_drake.evolve(tiny, tmp_path / "cluster", workers=32, executor=OneByOne)
-    assert asked == [3, None]
 
 
 SMALL = ("--trials", "1", "--evaluations", "18", "--workers", "1")

@@ -71,13 +71,6 @@ def test_all_trials_are_on_one_map_without_failures_and_what_lacks_a_measure(run
     assert elites(run)["kept"].isna().all()
 
 
-def test_a_run_that_asks_for_no_map_has_none(run_of):
-    run = run_of({2.0: (0.01, 0.3)}, **{"optimizer": tiny_scenario().optimizer})
-    assert elites(run).empty and notable_gaits(run) == {}
-    judge_elites(run.directory)
-    assert not (run.directory / "elites.jsonl").exists()
-
-
 def test_the_fittest_and_those_next_to_the_corners_are_chosen_without_lucky_ones(run_of):
     run = run_of(
         {9.0: (0.09, 0.7), 8.0: (0.05, 0.5), 3.0: (0.01, 0.3), 2.0: (0.03, 0.7), 4.0: (0.07, 0.3)}

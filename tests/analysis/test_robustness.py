@@ -9,16 +9,7 @@ from helpers.judgements import judgement_by_hand
 from helpers.quantities import with_unit
 from helpers.synthetic_run import tiny_scenario
 
-from tetra_drake.analysis.robustness import (
-    ALONE,
-    START,
-    TERRAIN,
-    by_change,
-    by_gait,
-    default_disturbances,
-    judge,
-    rank_correlations,
-)
+from tetra_drake.analysis import robustness
 from tetra_drake.analysis.statistics import share_interval
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
@@ -47,7 +38,7 @@ def gaits(scenario):
 
 @pytest.fixture(scope="module")
 def judgement(scenario, gaits):
-    return judge(scenario, gaits, draws=DRAWS, seed=5, workers=2)
+    return robustness.judge(scenario, gaits, draws=DRAWS, seed=5, workers=2)
 
 
 GROUND = ["ground.damping", "ground.stiffness"]
@@ -64,7 +55,7 @@ def test_the_default_disturbances_are_of_what_the_scenario_has(name):
     groups = [f"robot.cables.{group}.stiffness" for group in ("bottom", "side", "top")]
     expected = [f"friction.{law}" for law in LAWS[name]] + GROUND
     expected += groups if name == "prism" else ROW
-    ours = default_disturbances(load_scenario(name), 2.0)
+    ours = robustness.default_disturbances(load_scenario(name), 2.0)
     assert sorted(ours.spreads) == expected
     assert {*ours.spreads.values(), ours.start} == {0.02}
 
@@ -90,8 +81,8 @@ def test_every_change_is_also_made_alone(judgement, gaits):
     spreads = alone.dropna(subset="spread").groupby("what", sort=False)["spread"].apply(list)
     keys = judgement.scenario.disturbances.spreads
     assert spreads.to_dict() == {key: [-0.05, 0.05] for key in keys}
-    for what in (START, TERRAIN):
-        assert sum(alone["what"] == what) == DRAWS <= ALONE
+    for what in (robustness.START, robustness.TERRAIN):
+        assert sum(alone["what"] == what) == DRAWS <= robustness.ALONE
     (softer,) = alone.query("what == 'ground.stiffness' and spread < 0")["distance"]
     stiffness = with_unit(0.95 * judgement.scenario.ground.stiffness, "N/m")
     changed = judgement.scenario.with_changes({"ground.stiffness": stiffness, "disturbances": None})
@@ -99,12 +90,12 @@ def test_every_change_is_also_made_alone(judgement, gaits):
     draw = fresh_draws(judgement.scenario, 5, DRAWS)[1]
     terrain = changed.terrain.model_copy(update={"seed": draw.terrain_seed})
     changed = judgement.scenario.with_changes({"terrain": terrain, "disturbances": None})
-    (other,) = alone[(alone["what"] == TERRAIN) & (alone["draw"] == 1)]["distance"]
+    (other,) = alone[(alone["what"] == robustness.TERRAIN) & (alone["draw"] == 1)]["distance"]
     assert other == simulate(scenario=changed, gait=gaits["b"]).metrics.distance
 
 
 def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits, judgement):
-    again = judge(scenario, {"b": gaits["b"]}, draws=DRAWS, seed=5, workers=1)
+    again = robustness.judge(scenario, {"b": gaits["b"]}, draws=DRAWS, seed=5, workers=1)
     for name in ("undisturbed", "draws", "alone"):
         table = getattr(judgement, name)
         of_b = table[table["gait"] == "b"].reset_index(drop=True)
@@ -114,12 +105,12 @@ def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits,
 def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
     damping = Disturbances(draws=4, spreads={"robot.cables.damping": 0.2})
     disturbing = scenario.with_changes({"disturbances": damping, "require": {"distance": "1 m"}})
-    judged = judge(disturbing, gaits, draws=2)
-    assert set(judged.alone["what"]) == {"robot.cables.damping", TERRAIN}
+    judged = robustness.judge(disturbing, gaits, draws=2)
+    assert set(judged.alone["what"]) == {"robot.cables.damping", robustness.TERRAIN}
     assert judged.draws["robot.cables.damping"].between(0.8, 1.2).all()
-    assert by_gait(judged)["missed"].tolist() == [2, 2]  # no gait walks a metre
-    given = judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1, alone=False)
-    assert given.scenario.disturbances == default_disturbances(scenario, 3.0)
+    assert robustness.by_gait(judged)["missed"].tolist() == [2, 2]  # no gait walks a metre
+    given = robustness.judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1, alone=False)
+    assert given.scenario.disturbances == robustness.default_disturbances(scenario, 3.0)
 
 
 def test_no_evolution_sees_a_fresh_draw():
@@ -142,13 +133,13 @@ def test_no_evolution_sees_a_fresh_draw():
 
 def test_a_simulation_that_fails_has_a_reason_and_no_distance_and_keeps_nothing(scenario, gaits):
     stopped = scenario.with_changes({"simulation.max_evaluations": 100})
-    found = judge(stopped, {"a": gaits["a"]}, draws=2)
+    found = robustness.judge(stopped, {"a": gaits["a"]}, draws=2)
     for table in (found.undisturbed, found.draws, found.alone):
         assert table["distance"].isna().all() and table["failure"].str.contains("100").all()
-    row = by_gait(found).loc["a"]
+    row = robustness.by_gait(found).loc["a"]
     assert (row["failed"], row["kept"]) == (2, 0.0)
     assert row[["50 %", "mean", "mean_low"]].isna().all()
-    assert (by_change(found)["failed"] > 0).all()
+    assert (robustness.by_change(found)["failed"] > 0).all()
     assert robustness_text(found)
 
 
@@ -165,7 +156,7 @@ def test_a_draw_is_kept_if_a_tenth_of_the_distance_is_lost_at_most(made):
 
 
 def test_the_summary_of_gaits(made):
-    found = by_gait(made)
+    found = robustness.by_gait(made)
     a, b = found.loc["a"], found.loc["b"]
     # Linear interpolation between 8.9, 9 and 12: at 5 % a tenth of the way to the second one.
     assert a[["5 %", "25 %", "50 %", "75 %", "95 %"]].tolist() == pytest.approx(
@@ -180,19 +171,19 @@ def test_the_summary_of_gaits(made):
 
 def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):
     # START: -6 and +1. p: -1, -0.5, -0.25 and a failure.
-    found = by_change(made)
+    found = robustness.by_change(made)
     assert found[["median", "worst", "failed"]].reset_index().to_numpy().tolist() == [
-        [START, 3.5, -6.0, 0],
+        [robustness.START, 3.5, -6.0, 0],
         ["p", 0.5, -1.0, 1],
     ]
     # Ranks of a's distances 3, 2, 1 with p's 1, 2, 3: -1; with q's 3, 2, 1: +1. Of b's 2, 1, 3, 4
     # with p's 1, 2, 3, 4: 1 - 6 (1 + 1) / 60 = 0.8; with q's 3, 2, 1, 4: 1 - 6 (1 + 1 + 4) / 60.
     expected = [[-1.0, 1.0], [0.8, 0.4]]
-    np.testing.assert_allclose(rank_correlations(made)[["p", "q"]], expected, rtol=1e-12)
+    np.testing.assert_allclose(robustness.rank_correlations(made)[["p", "q"]], expected, rtol=1e-12)
     assert found.loc["p", ["correlation", "correlation_size"]].tolist() == pytest.approx(
         [-0.1, 0.9]
     )
-    assert found.loc[START, ["correlation", "correlation_size"]].isna().all()
+    assert found.loc[robustness.START, ["correlation", "correlation_size"]].isna().all()
 
 
 def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement, tmp_path):
@@ -215,7 +206,7 @@ def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement
 
 def test_nothing_is_written_for_a_gait_of_another_robot(scenario, tmp_path, refused, capsys):
     with refused("gait random gait 1", "weights", "expected 4"):
-        judge(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)
+        robustness.judge(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)
     gait, out = tmp_path / "gait.json", tmp_path / "out"
     save_gait(seeded_gait(scenario, 1), gait, scenario)
     assert main(["robustness", str(gait), "--out", str(out)]) == 2

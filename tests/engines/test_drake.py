@@ -6,7 +6,6 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from tetra_drake.engines.drake import MakeSimulator
@@ -109,27 +108,3 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
             np.testing.assert_array_equal(walk[name].values.ravel(), there[-1][port])
     assert np.abs(there[-1]["friction_forces"]).max() > 0.0
     assert there[-1]["signals"].any()
-
-
-def test_a_mode_change_is_due_until_it_is_made(scenario, robot, gait):
-    diagram = MakeTensegrityDiagram(robot, gait)
-    simulator = MakeSimulator(diagram, scenario.engine)
-    ground = diagram.GetSubsystemByName("ground")
-    context = ground.GetMyContextFromRoot(simulator.get_context())
-
-    def is_due() -> bool:
-        due, _ = ground.NextModeChange(context, acceleration=np.zeros(30), horizon=1e-3)
-        return due
-
-    assert is_due()  # the feet stand on the ground, not yet in contact
-    simulator.Initialize()
-    assert not is_due()
-
-
-def test_plain_drake_simulates_the_diagram_too(scenario, robot, gait):
-    # No hidden set-up: the diagram with its default context is all a Drake user needs.
-    diagram = MakeTensegrityDiagram(robot, gait)
-    simulator = Simulator(diagram)
-    simulator.AdvanceTo(0.05)
-    height = diagram.GetOutputPort("state").Eval(simulator.get_context())[6]
-    assert height == pytest.approx(scenario.robot.strut_length / 12**0.5, abs=1e-3)

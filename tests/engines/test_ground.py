@@ -78,22 +78,6 @@ def test_contact_never_gives_energy(scenario, friction):
     assert lost > 0.5 * 5 * mass * gravity * 0.005
 
 
-def test_the_robot_stands_on_what_is_under_it(scenario):
-    # Settled on rough ground: contacts press by their depth, and together bear the weight.
-    times = {"simulation.duration": "2.5 s", "simulation.steady_from": "2.0 s"}
-    rough = {"terrain": Rough(amplitude=0.25 * INCH, wavelength=6.0 * INCH), "friction": FIRM}
-    changes = {"cpg.start_up": "2.5 s", "robot.contacts": "all"}
-    resting = scenario.with_changes({**times, **rough, **changes})
-    end = trajectory(resting, Compiled()).isel(time=-1)
-    robot = Robot.of(resting)
-    p_WN = end.p_WN.values.reshape(-1, 3)[robot.structure.contacts]
-    gaps = ground_frames(p_WN, robot.ground)[:, 0]
-    expected = resting.ground.stiffness * np.maximum(-gaps, 0.0)
-    np.testing.assert_allclose(end.normal_force, expected, atol=0.01 * expected.max())
-    assert 5 <= (gaps < 0.0).sum() < 11, "some feet hang in the air"
-    assert expected.sum() == pytest.approx(robot.weight, rel=0.02)
-
-
 @pytest.mark.parametrize("name", ["incline", "prism"])
 def test_a_robot_that_nothing_drives_stands_on_a_slope(name):
     """On 5 degrees, with the bristles of the shipped scenarios, once its cables have settled.

@@ -9,7 +9,6 @@ import xarray
 from helpers.actuations import LIMITED
 from helpers.bars import RADIUS, STIFFNESS, loose_bars
 
-from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
@@ -17,7 +16,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Mujoco
-from tetra_drake.scenario.friction_kinds import MUJOCO_FRICTION, Coulomb
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
@@ -54,17 +53,6 @@ def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, struc
     np.testing.assert_allclose(spacing, settled["spacing_in"], atol=0.05)
     tip = float(end["p_WN"].sel(node="T5 tip", axis="z")) / INCH
     assert tip == pytest.approx(settled["tip5_height_in"], abs=0.05)
-
-
-@needs_mujoco
-def test_friction_opposes_motion_within_the_cone(short, structure):
-    trajectory = trajectory_of(short.with_changes({"simulation.duration": "1.0 s"}))
-    friction = trajectory["friction_force"].values
-    limit = MUJOCO_FRICTION * trajectory["normal_force"].values
-    assert (np.linalg.norm(friction, axis=2) <= limit + 1e-6).all()
-    velocity = trajectory["v_WN"].values.reshape(len(friction), -1, 3)[:, structure.contacts, :2]
-    power = (friction * velocity).sum(axis=2)
-    assert power.sum() < 0.0 and power.max() < 1e-2 * -power.min()
 
 
 @needs_mujoco
@@ -119,18 +107,6 @@ def test_many_gaits_walk_or_fail_as_each_alone(short, workers, monkeypatch):
         result = simulate(scenario=short, gait=gait, record=True)
         assert (outcome.metrics, outcome.integrator) == (result.metrics, result.integrator)
         xarray.testing.assert_identical(outcome.trajectory, result.trajectory)
-
-
-@needs_mujoco
-def test_the_command_simulate_takes_the_engine(tmp_path):
-    text = "{base: thesis, name: x, simulation: {duration: 0.3 s, steady_from: 0.1 s}}"
-    (tmp_path / "x.yaml").write_text(text)
-    out = tmp_path / "out"
-    options = ["--scenario", str(tmp_path / "x.yaml"), "--engine", "mujoco", "--out", str(out)]
-    assert main(["simulate", *options]) == 0
-    found = json.loads((out / "result.json").read_text())
-    assert found["engine"] == "mujoco" and "mujoco" in found["versions"]
-    assert {"trajectory.nc", "replay.html"} <= {path.name for path in out.iterdir()}
 
 
 @needs_mujoco

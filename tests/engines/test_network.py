@@ -105,19 +105,6 @@ def test_each_feedback_changes_the_signals(scenario, pathway):
     assert np.abs(none.signal - felt.signal).max() > 1e-3, "more than engines may differ by"
 
 
-@pytest.mark.parametrize("signals", ["listing", "live"])
-def test_a_steering_signal_acts_when_it_changes(signals):
-    changes = {"cpg.signals": signals, "cpg.listing_step": "1e-4 s", "gait_bounds.turn": 0.0}
-    short = shortly(load_scenario("turning"), 0.4, **changes)
-    signal = walk(
-        short, seeded_gait(short), "compiled", lambda time: max(0.0, 5.0 * (time - 0.2))
-    ).signal
-    left, right = signal.values[:, 0], signal.values[:, 1]
-    before = signal.time.values < 0.199  # the listing is one step ahead
-    np.testing.assert_allclose(left[before], right[before], atol=1e-12)
-    assert np.abs(left - right)[-1] > 0.01
-
-
 def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
     changes = {"engine": "!Compiled", "simulation.duration": "0.4 s"}
     short = load_scenario("turning").with_changes(changes | {"simulation.steady_from": "0.2 s"})

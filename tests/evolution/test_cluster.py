@@ -11,16 +11,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from helpers.analytic import (
-    Bowl,
-    DrawnBowl,
-    Dying,
-    drawn_scenario,
-    in_threads,
-    read_record,
-    record_run,
-    tasks_of,
-)
+from helpers import analytic
 
 from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
@@ -47,7 +38,7 @@ def cluster(one_cluster):
 @pytest.fixture
 def tasks(scenario):
     generator, space = np.random.default_rng(2), ParameterSpace.of(scenario)
-    return tasks_of(space.random(generator) for _ in range(40))
+    return analytic.tasks_of(space.random(generator) for _ in range(40))
 
 
 def test_what_ends_its_worker_is_named(cluster, tasks, tmp_path, monkeypatch, refused):
@@ -56,11 +47,11 @@ def test_what_ends_its_worker_is_named(cluster, tasks, tmp_path, monkeypatch, re
     with (
         refused(tasks[12], "", "died"),
         dask_cluster(cluster) as make,
-        OnExecutor(Dying(tmp_path, always=(12,)), make, 2) as evaluator,
+        OnExecutor(analytic.Dying(tmp_path, always=(12,)), make, 2) as evaluator,
     ):
         for task, evaluation in evaluate_all(evaluator, tasks[:15]):
             others[task.index] = evaluation
-    assert others == {i: Bowl()(tasks[i]) for i in others}
+    assert others == {i: analytic.Bowl()(tasks[i]) for i in others}
     assert 12 not in others
 
 
@@ -85,18 +76,20 @@ class Killer:
             self.killed += 1
 
 
-DRAWN = DrawnBowl(delay=0.05)
+DRAWN = analytic.DrawnBowl(delay=0.05)
 
 
 def record_on(evaluator, directory, **options):
     """The record of two trials of 28 evaluations among draws."""
-    record_run(directory, drawn_scenario(iterations=8), evaluator=evaluator, **options)
-    return read_record(directory)
+    analytic.record_run(
+        directory, analytic.drawn_scenario(iterations=8), evaluator=evaluator, **options
+    )
+    return analytic.read_record(directory)
 
 
 def test_killed_workers_leave_no_trace(cluster, tmp_path):
     killer = Killer(cluster)
-    whole = record_on(in_threads(DRAWN), tmp_path / "whole")
+    whole = record_on(analytic.in_threads(DRAWN), tmp_path / "whole")
     with dask_cluster(cluster) as make:
         disturbed = OnExecutor(DRAWN, make, 2)
         assert record_on(disturbed, tmp_path / "disturbed", show=killer) == whole
@@ -107,7 +100,7 @@ def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, tasks):
     with (
         pytest.raises(KeyboardInterrupt),
         dask_cluster(cluster) as make,
-        OnExecutor(Bowl(delay=1.0), make, 2) as evaluator,
+        OnExecutor(analytic.Bowl(delay=1.0), make, 2) as evaluator,
     ):
         for _ in evaluate_all(evaluator, tasks[:8]):
             assert cluster.scheduler.tasks
@@ -130,7 +123,7 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
     def evaluator_of(evaluate, *, executor, **_):
-        return OnExecutor(Bowl(), executor or ThreadPoolExecutor, 1)
+        return OnExecutor(analytic.Bowl(), executor or ThreadPoolExecutor, 1)
 
     for module in ("experiment", "evolution.reevaluation"):
         monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", evaluator_of)
@@ -138,7 +131,7 @@ def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monke
     command = ["evolve", "--scenario", "quick", "--evaluations", "16", "--workers", "1"]
     for name, executor in (("dask", ("--dask",)), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0
-    assert read_record(tmp_path / "dask") == read_record(tmp_path / "local")
+    assert analytic.read_record(tmp_path / "dask") == analytic.read_record(tmp_path / "local")
     with dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}):
         for wrong in ("slurm", "tcp://127.0.0.1:1", "gopher://here"):
             assert cli.main([*command, "--out", str(tmp_path / "no"), "--dask", wrong]) == 2

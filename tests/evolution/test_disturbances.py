@@ -7,16 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from helpers.analytic import (
-    TAIL,
-    DrawnBowl,
-    drawn_scenario,
-    evaluated,
-    in_threads,
-    record_run,
-    small_scenario,
-    tasks_of,
-)
+from helpers import analytic
 from helpers.quantities import with_unit
 from pytest import approx
 
@@ -36,7 +27,7 @@ from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"robot.cables.outer_stiffness": 0.05}
 SEED = (5, 0, 3)
-BOWL = DrawnBowl()
+BOWL = analytic.DrawnBowl()
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +36,7 @@ def tiny():
     times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
     changes = {"engine": "!Compiled", "cpg.start_up": 0.0, **times}
     changes |= {"disturbances": Disturbances(draws=3, spreads=STIFFNESS, start=0.02)}
-    small = small_scenario(oscillators=2, population=4, iterations=2, trials=2)
+    small = analytic.small_scenario(oscillators=2, population=4, iterations=2, trials=2)
     return small.with_changes(changes)
 
 
@@ -91,10 +82,10 @@ def test_in_lanes_each_draw_has_one_robot_for_all_gaits_of_an_iteration(tiny, mo
 
     monkeypatch.setattr(Robot, "of", counted)
     generator, space = np.random.default_rng(2), ParameterSpace.of(tiny)
-    tasks = tasks_of((space.random(generator) for _ in range(6)), SEED)
+    tasks = analytic.tasks_of((space.random(generator) for _ in range(6)), SEED)
     with InLanes(GaitEvaluation(tiny), LanePool(2)) as lanes:
         first = lanes.submit(tasks[0]).result()
-        rest = evaluated(lanes, tasks[1:]).values()
+        rest = analytic.evaluated(lanes, tasks[1:]).values()
     assert len({gait.fitness for gait in (first, *rest)}) == 6
     assert len(made) == 3
 
@@ -158,7 +149,7 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, 
     evaluate = GaitEvaluation(scenario)
     alone = [dataclasses.replace(evaluate(task), wall_time=0.0) for task in tasks]
     with InLanes(evaluate, LanePool(1)) as lanes:
-        beside = evaluated(lanes, tasks)
+        beside = analytic.evaluated(lanes, tasks)
     for i, evaluation in enumerate(alone):
         assert dataclasses.replace(beside[i], wall_time=0.0) == evaluation
     failed = [gait for gait in alone if gait.failure]
@@ -173,7 +164,7 @@ def run_drawn(tmp_path):
     """run_drawn(...): a small run among draws; its directory."""
 
     def run(*, evaluate=BOWL, **options):
-        record_run(tmp_path / "run", drawn_scenario(**options), evaluate=evaluate)
+        analytic.record_run(tmp_path / "run", analytic.drawn_scenario(**options), evaluate=evaluate)
         return tmp_path / "run"
 
     return run
@@ -184,7 +175,7 @@ def test_all_gaits_of_an_iteration_share_its_draws(run_drawn):
 
     def evaluate(task):
         seeds.append(task.seed)
-        return DrawnBowl()(task)
+        return analytic.DrawnBowl()(task)
 
     run_drawn(evaluate=evaluate)
     expected = [(5, trial, 0) for trial in (0, 1) for _ in range(12)]
@@ -199,7 +190,7 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
     walked = [entry for entry in entries if entry["failure"] is None]
     assert 0 < len(walked) < len(entries)
     for entry in walked:
-        assert entry["fitness"] == worst_mean(entry["draws"]["fitness"], TAIL)
+        assert entry["fitness"] == worst_mean(entry["draws"]["fitness"], analytic.TAIL)
         assert entry["metrics"]["distance"] == approx(np.mean(entry["draws"]["distance"]))
     assert all("draws" not in entry for entry in entries if entry["failure"])
     table = load_run(directory).evaluations.dropna(subset="fitness")
@@ -210,7 +201,7 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
 
 def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn, monkeypatch):
     name = "tetra_drake.evolution.reevaluation.evaluator_of"
-    monkeypatch.setattr(name, lambda *_, **__: in_threads(BOWL))
+    monkeypatch.setattr(name, lambda *_, **__: analytic.in_threads(BOWL))
     run = reevaluate(run_drawn())
     again = run.reevaluations.set_index(["trial", "index"])
     first = run.evaluations.set_index(["trial", "index"]).loc[again.index]

@@ -9,16 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from helpers.analytic import (
-    Bowl,
-    Dying,
-    evaluated,
-    in_threads,
-    read_record,
-    record_run,
-    small_scenario,
-    tasks_of,
-)
+from helpers import analytic
 
 from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -30,7 +21,7 @@ from tetra_drake.robot.gait import ParameterSpace
 @pytest.fixture
 def tasks(scenario):
     generator, space = np.random.default_rng(5), ParameterSpace.of(scenario)
-    return tasks_of(space.random(generator) for _ in range(10))
+    return analytic.tasks_of(space.random(generator) for _ in range(10))
 
 
 def on_processes(evaluate, workers):
@@ -38,45 +29,45 @@ def on_processes(evaluate, workers):
     return OnExecutor(evaluate, ProcessPoolExecutor, workers)
 
 
-@pytest.mark.parametrize("make", [InProcesses, in_threads])
+@pytest.mark.parametrize("make", [InProcesses, analytic.in_threads])
 def test_every_task_is_evaluated_once_also_when_workers_are_recycled(tasks, monkeypatch, make):
     monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 4)
-    with make(Bowl(), 2) as evaluator:
-        evaluations = evaluated(evaluator, tasks)
-        assert evaluated(evaluator, []) == {}
-    assert evaluations == {i: Bowl()(task) for i, task in enumerate(tasks)}
+    with make(analytic.Bowl(), 2) as evaluator:
+        evaluations = analytic.evaluated(evaluator, tasks)
+        assert analytic.evaluated(evaluator, []) == {}
+    assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
 
 
 @pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
 def test_a_task_whose_worker_dies_is_tried_once_more(tasks, tmp_path, make, once):
-    with make(Dying(tmp_path, once=once), 2) as evaluator:
-        evaluations = evaluated(evaluator, tasks)
-    assert evaluations == {i: Bowl()(task) for i, task in enumerate(tasks)}
+    with make(analytic.Dying(tmp_path, once=once), 2) as evaluator:
+        evaluations = analytic.evaluated(evaluator, tasks)
+    assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
 
 
 @pytest.mark.parametrize("make", [InProcesses, on_processes])
 def test_a_task_whose_worker_dies_twice_is_named(tasks, tmp_path, make, refused):
-    dying = Dying(tmp_path, always=(4,))
+    dying = analytic.Dying(tmp_path, always=(4,))
     with refused("trial 0, evaluation 4", "", "died"), make(dying, 2) as evaluator:
-        evaluated(evaluator, tasks)
+        analytic.evaluated(evaluator, tasks)
 
 
 def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, refused):
     run = tmp_path / "run"
-    record_run(tmp_path / "whole", small_scenario(trials=1))
+    analytic.record_run(tmp_path / "whole", analytic.small_scenario(trials=1))
     with refused("trial 0, evaluation 17", "", "died"):
-        dying = Dying(tmp_path, always=(17,))
-        record_run(run, small_scenario(trials=1), evaluator=InProcesses(dying, 2))
+        dying = analytic.Dying(tmp_path, always=(17,))
+        analytic.record_run(run, analytic.small_scenario(trials=1), evaluator=InProcesses(dying, 2))
     assert load_run(run).evaluations["failure"].isin([None, "fell off the table"]).all()
-    record_run(run)
-    assert read_record(run) == read_record(tmp_path / "whole")
+    analytic.record_run(run)
+    assert analytic.read_record(run) == analytic.read_record(tmp_path / "whole")
 
 
 def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, refused):
     monkeypatch.delenv("TETRA_DRAKE_LOADED_IN", raising=False)
     evaluate = importlib.import_module("helpers.unloadable").evaluate
     with refused("worker processes", "", "do not start"), InProcesses(evaluate, 1) as processes:
-        evaluated(processes, tasks)
+        analytic.evaluated(processes, tasks)
     assert "only one process can load this" in capfd.readouterr().err
 
 

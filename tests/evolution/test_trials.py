@@ -92,18 +92,3 @@ def test_another_optimiser_reports_its_own_numbers(tmp_path):
     farthest = run.evaluations.groupby("trial")["distance"].max()
     assert run.iterations.groupby("trial")["farthest"].last().tolist() == farthest.tolist()
     assert set(run.iterations["note"]) == {"wide"}
-
-
-def test_the_last_batch_is_cut_to_the_evaluations_that_are_left(tmp_path):
-    scenario = small_scenario(population=4, iterations=1)  # six evaluations, in batches of four
-    statuses = record_run(tmp_path / "run", scenario, optimizer=RandomSearch)
-    ends = [(status.evaluations, status.stop) for status in statuses]
-    assert ends == [(6, "all evaluations done")] * 2
-
-
-def test_an_error_in_the_program_is_no_failed_evaluation(run_small):
-    def evaluate(vector):
-        raise TypeError("a bug")
-
-    with pytest.raises(TypeError, match="a bug"):
-        run_small(evaluate=evaluate)

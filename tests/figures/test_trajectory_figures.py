@@ -318,12 +318,6 @@ def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
     assert np.ptp(panel.lines[0].get_xdata()) > step * prism.SPEED / INCH
 
 
-def test_bars_are_drawn_from_node_to_node(carried):
-    lines, _ = struts(pictures(time_lapse(carried, instants=2))[0])
-    p_WN = carried.trajectory.p_WN.values[0, :, :2] / INCH
-    np.testing.assert_allclose(lines[0], p_WN.reshape(3, 2, 2), atol=1e-12)
-
-
 def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
     shown = [panel.get_title("left") for panel in ground_forces(carried).axes]
     assert shown == ["n0", "n1", "n2"]

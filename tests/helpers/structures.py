@@ -16,7 +16,6 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario import robot_structure
 
@@ -71,12 +70,6 @@ def joined_nodes(given: robot_structure.StructureFile) -> dict[str, np.ndarray]:
         "body_of_node": np.array([given.body_of_node[node] for node in given.nodes]),
         "cable_ends": np.array([[number[n] for n in cable.nodes] for cable in given.all_cables]),
     }
-
-
-def statics_of(given: robot_structure.StructureFile) -> Statics:
-    """Statics of a structure with its nodes as given."""
-    held = [[axis in given.anchors.get(node, "") for axis in "xyz"] for node in given.nodes]
-    return find_statics(**joined_nodes(given), held=np.array(held))
 
 
 def recorded_structure(data: Path, name: str) -> dict[str, Any]:

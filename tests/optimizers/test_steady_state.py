@@ -184,18 +184,6 @@ def test_the_mean_fitness_never_falls_and_rises_much():
     assert means[-1] > 0.6 * means[0]
 
 
-def vectors_of(changes):
-    """The initial population and the children of a trial of a changed scenario."""
-    batches, _ = run(small_scenario(iterations=100).with_changes(changes))
-    return np.array(batches[0]), np.concatenate(batches[1:])
-
-
-def test_with_the_listings_slip_tau_a_is_only_ever_passed_on():
-    initial, children = vectors_of({"optimizer.tau_mutation": "listing"})
-    assert set(children[:, TAU_A]) <= set(initial[:, TAU_A])
-    np.testing.assert_array_equal(children[:, TAU_B], 2.0 * children[:, TAU_A])
-
-
 def test_a_trial_ends_when_the_mean_fitness_levels_off_and_not_for_want_of_one():
     changes = {"optimizer.stop_after": 20, "optimizer.stop_window": 10}
     level, failing = (make(small_scenario(iterations=100).with_changes(changes)) for _ in range(2))

@@ -8,9 +8,8 @@ from pydrake.multibody.tree import LinearSpringDamper
 
 from tetra_drake.physics.cable import TENSION, CableLaw, cable_tension
 from tetra_drake.physics.forces import Forces, compute_cable_forces
-from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.physics.model import Model
-from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes
+from tetra_drake.robot.structure import AddBodies, Structure
 
 
 @pytest.fixture
@@ -31,17 +30,6 @@ def forces_of_cables(
 def test_tension_is_equation_6():
     # 35 N/m (0.3 m - 0.1 m) + 8 N s/m * -0.25 m/s + 1.5 N = 7 - 2 + 1.5
     assert cable_tension(0.3, -0.25, 1.5, CableLaw(35.0, 8.0, 0.1)) == pytest.approx(6.5, rel=1e-15)
-
-
-def test_power_of_the_cables_is_tension_times_shortening(robot, structure, state):
-    # Virtual power: generalized force . v = - sum of T dl/dt.
-    force, tensions = forces_of_cables(robot.model, state, 1.0, 0.0, -1.0, 2.0)
-    a, b = structure.cables["node_a"], structure.cables["node_b"]
-    nodes = moved_nodes(structure, state)
-    p_WN, v_WN = nodes[:, P_WN : P_WN + 3], nodes[:, V_WN : V_WN + 3]
-    d = p_WN[b] - p_WN[a]
-    rates = np.einsum("ij,ij->i", v_WN[b] - v_WN[a], d) / np.linalg.norm(d, axis=1)
-    assert force @ state[35:] == pytest.approx(-tensions @ rates, rel=1e-12)
 
 
 def test_passive_cables_are_drakes_linear_spring_dampers(robot, structure, state):

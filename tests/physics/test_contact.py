@@ -29,17 +29,6 @@ def robot_on_ground(scenario: Scenario) -> RobotOnGround:
     return RobotOnGround(scenario, np.eye(3))
 
 
-def test_a_node_that_lands_sticks_where_it_lands(robot_on_ground):
-    modes = robot_on_ground.modes
-    robot_on_ground.update(p=(0.0, 0.0, 1e-3))
-    assert not modes[:, CONTACT].any()
-    robot_on_ground.update(v=(0.1, 0.0, 0.0), p=(0.02, 0.0, -1e-5))
-    assert modes[:-1, CONTACT].all()
-    assert modes[-1, CONTACT] == 0.0, "the tip of the lead tetrahedron is off the ground"
-    assert (modes[:, MODE : MODE + 2] == STICK).all()
-    assert modes[0, STICK_POINT] == pytest.approx(0.02, abs=1e-15)
-
-
 def test_a_node_that_sticks_again_does_so_where_it_is_and_changes_are_told(robot_on_ground):
     modes, lifted = robot_on_ground.modes, (0.0, 0.0, 1e-3)
     assert not robot_on_ground.update(p=lifted), "in the air"

@@ -84,12 +84,6 @@ def slide(v=(0.0, 0.0), x=(0.0, 0.0), mode=(0.0, 0.0), heading=ALONG_X) -> Slide
     return Slide(t1, t2, heading, np.float64(NORMAL))
 
 
-def test_in_stick_the_bristle_is_a_spring_and_a_damper():
-    # -(70 * 2e-4 + 1000 * 3e-5) = -0.044 < 0.6 * 0.2 N
-    force = coulomb_force(slide(v=(2e-4, 0.0), x=(3e-5, -1e-5)), law())
-    assert force == pytest.approx((-0.044, 0.01), rel=1e-12)
-
-
 @pytest.mark.parametrize(("mode", "coefficient"), [((0.0, 0.0), STATIC), ((0.6, 0.8), KINETIC)])
 @pytest.mark.parametrize("angle", [0.0, 1.0, 2.5])
 def test_the_force_is_limited_by_the_load_and_opposes_the_motion(mode, coefficient, angle):
@@ -103,26 +97,6 @@ def test_slow_slip_is_viscous_and_forgets_the_bristle():
     # c v = 0.07 N < 0.5 * 0.2 N
     force = coulomb_force(slide(v=(1e-3, 0.0), x=(1.0, 1.0), mode=ALONG_X), law())
     assert force == pytest.approx((-0.07, 0.0), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("v", "factor"), [((0.3, 0.0), 2.0), ((-0.3, 0.0), 3.0), ((0.0, 0.3), 0.5), ((0.0, -0.3), 0.5)]
-)
-def test_directional_factors_are_those_along_and_across_the_heading(v, factor):
-    directional = law(forward=2.0, backward=3.0, lateral=0.5)
-    force = coulomb_force(slide(v=v, mode=ALONG_X), directional)
-    expected = [-factor * KINETIC * NORMAL * each / 0.3 for each in v]
-    assert force == pytest.approx(expected, rel=1e-12)
-    turned = slide(v=(v[1], -v[0]), mode=ALONG_X, heading=(0.0, -1.0))
-    force = coulomb_force(turned, directional)
-    assert force == pytest.approx([expected[1], -expected[0]], rel=1e-12)
-
-
-def test_between_the_axes_the_limit_is_an_ellipse():
-    # On (u / a)^2 + (v / b)^2 = 1 in the direction (1, 1): u = v = ab / sqrt(a^2 + b^2).
-    force = coulomb_force(slide(v=(0.3, 0.3), mode=ALONG_X), law(forward=2.0, lateral=0.5))
-    half = KINETIC * NORMAL * 2.0 * 0.5 / math.hypot(2.0, 0.5)
-    assert force == pytest.approx((-half, -half), rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 
 from tetra_drake.physics.oscillator import (
-    U_RATE,
-    V_RATE,
     Network,
     U,
     V,
     correct_neurons,
     make_neurons,
     network_output,
-    neuron_rates,
     predict_neurons,
 )
 
@@ -23,20 +20,6 @@ from tetra_drake.physics.oscillator import (
 def neurons_at(u: list[float] | np.ndarray, v: list[float] | np.ndarray) -> np.ndarray:
     """The neurons with these states."""
     return make_neurons(np.concatenate([u, v]))
-
-
-def test_rates_are_those_of_equation_7():
-    # One oscillator by hand: u = (0.4, -0.2), v = (0.1, 0.3), f = (0.05, 0), w_partner = 1.5,
-    # beta = 2.5, u0 = 0.5, tau_A = 0.25 s, tau_B = 0.5 s; y = (0.4, 0).
-    #   du_e = (-0.4 - 1.5*0   - 2.5*0.1 + 0.5 + 0.05)/0.25 = -0.4
-    #   du_f = ( 0.2 - 1.5*0.4 - 2.5*0.3 + 0.5       )/0.25 = -2.6
-    #   dv_e = (0.4 - 0.1)/0.5 = 0.6,  dv_f = (0 - 0.3)/0.5 = -0.6
-    inhibition = [[0.0, 1.5], [1.5, 0.0]]
-    network = Network.of(inhibition, tau_a=0.25, tau_b=0.5, self_inhibition_weight=2.5)
-    neurons = neurons_at([0.4, -0.2], [0.1, 0.3])
-    neuron_rates(network, np.array([0.5 + 0.05, 0.5]), neurons)
-    np.testing.assert_allclose(neurons[:, U_RATE], [-0.4, -2.6], rtol=1e-14)
-    np.testing.assert_allclose(neurons[:, V_RATE], [0.6, -0.6], rtol=1e-14)
 
 
 # While both neurons of this oscillator fire, Eq. 7 is linear, without kinks. Halving the step then

@@ -1,6 +1,5 @@
 """The tally of a walk: work, signals, lifted bodies and tension of hand-made motions."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -43,23 +42,6 @@ def tallied(
             )
             observe(tally, robot, time, NO_STATE, signal, forces)
     return tally
-
-
-TIMES = np.linspace(0.0, 2.0 * math.pi, 1001)
-
-
-def test_a_constant_pull_works_along_the_way_by_which_its_cable_shortens():
-    # 1 + 0.1 sin t shortens by 0.2 m in a period; an actuator takes no work back, and the cable
-    # that is not driven does not count.
-    tally = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, 2.0))
-    assert tally.effort.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
-    result = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, -2.0))
-    assert result.effort.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
-
-
-def test_the_rate_of_signals_is_integrated_as_its_square():
-    tally = tallied(TIMES, lengths=np.ones(1001), signals=2.0 * np.sin(TIMES))
-    assert tally.roughness.total[0] == pytest.approx(4.0 * math.pi, rel=1e-4)
 
 
 def test_sums_begin_with_the_first_step_that_is_whole_and_least_values_at_once():

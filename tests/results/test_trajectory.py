@@ -13,7 +13,6 @@ from tetra_drake.results.trajectory import sample_times, save_dataset, with_inde
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_tetrahedra import NODES
 
 
 @pytest.fixture(scope="module", params=["drake", "compiled"])
@@ -64,13 +63,6 @@ def test_body_poses_carry_the_nodes(trajectory: xarray.Dataset, structure: Struc
     np.testing.assert_allclose(p_WN, trajectory.p_WN.values, atol=1e-6)
 
 
-def test_cables_reach_from_node_to_node(trajectory: xarray.Dataset, structure: Structure) -> None:
-    p_WN, cables = trajectory.p_WN.values, structure.cables
-    distance = np.linalg.norm(p_WN[:, cables["node_b"]] - p_WN[:, cables["node_a"]], axis=-1)
-    np.testing.assert_allclose(trajectory.length, distance, rtol=1e-12)
-    assert trajectory.cable.values.tolist() == list(structure.cable_names)
-
-
 def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Dataset) -> None:
     driven = trajectory.cable[trajectory.cable_signal == "T2-T3"].values.tolist()
     assert driven == ["T2-T3 outer bottom_left", "T2-T3 outer bottom_right"]
@@ -79,13 +71,6 @@ def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Datas
     assert trajectory.sel(cable_bodies="T2-T3").sizes["cable"] == 6
     inner = trajectory.sel(cable="T1-T2 inner top")
     assert (inner.cable_bodies.item(), inner.cable_group.item()) == ("T1-T2", "inner")
-
-
-def test_nodes_say_of_which_bodies_they_are(trajectory: xarray.Dataset) -> None:
-    assert trajectory.node_body.sel(node="T4 tip") == "T4"
-    assert set(trajectory.p_WN.sel(node_body="T1").node.values) == {f"T1 {name}" for name in NODES}
-    assert trajectory.contact_body.sel(contact="T5 tip") == "T5"
-    assert trajectory.body.values.tolist() == ["T1", "T2", "T3", "T4", "T5"]
 
 
 def test_forces_belong_to_the_recorded_states(

@@ -15,20 +15,17 @@ def counting(cables: int = 8, samples: int = 3) -> Command:
     return Command("counting", 0.01, values)
 
 
-def test_a_sample_is_held_and_changes_within_a_step():
-    # Steps of 4 ms: a new sample begins at 10 ms, within the step from 8 to 12 ms.
-    held = held_samples(counting(1), 0.004, 0.03)[:, 0]
-    at_8, at_12, at_16 = held[2:5]
-    assert (held[0], at_8, at_12) == (0.0, 0.0, 0.0)
-    assert at_16 == 10.0
-    assert len(held) * 0.004 > 0.03 + 0.004
-
-
-def test_a_change_on_the_grid_begins_at_its_time_and_takes_a_step():
-    held = held_samples(counting(1), 0.0005, 1.0)[:, 0]
-    assert held[20] == 0.0 and held[21] == 10.0
-    assert held[40] == 10.0 and held[41] == 20.0
-    assert held[-1] == 20.0, "the last sample is held for ever"
+@pytest.mark.parametrize(
+    ("step", "before", "after"),
+    [
+        (0.0005, 20, 21),  # on the grid
+        (0.004, 3, 4),  # within the step from 8 to 12 ms
+    ],
+)
+def test_a_sample_is_held_for_ten_milliseconds_and_the_last_for_ever(step, before, after):
+    held = held_samples(counting(1), step, 1.0)[:, 0]
+    assert (held[0], held[before], held[after], held[-1]) == (0.0, 0.0, 10.0, 20.0)
+    assert len(held) * step > 1.0 + step
 
 
 def test_each_driven_cable_has_a_signal_of_its_own(scenario):

@@ -13,7 +13,6 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
@@ -164,11 +163,3 @@ def test_a_search_ends_after_steps_by_the_robot_alone(robot, refused, monkeypatc
     with refused("thesis", "robot", f"no equilibrium until step {steps};"):
         _ = robot.equilibrium
     assert len(taken) == steps
-
-
-def test_a_search_over_hills_seldom_tries_more_than_two_shifts(monkeypatch):
-    solve, tries, steps, displaced = equilibrium.solve_convex, [], [], equilibrium.displaced
-    monkeypatch.setattr(equilibrium, "solve_convex", lambda *a: tries.append(a) or solve(*a))
-    monkeypatch.setattr(equilibrium, "displaced", lambda *a: steps.append(a) or displaced(*a))
-    assert Robot.of(load_scenario("prism")).equilibrium.feet == 3
-    assert len(steps) > 10 and len(tries) <= 3 * len(steps)

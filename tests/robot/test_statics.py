@@ -2,78 +2,68 @@
 
 import math
 from itertools import combinations, product
-from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.structures import joined_nodes, statics_of
+from helpers.structures import joined_nodes
 
-import tetra_drake
-from tetra_drake.robot.statics import cable_wrenches
+from tetra_drake.robot.statics import cable_wrenches, find_statics
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 
-SHIPPED = Path(tetra_drake.__file__).parent / "scenario" / "structures"
+Joined = dict[str, np.ndarray]
+"""Nodes and what joins them, as statics takes them."""
 
 
-def structure(nodes, struts, cables) -> StructureFile:
-    """A structure of one make of struts and one of cables, its nodes numbered."""
-    make = {"diameter": 0.01, "density": 1000.0, "node_diameter": 0.02}
-    spring = {"stiffness": 100.0, "damping": 1.0, "free_length": 0.0}
-
-    def names(pairs):
-        return [[f"n{a}", f"n{b}"] for a, b in pairs]
-
-    return StructureFile(
-        nodes={f"n{i}": list(map(float, p)) for i, p in enumerate(nodes)},
-        struts={"strut": {"pairs": names(struts), **make}},
-        cables={"cable": {"pairs": names(cables), **spring}},
-    )
-
-
-def prism(n: int, twist: float, *, radius=1.0, height=1.5) -> StructureFile:
+def prism(n: int, twist: float, *, radius: float = 1.0, height: float = 1.5) -> Joined:
     """Bottom cables, then top ones, then sides, which the twist (deg) makes slant."""
     angles = np.radians(10.0 + 360.0 / n * np.arange(n))
-    tops = angles + math.radians(twist)
-    bottom = np.stack([radius * np.cos(angles), radius * np.sin(angles), 0.0 * angles], axis=1)
-    top = np.stack([radius * np.cos(tops), radius * np.sin(tops), height + 0.0 * tops], axis=1)
-    following = [(i + 1) % n for i in range(n)]
-    struts = [(i, n + following[i]) for i in range(n)]
-    horizontal = [(i, following[i]) for i in range(n)]
-    horizontal += [(n + i, n + following[i]) for i in range(n)]
-    return structure([*bottom, *top], struts, horizontal + [(i, n + i) for i in range(n)])
+    angles = np.append(angles, angles + math.radians(twist))
+    heights = np.repeat([0.0, height], n)
+    here, following = np.arange(n), (np.arange(n) + 1) % n
+    ends = np.stack([here, following], axis=1)
+    return {
+        "p_WN": np.stack([radius * np.cos(angles), radius * np.sin(angles), heights], axis=1),
+        # A strut leads from each node below to the one above the next.
+        "body_of_node": np.append(here, (here - 1) % n),
+        "cable_ends": np.concatenate([ends, n + ends, np.stack([here, n + here], axis=1)]),
+    }
 
 
-def six_bar(apart: float) -> StructureFile:
+def six_bar(apart: float) -> Joined:
     """Struts of length 1 along x, y and z, parallel ones so far apart, in a shell of 24 cables."""
-    nodes, half = [], 0.5 * apart
-    for axis in range(3):
-        for side, end in product((-half, half), (-0.5, 0.5)):
-            nodes.append(np.roll([end, side, 0.0], axis))
-    struts = [(i, i + 1) for i in range(0, 12, 2)]
-    lengths = {pair: np.linalg.norm(nodes[pair[0]] - nodes[pair[1]]) for pair in PAIRS}
-    return structure(nodes, struts, sorted(PAIRS, key=lambda pair: lengths[pair])[:24])
+    half = 0.5 * apart
+    ends = list(product(range(3), (-half, half), (-0.5, 0.5)))
+    p_WN = np.array([np.roll([end, side, 0.0], axis) for axis, side, end in ends])
+    # Nodes of struts that are not parallel.
+    pairs = [pair for pair in combinations(range(12), 2) if pair[0] // 4 != pair[1] // 4]
+    pairs.sort(key=lambda pair: np.linalg.norm(p_WN[pair[0]] - p_WN[pair[1]]))
+    cable_ends = np.array(pairs[:24])
+    return {"p_WN": p_WN, "body_of_node": np.arange(12) // 2, "cable_ends": cable_ends}
 
 
-PAIRS = [pair for pair in combinations(range(12), 2) if pair[0] // 4 != pair[1] // 4]
-"""Nodes of struts that are not parallel."""
-
-
-def nested_tetrahedra(spacing: float) -> StructureFile:
-    """Two tetrahedra of the thesis and the six cables between them."""
+def nested_tetrahedra(spacing: float) -> Joined:
+    """Two tetrahedra of the thesis and the cables between them: three outer, three inner ones."""
     edge = 6 * 0.0254
     around = np.radians([120.0, 240.0, 0.0])
-    r = edge / math.sqrt(3.0)
-    base = np.stack([0.0 * around, r * np.sin(around), r * np.cos(around)], axis=1)
-    first = np.array([*base, [edge * math.sqrt(2.0 / 3.0), 0.0, 0.0]])
-    struts = list(combinations(range(4), 2))
-    outer = [(i, 4 + i) for i in range(3)]
-    inner = [(3, 4 + i) for i in range(3)]
-    second = first + np.array([spacing, 0.0, 0.0])
-    return structure(
-        [*first, *second], [*struts, *((4 + a, 4 + b) for a, b in struts)], outer + inner
-    )
+    base = edge / math.sqrt(3.0) * np.stack([0.0 * around, np.sin(around), np.cos(around)], axis=1)
+    first = np.append(base, [[edge * math.sqrt(2.0 / 3.0), 0.0, 0.0]], axis=0)
+    return {
+        "p_WN": np.append(first, first + np.array([spacing, 0.0, 0.0]), axis=0),
+        "body_of_node": np.repeat([0, 1], 4),
+        "cable_ends": np.array([(0, 4), (1, 5), (2, 6), (3, 4), (3, 5), (3, 6)]),
+    }
+
+
+def shipped(name: str) -> Joined:
+    return joined_nodes(read_structure(name))
+
+
+def forces_on_bodies(joined: Joined, tensions: np.ndarray) -> np.ndarray:
+    """(6 B, ...) about the nodes' centre, torques in N times the size of the structure."""
+    p_WN = joined["p_WN"]
+    scaled = (p_WN - p_WN.mean(axis=0)) / np.ptp(p_WN, axis=0).max()
+    return cable_wrenches(**joined | {"p_WN": scaled}) @ tensions
 
 
 def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
@@ -86,7 +76,7 @@ def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "self_stress_states", "mechanisms"),
+    ("joined", "self_stress_states", "mechanisms"),
     [
         (prism(3, 30.0), 1, 1),
         (prism(3, 30.00001), 1, 1),
@@ -98,56 +88,40 @@ def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
         (six_bar(0.52), 0, 0),
         (nested_tetrahedra(2.94 * 0.0254), 1, 1),
         (nested_tetrahedra(2.0 * 0.0254), 1, 1),
+        (shipped("mast"), 6, 0),  # 24 cables on four bodies are 18 equations
+        (shipped("pair"), 2, 0),  # 8 on two are 6
     ],
 )
-def test_self_stress_states_and_mechanisms(given, self_stress_states, mechanisms):
-    statics = statics_of(given)
+def test_self_stress_states_and_mechanisms(joined, self_stress_states, mechanisms):
+    statics = find_statics(**joined)
     assert statics.mechanisms == mechanisms
-    assert statics.self_stresses.shape == (self_stress_states, len(given.all_cables))
+    assert statics.self_stresses.shape == (self_stress_states, len(joined["cable_ends"]))
+    balance = forces_on_bodies(joined, statics.self_stresses.T)
+    assert np.abs(balance).max(initial=0.0) < 1e-6
 
 
 def test_tensions_of_a_prism() -> None:
-    given = prism(3, 30.0)
-    (tensions,) = statics_of(given).self_stresses
-    heights = [[given.nodes[node][2] for node in cable.nodes] for cable in given.all_cables]
-    is_horizontal = np.ptp(heights, axis=1) == 0.0
-    horizontal, side = tensions[is_horizontal], tensions[~is_horizontal]
-    assert (len(horizontal), len(side)) == (6, 3)
+    (tensions,) = find_statics(**prism(3, 30.0)).self_stresses
+    horizontal, side = tensions[:6], tensions[6:]
     assert horizontal == pytest.approx(horizontal[0], rel=1e-9)
     assert side == pytest.approx(side[0], rel=1e-9)
     assert horizontal[0] / side[0] == pytest.approx(0.630, abs=5e-4)
 
 
-def forces_on_bodies(given: StructureFile, tensions: np.ndarray) -> np.ndarray:
-    """(6 B,) about the nodes' centre, torques in N times the size of the structure."""
-    nodes = joined_nodes(given)
-    p_WN = nodes["p_WN"]
-    nodes["p_WN"] = (p_WN - p_WN.mean(axis=0)) / np.ptp(p_WN, axis=0).max()
-    return cable_wrenches(**nodes) @ tensions
-
-
-def test_self_stresses_balance() -> None:
-    for given in (prism(4, 45.0), read_structure(SHIPPED / "mast.yaml")):
-        for tensions in statics_of(given).self_stresses:
-            assert np.abs(forces_on_bodies(given, tensions)).max() < 1e-6
-
-
 @pytest.mark.parametrize("name", ["mast", "pair"])
 def test_the_shipped_spines_balance_without_weight(name: str) -> None:
-    given = read_structure(SHIPPED / f"{name}.yaml")
-    stiffness = np.array([given.cables[cable.group].stiffness for cable in given.all_cables])
-    lengths = [
-        math.dist(given.nodes[first], given.nodes[second])
-        for first, second in (cable.nodes for cable in given.all_cables)
-    ]
-    tensions = stiffness * (np.array(lengths) - given.free_lengths)
+    given, joined = read_structure(name), shipped(name)
+    stiffness = [given.cables[cable.group].stiffness for cable in given.all_cables]
+    spans = joined["p_WN"][joined["cable_ends"]]
+    lengths = np.linalg.norm(spans[:, 1] - spans[:, 0], axis=1)
+    tensions = stiffness * (lengths - given.free_lengths)
     assert tensions.min() > 1.0
-    assert np.abs(forces_on_bodies(given, tensions)).max() < 0.02 * tensions.min()
+    assert np.abs(forces_on_bodies(joined, tensions)).max() < 0.02 * tensions.min()
 
 
 def test_the_six_cables_of_the_thesis_balance_where_its_spacing_says() -> None:
     robot = load_scenario("thesis").robot
-    (tensions,) = statics_of(nested_tetrahedra(robot.spacing)).self_stresses
+    (tensions,) = find_statics(**nested_tetrahedra(robot.spacing)).self_stresses
     outer, inner = tensions[0], tensions[3]
     assert tensions == pytest.approx([outer] * 3 + [inner] * 3, rel=1e-9)
     reach = robot.strut_length * math.sqrt(2.0 / 3.0) - robot.spacing

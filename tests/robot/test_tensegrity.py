@@ -76,20 +76,6 @@ def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
     np.testing.assert_allclose(centre, 0.0, atol=1e-15)  # kg m
 
 
-def test_offsets_move_the_bodies_of_the_robot_at_rest():
-    scenario = load_scenario("prism")
-    shift = [[0.0, 0.0, 0.01], [0.02, 0.0, 0.01], [0.0, -0.03, 0.01]]
-    moved = scenario.with_sections(robot=scenario.robot.model_copy(update={"offsets": shift}))
-    difference = make_structure(moved).p_WB - make_structure(scenario).p_WB
-    np.testing.assert_allclose(difference, shift, atol=1e-15)
-
-
-def test_a_robot_knows_the_rest_at_which_it_starts():
-    robot = Robot.of(load_scenario("prism"))
-    assert robot.equilibrium is robot.structure.equilibrium
-    np.testing.assert_array_equal(robot.equilibrium.state, robot.structure.initial_state)
-
-
 def test_nodes_placed_in_the_ground_are_refused(refused):
     scenario = load_scenario("prism")
     sunk = scenario.with_changes({"robot.nodes.n1": ["-5 cm", "8.66 cm", "-1 mm"]})

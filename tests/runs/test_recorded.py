@@ -51,7 +51,10 @@ def test_every_experiment_is_recorded():
     assert folders <= set(FOLDERS) == set(record.EXPERIMENTS)
 
 
-@pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.parametrize(
+    "name",  # the engine would be compiled for the six-bar alone
+    [pytest.param(name, marks=[pytest.mark.slow] * (name == "six-bar")) for name in FOLDERS],
+)
 def test_the_best_gaits_walk_as_recorded(name):
     """On the compiled engine, undisturbed, which is what analyse.py recorded, too."""
     folder = tables.HERE / name

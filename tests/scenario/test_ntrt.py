@@ -1,13 +1,12 @@
-"""Files of NTRT: a prism, a six-bar and a spine, read into structures."""
+"""Files of NTRT: a prism and a spine, read into structures."""
 
-import math
 from pathlib import Path
 
-import numpy as np
 import pytest
-from helpers.structures import statics_of
+from helpers.structures import joined_nodes
 
 from tetra_drake.errors import InputError
+from tetra_drake.robot.statics import find_statics
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_structure import StructureFile
 
@@ -32,19 +31,6 @@ builders:
   vertical:
     class: tgKinematicActuatorInfo
     parameters: {stiffness: 800, damping: 5, pretension: 1200, radius: 2, history: true}
-"""
-
-# Struts of 4 units in three parallel pairs, half a strut apart.
-SIX_BAR = """
-nodes: {x1: [-2, 0, -1], x2: [2, 0, -1], x3: [-2, 0, 1], x4: [2, 0, 1], y1: [-1, -2, 0],
-  y2: [-1, 2, 0], y3: [1, -2, 0], y4: [1, 2, 0], z1: [0, -1, -2], z2: [0, -1, 2], z3: [0, 1, -2],
-  z4: [0, 1, 2]}
-pair_groups:
-  rod: [[x1, x2], [x3, x4], [y1, y2], [y3, y4], [z1, z2], [z3, z4]]
-  string:
-    [[x1, y1], [x1, y2], [x3, y1], [x3, y2], [x2, y3], [x2, y4], [x4, y3], [x4, y4],
-     [y1, z1], [y1, z2], [y3, z1], [y3, z2], [y2, z3], [y2, z4], [y4, z3], [y4, z4],
-     [z1, x1], [z1, x2], [z3, x1], [z3, x2], [z2, x3], [z2, x4], [z4, x3], [z4, x4]]
 """
 
 VERTEBRA = """
@@ -85,7 +71,7 @@ def test_a_prism_in_decimetres(tmp_path: Path) -> None:
         "vertical/string low1 high1",
     ]
     assert len(given.bodies) == 3
-    statics = statics_of(given)
+    statics = find_statics(**joined_nodes(given))
     assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
 
 
@@ -96,20 +82,12 @@ def test_a_builder_has_no_pretension_unless_it_says_so(tmp_path: Path, text: str
     assert read(file).cables["vertical/string"].tension == 0.0
 
 
-def test_a_six_bar_by_the_default_builders(tmp_path: Path) -> None:
-    given = read(write(tmp_path, SIX_BAR), unit=0.01)
-    assert given.struts["rod"].diameter == pytest.approx(0.01)
-    assert given.struts["rod"].density == pytest.approx(1e6)
-    assert given.nodes["z4"] == pytest.approx([0.02, 0.0, 0.01])
-    statics = statics_of(given)
-    assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
-    assert np.abs(statics.self_stresses) == pytest.approx(math.sqrt(1 / 24), rel=1e-9)
-
-
 def test_a_spine_by_substructures(tmp_path: Path) -> None:
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     given = read(write(tmp_path, SPINE))
     assert len(given.bodies) == 3
+    rod = given.struts["rod"]  # by the default builder
+    assert (rod.diameter, rod.density) == pytest.approx((0.1, 1000.0))
     assert given.nodes["v1/front"] == pytest.approx([0.1, 0.1, 0.2])
     assert given.nodes["v2/front"] == pytest.approx([0.05, -0.1, 0.2])
     assert given.nodes["v3/left"] == pytest.approx([0.4, -0.1, 0.0])
@@ -223,7 +201,7 @@ def test_a_substructure_may_have_no_nodes(tmp_path: Path) -> None:
     """Such as one that holds builders only."""
     write(tmp_path, "builders: {rod: {class: tgRodInfo, parameters: {radius: 2}}}", "kinds.yaml")
     entry = "{path: kinds.yaml, rotation: {axis: [0, 1, 0], angle: 90}, translation: [1, 0, 0]}"
-    given = read(write(tmp_path, f"{SIX_BAR}\nsubstructures: {{kinds: {entry}}}"))
+    given = read(write(tmp_path, f"{VERTEBRA}\nsubstructures: {{kinds: {entry}}}"))
     assert given.struts["rod"].diameter == pytest.approx(0.4)
 
 

@@ -5,29 +5,6 @@ import pytest
 from pytest import approx
 
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
-from tetra_drake.scenario.load import dump_scenario, load_scenario
-
-IN = 0.0254
-
-
-@pytest.mark.parametrize(
-    ("text", "objective", "require"),
-    [
-        ("objective: {speed: 2 s/in, twist: -1 1/in}", {"speed": 2 / IN, "twist": -1 / IN}, {}),
-        (
-            "objective: {lead: 1 /m}\nrequire: {twist: 0.5 in, speed: -1 mm/s}",
-            {"lead": 1.0},
-            {"twist": 0.5 * IN, "speed": -1e-3},
-        ),
-    ],
-)
-def test_objective_and_requirements_replace_the_base(load_text, tmp_path, text, objective, require):
-    scenario = load_text(text)
-    assert scenario.objective == approx(objective, rel=1e-14)
-    assert scenario.require == approx(require, rel=1e-14)
-    (tmp_path / "full.yaml").write_text(dump_scenario(scenario))
-    assert load_scenario(tmp_path / "full.yaml") == scenario
-
 
 SPREADS = """
 disturbances:

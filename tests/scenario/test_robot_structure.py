@@ -98,21 +98,6 @@ def test_a_written_structure_is_read_as_it_was(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "first", "bodies", "cables", "oscillators"),
-    [("prism", "n0 n4", 3, 9, 3), ("six_bar", "n0 n1", 6, 24, 3), ("mast", "v1", 4, 24, 3)],
-)
-def test_shipped_structures(name, first, bodies, cables, oscillators) -> None:
-    given = read_structure(name)
-    assert given.body_names[0] == first
-    sizes = len(given.bodies), len(given.all_cables), len(given.cables_of_oscillator)
-    assert sizes == (bodies, cables, oscillators)
-    if name != "mast":  # the struts of the independent simulation's robots
-        for a, b in (strut.nodes for strut in given.all_struts):
-            length = np.linalg.norm(np.subtract(given.nodes[b], given.nodes[a]))
-            assert length == pytest.approx(0.25083960627398694, rel=1e-12)
-
-
-@pytest.mark.parametrize(
     ("changes", "key", "facts"),
     [
         ("cables: {side: {pairs: [[b, dd]]}}", "cables.side.pairs[0]", ["'dd'", "mean 'd'"]),

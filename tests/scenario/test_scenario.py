@@ -11,7 +11,6 @@ from record import EXPERIMENTS
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.common_sections import CpgSection, Disturbances
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, SteadyState
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -77,9 +76,7 @@ LEFT = ["outer bottom_left"]
 LOAD = {"cpg.feedback": ["load"]}
 BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"robot.spacing.x": "1 m"}, "robot.spacing", "a mapping"),
-    ({"robot.offsets": np.ones((5, 3))}, "robot.offsets[0][0]", "1.0 without a unit"),
     ({"robot.payload": ["35 g"]}, "robot.payload", "1 items"),
-    ({"accuracy": 0.1}, "accuracy", "'engine.accuracy'"),
     ({"engine": "compiled"}, "engine", "!Compiled"),
     ({"robot": {"tetrahedra": 7}, "robot.tetrahedra": 7}, "robot.tetrahedra", "twice"),
     ({"simulation.duration": "2.0 s"}, "simulation.steady_from", "3.0 s"),
@@ -92,7 +89,6 @@ BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"cpg.listing_step": "16 s"}, "cpg.listing_step", "16.0 s"),
     ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
     ({"robot.strut_length": "1e-15 m"}, "robot.strut_length", "1e-06 m to 10000 m"),
-    ({"robot.strut_length": "20 km"}, "robot.strut_length", "1e-06 m to 10000 m"),
     # What no memory holds
     ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
     ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
@@ -121,13 +117,6 @@ def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
     file = write(tmp_path, "base: ../middle.yaml\nname: top\n", "mine/top.yaml")
     changes = {"name": "top", "robot.spacing": "2.0 m", "robot.gravity": "1.0 m/s^2"}
     assert load_scenario(str(file)) == scenario.with_changes(changes)
-
-
-def test_another_kind_of_the_base_is_replaced_whole(tmp_path, refused):
-    write(tmp_path, "base: thesis\nfriction: !Coulomb {}\n", "low.yaml")
-    file = write(tmp_path, "base: low.yaml\nfriction: {stiction_range: 1 mm}\n")
-    with refused(file, "friction.stiction_range", "!ResetIntegrator"):
-        load_scenario(file)
 
 
 def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario):
@@ -161,6 +150,19 @@ def test_differences_are_keys_and_readable_values(scenario):
         ("cpg.signals", "live"),
         ("optimizer.stop_rise", "0.3"),
     ]
+    winch = "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}"
+    other = scenario.with_changes({"objective.lead": "2 /in", "actuation": winch})
+    assert other.differences(scenario) == [
+        ("actuation", "Winch"),
+        ("actuation.max_force", "1 N"),
+        ("actuation.max_speed", "1 m/s"),
+        ("actuation.time_constant", "1 ms"),
+        ("actuation.least_length", "0"),
+        ("objective.lead", "2 /in"),
+    ]
+    assert scenario.differences(other) == [("actuation", "Force"), ("objective.lead", "none")]
+    last_digit = {"ground.stiffness": "4378.170881161912 N/m"}
+    assert scenario.with_changes(last_digit).differences(scenario) == [*last_digit.items()]
 
 
 DISTURBED = {"draws": 4, "spreads": {"ground.damping": 0.1}}
@@ -220,43 +222,6 @@ def test_there_are_no_differences_exactly_between_equal_scenarios(scenarios):
         assert not is_same or hash(one) == hash(other)
         differing |= {hash(one), hash(other)} if not is_same else set()
     assert len(differing) == len({*records})
-
-
-@pytest.mark.parametrize(
-    ("changes", "there", "back"),
-    [
-        ({"objective.lead": "2 /in"}, [("objective.lead", "2 /in")], [("objective.lead", "none")]),
-        (
-            {"disturbances": {"draws": 4, "tail": 0.5, "start": 0.0}},
-            [("draws", "4"), ("start", "0.0"), ("tail", "0.5")],
-            [("draws", "none"), ("start", "none"), ("tail", "none")],
-        ),
-        ({"cpg.reach": 1}, [("cpg.reach", "1")], [("cpg.reach", "none")]),
-        (
-            {"actuation": "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}"},
-            [
-                ("actuation", "Winch"),
-                ("actuation.max_force", "1 N"),
-                ("actuation.max_speed", "1 m/s"),
-                ("actuation.time_constant", "1 ms"),
-                ("actuation.least_length", "0"),
-            ],
-            [("actuation", "Force")],
-        ),
-        (
-            {"ground.stiffness": "4378.170881161912 N/m"},
-            [("ground.stiffness", "4378.170881161912 N/m")],
-            [("ground.stiffness", "4378.170881161911 N/m")],
-        ),
-    ],
-)
-def test_differences_are_seen_from_both_sides(scenario, changes, there, back):
-    changed = scenario.with_changes(changes)
-
-    def found(one, other):
-        return [(key.removeprefix("disturbances."), text) for key, text in one.differences(other)]
-
-    assert (found(changed, scenario), found(scenario, changed)) == (there, back)
 
 
 def every_default(section, tree, key=""):
@@ -328,14 +293,11 @@ BAD = [
     ("robot: {offsets: [[0 m, 0 m, 0 m]]}", "robot.offsets", "1 items"),
     ("gait_bounds: {tau_a_min: 0.6 s}", "gait_bounds.tau_a_min", "0.6"),
     ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),
-    ("robot: {contacts: some}", "robot.contacts", "'thesis' or 'all'"),
     ("robot: {cables: {free_length: 1 km}}", "robot.spacing", "balance"),
     ("terrain: !HeightField {file: none.csv, cell: 1 in}", "terrain.file", "none.csv"),
     ("robot: {spacing: &own [*own]}", "", "alias of what holds it"),
-    ("robot: &own {cables: *own}", "", "alias of what holds it"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
     ("terrain: !Steps {height: 1 in, depth: 0.1 um, count: 2}", "terrain.depth", "4000000"),
-    (f"robot: {{payload: [{'1 g,' * 7}]}}", "robot.payload", "found 7 items"),
     (
         "optimizer: !QualityDiversity {measures: {lifted: [0, 1], tension: [1 lbf, 0 lbf]}}",
         "optimizer.measures.tension",
@@ -461,8 +423,3 @@ def test_a_printed_scenario_tells_what_differs_from_the_thesis(tmp_path):
         ["optimizer", "population", "12,", "weight_mutation", "0.5"],
     ]
     assert str(load_scenario(write(tmp_path, dump_scenario(loaded)))) == str(loaded)
-
-
-def test_a_kind_is_changed_with_its_settings_as_in_a_file(scenario):
-    changed = scenario.with_changes({"friction": "!Coulomb {static: 0.3, kinetic: 0.2}"})
-    assert changed.friction == Coulomb(static=0.3, kinetic=0.2)

@@ -124,9 +124,13 @@ def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
 
 def test_a_mapping_of_many_keys_is_read_as_fast_as_many_mappings():
     def time_of(text: str) -> float:
-        started = time.process_time()
-        assert len(parse_yaml(text, "file")) == 8_000
-        return time.process_time() - started
+        """The least of three, as other processes disturb."""
+        times = []
+        for _ in range(3):
+            started = time.process_time()
+            assert len(parse_yaml(text, "file")) == 8_000
+            times.append(time.process_time() - started)
+        return min(times)
 
     keys = [f"k{i}: 1\n" for i in range(8_000)]
     # Comparing all pairs of keys would take four times as long.

@@ -145,7 +145,6 @@ def test_a_unit_is_that_of_bare_coordinates(refused) -> None:
     ("robot", "key", "fact"),
     [
         ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
-        ("!Structure {file: none.yaml}", "robot.file", "prism"),
         ("!Structure {file: 7}", "robot.file", "7"),
         ("!Tetrahedra {file: bar.yaml}", "robot.file", "unknown"),
         ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),

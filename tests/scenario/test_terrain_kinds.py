@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import NdBSpline
 
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -42,20 +43,10 @@ def points(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """The biquadratic B-spline at points inside: each of 3 x 3 heights around with its weight."""
-    x, y = np.broadcast_arrays(x, y)
-    rows, columns = (x - grid.corner[0]) / grid.cell[0], (y - grid.corner[1]) / grid.cell[1]
-
-    def weights(t: np.ndarray) -> list[np.ndarray]:
-        return [0.5 * (0.5 - t) ** 2, 0.75 - t**2, 0.5 * (0.5 + t) ** 2]
-
-    i, j = np.rint(rows).astype(int), np.rint(columns).astype(int)
-    along, across = weights(rows - i), weights(columns - j)
-    return sum(
-        along[a] * across[b] * grid.heights[i + a - 1, j + b - 1]
-        for a in range(3)
-        for b in range(3)
-    )
+    """The biquadratic B-spline whose control points are the heights."""
+    axes = zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
+    knots = tuple(start + cell * (np.arange(size + 3) - 1.5) for start, cell, size in axes)
+    return NdBSpline(knots, grid.heights, k=2)(np.stack(np.broadcast_arrays(x, y), axis=-1))
 
 
 @pytest.mark.parametrize("terrain", KINDS, ids=repr)

@@ -7,12 +7,12 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from unittest.mock import Mock
 
 import numba
 import pytest
 
 import tetra_drake
+from tetra_drake.simd import compiling
 from tetra_drake.simd.compiling import LOGGER, announce, compiled
 
 PROGRAM = """
@@ -200,29 +200,13 @@ def test_values_of_a_closure_are_never_those_of_an_earlier_one(folder):
     assert [make(factor)(2.0) for factor in (3.0, 5.0)] == [6.0, 10.0]
 
 
-@pytest.fixture
-def timers(monkeypatch):
-    """In place of timers, which would run out while a kernel is compiled: what they were given."""
-    made: list[Mock] = []
-
-    def timer(*given: object) -> Mock:
-        made.append(Mock(given=given))
-        return made[-1]
-
-    monkeypatch.setattr("threading.Timer", timer)
-    return made
-
-
-def test_only_compilation_that_takes_longer_than_a_moment_is_announced_once(folder, timers, caplog):
-    compiled(twice)(0.25)
-    (timer,) = timers
-    assert [call[0] for call in timer.method_calls] == ["start", "cancel"]
-    _, function, arguments = timer.given
-    assert (function, arguments) == (announce, [True])
-    compiled(twice)(0.25)  # from the cache
-    assert timers == [timer]
+@pytest.mark.parametrize(("moment", "times"), [(0.0, 1), (600.0, 0)])
+def test_compilation_that_takes_longer_than_a_moment_is_announced_once(
+    folder, monkeypatch, caplog, moment, times
+):
+    monkeypatch.setattr(compiling, "_MOMENT", moment)
     announce.cache_clear()
-    for _ in range(2):
-        announce(True)
-    (told,) = caplog.records
-    assert (told.name, told.levelno) == (LOGGER, logging.WARNING)
+    for kernel in (compiled(twice), compiled(half)):
+        kernel(0.25)
+    told = [(record.name, record.levelno) for record in caplog.records]
+    assert told == [(LOGGER, logging.WARNING)] * times

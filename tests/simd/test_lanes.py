@@ -1,10 +1,10 @@
-"""Lanes and masks in kernels, lane by lane and bit for bit against NumPy, and what is refused.
+"""Functions of lanes, lane by lane and bit for bit against NumPy, and what is refused.
 
-That all that kernels use is right in every lane is tested in engines/compiled/test_many.py."""
+That operators and all that kernels use are right in every lane is tested in
+engines/compiled/test_many.py."""
 
 import itertools
 import math
-from collections.abc import Callable
 from decimal import Decimal
 
 import numba
@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from helpers.widths import WIDTHS
 from numba.core.errors import TypingError
-from numba.extending import register_jitable
 
 from tetra_drake.simd.lanes import (
     FieldArray,
@@ -66,66 +65,15 @@ def assert_same(found: np.ndarray, expected: np.ndarray, message: str = "") -> N
     np.testing.assert_array_equal(*signs, f"signs, {message}")
 
 
-def check(in_kernel, width: int, *, expected: Callable[..., tuple], gives_masks: bool) -> None:
-    """Asserts that in_kernel(x, y), a tuple of numbers or of truth values, gives for lanes what
-    `expected` gives for NumPy arrays."""
-    as_number = jit((lambda truth: select(truth, 1.0, 0.0)) if gives_masks else (lambda x: x))
-
-    @jit
-    def kernel(x, y, results):
-        for n in range(x.size):
-            for k, result in enumerate(in_kernel(x[n], y[n])):
-                results[k, n] = as_number(result)
-
-    x, y = operands()
-    with np.errstate(all="ignore"):
-        rows = expected(x, y)
-    results = lane_table((len(rows), len(x) // width), width)
-    kernel(in_lanes(x, width), in_lanes(y, width), results)
-    for k, row in enumerate(rows):
-        assert_same(results.array[k].ravel(), row.astype(float), f"result {k}")
-
-
-@register_jitable
-def arithmetic(x, y):
-    added, subtracted, multiplied, divided = 1.0 * x, 1.0 * x, 1.0 * x, 1.0 * x  # copies
-    added += y
-    subtracted -= y
-    multiplied *= y
-    divided /= y
-    return x + y, x - y, x * y, x / y, added, subtracted, multiplied, divided
-
-
-@register_jitable
-def comparisons(x, y):
-    return x < y, x <= y, x > y, x >= y, x == y, x != y
-
-
-def operators(x, y):
-    of_two = (*arithmetic(x, y), *arithmetic(x, -3.7), *arithmetic(3, x))
-    return (*of_two, -x, abs(x))
-
-
-def masks(x, y):
-    p, q = x < y, x > 0.0
-    both, either, one, scalar_first = x < y, x < y, x < y, True
-    both &= q
-    either |= q
-    one ^= q
-    scalar_first &= p
-    combined = (p & q, p | q, p ^ q, both, either, one, scalar_first)
-    with_scalars = (p & False, True & p, p | False, True | p, p ^ True, False ^ p)
-    compared = (*comparisons(x, y), *comparisons(x, -3.7), *comparisons(3, x))
-    return (*combined, *with_scalars, *compared)
-
-
 def functions(x, y):
     """What both numbers and lanes can be given to."""
     picked = (select(x < y, x, y), select(x != y, y, -x), select((x >= y) | (y > 0.0), x, 2.0))
     constant = (select(x < y, 1.0, -0.0), select(x < y, 1, y), select(x < y, 1, 0))
     smaller = (minimum(x, y), minimum(y, x), minimum(x, 0.0), minimum(0.0, x), minimum(1, x))
     larger = (maximum(x, y), maximum(y, x), maximum(x, 0.0), maximum(0.0, x), maximum(x, 1))
-    return picked + constant + smaller + larger + (floor(x),)
+    both, one = (x <= y) & (y == y), (x < y) ^ (x == -3.7)
+    computed = (x + y, x - y, x * y, x / y, -x, abs(x), select(both, x, y), select(one, x, y))
+    return picked + constant + smaller + larger + computed + (floor(x),)
 
 
 def functions_in_numpy(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -144,27 +92,29 @@ def functions_in_numpy(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
     larger = [(x, y), (y, x), (x, 0.0), (0.0, x), (x, 1.0)]
     extremes = [the_better(np.minimum, *pair) for pair in smaller]
     extremes += [the_better(np.maximum, *pair) for pair in larger]
-    return (*picked, *constant, *extremes, np.floor(x))
+    both, one = (x <= y) & (y == y), less ^ (x == -3.7)
+    computed = (x + y, x - y, x * y, x / y, -x, abs(x), np.where(both, x, y), np.where(one, x, y))
+    return (*picked, *constant, *extremes, *computed, np.floor(x))
 
 
-def opposite(x, y):
-    return (not_(x > 0.0),)
+def test_lanes_compute_as_doubles_do(width):
+    in_kernel, (x, y) = jit(functions), operands()
+
+    @jit
+    def kernel(x, y, results):
+        for n in range(x.size):
+            for k, result in enumerate(in_kernel(x[n], y[n])):
+                results[k, n] = result
+
+    with np.errstate(all="ignore"):
+        rows = functions_in_numpy(x, y)
+    results = lane_table((len(rows), len(x) // width), width)
+    kernel(in_lanes(x, width), in_lanes(y, width), results)
+    for k, row in enumerate(rows):
+        assert_same(results.array[k].ravel(), row.astype(float), f"result {k}")
 
 
-@pytest.mark.parametrize(
-    ("function", "expected", "gives_masks"),
-    [
-        (operators, operators, False),
-        (masks, masks, True),
-        (functions, functions_in_numpy, False),
-        (opposite, lambda x, y: (~(x > 0.0),), True),
-    ],
-)
-def test_lanes_compute_as_doubles_do(width, function, expected, gives_masks):
-    check(jit(function), width, expected=expected, gives_masks=gives_masks)
-
-
-@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_functions_of_plain_numbers_are_the_same_in_python():
     x, y = operands()  # kernels give the same for one lane (above)
     found = [functions(*pair) for pair in zip(x, y, strict=True)]

@@ -13,9 +13,8 @@ from pydrake.systems.analysis import Simulator
 
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS
 from tetra_drake.physics.friction import STICK
-from tetra_drake.physics.oscillator import NEURON_COLUMNS, U_RATE, V_RATE, U, V, neuron_rates
 from tetra_drake.robot.gait import Gait, load_gait
-from tetra_drake.robot.robot import Robot, initial_neurons
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems import CableNetwork, MatsuokaCpg, Steering
@@ -77,59 +76,8 @@ def test_initialize_takes_contact_and_stick_points_from_the_pose(scenario, heigh
         np.testing.assert_allclose(modes[:, 3:5], p_WN[:3, :2], atol=1e-15)
 
 
-@pytest.fixture
-def cpg(scenario: Scenario, robot: Robot, gait: Gait) -> MatsuokaCpg:
-    law = scenario.cpg
-    start, network = initial_neurons(law, 4), robot.network(gait)
-    return MatsuokaCpg(network, tonic=law.external_input, initial_state=start, gain=law.gain)
-
-
-def test_starts_at_the_values_of_table_4(cpg):
-    context = cpg.CreateDefaultContext()
-    state = context.get_continuous_state_vector().CopyToVector()
-    np.testing.assert_array_equal(state[:8], 0.3)
-    np.testing.assert_array_equal(state[8:], np.tile([0.1, 0.5], 4))
-    # Both neurons of each oscillator start alike, so its signal starts at zero.
-    np.testing.assert_array_equal(cpg.GetOutputPort("signals").Eval(context), np.zeros(4))
-
-
-@pytest.mark.parametrize("tonic", [None, np.linspace(0.3, 0.9, 8)], ids=["0.5", "its own"])
-@pytest.mark.parametrize("feedback", [None, np.linspace(-1.0, 1.0, 8)], ids=["none", "some"])
-def test_derivatives_are_the_laws_with_what_is_connected(robot, gait, cpg, feedback, tonic):
-    context = cpg.CreateDefaultContext()
-    state, neurons = np.random.default_rng(5).normal(size=16), np.zeros((8, NEURON_COLUMNS))
-    context.SetContinuousState(state)
-    if feedback is not None:
-        cpg.GetInputPort("feedback").FixValue(context, feedback)
-    if tonic is not None:
-        cpg.GetInputPort("tonic").FixValue(context, tonic)
-    inputs = (0.5 if tonic is None else tonic) + (np.zeros(8) if feedback is None else feedback)
-    neurons[:, U], neurons[:, V] = state[:8], state[8:]
-    neuron_rates(robot.network(gait), inputs, neurons)
-    expected = np.concatenate([neurons[:, U_RATE], neurons[:, V_RATE]])
-    np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
-
-
 def doubled(turn: np.ndarray) -> np.ndarray:
     return np.array([2.0 * turn, 0.0])
-
-
-@pytest.mark.parametrize(
-    ("turn", "port", "decides"),
-    [
-        (0.25, None, 0.25),
-        (lambda time: 0.1 * time, None, 0.3),
-        (lambda time: 0.1 * time, -0.5, -0.5),
-    ],
-    ids=["number", "function of time", "port"],
-)
-def test_the_port_decides_if_it_is_connected(turn, port, decides):
-    steering = Steering(doubled, turn=turn)
-    context = steering.CreateDefaultContext()
-    context.SetTime(3.0)
-    if port is not None:
-        steering.GetInputPort("turn").FixValue(context, [port])
-    assert steering.get_output_port().Eval(context) == pytest.approx([2.0 * decides, 0.0])
 
 
 @pytest.mark.parametrize("turn", [5.0, -1.1, math.nan])

@@ -1,4 +1,4 @@
-"""Watching a simulation in Meshcat: when what is shown, and that it changes nothing."""
+"""Watching a simulation in Meshcat: when what is shown."""
 
 import re
 import socket
@@ -6,7 +6,6 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-import xarray
 from helpers.meshcat_page import commands
 from pydrake.geometry import MeshcatParams
 
@@ -56,20 +55,14 @@ def visitor(meshcat):
 
 
 @pytest.mark.parametrize(("look", "slept"), [(0.0, 0.3), (1.0, 0.0)], ids=["fast", "slow"])
-def test_watching_changes_nothing_and_waits_for_real_time(
-    short, meshcat, visitor, look, slept, monkeypatch
-):
+def test_watching_waits_for_real_time(short, meshcat, visitor, look, slept, monkeypatch):
     time = FakeTime(look)
     monkeypatch.setattr("tetra_drake.visualization.live.time", time)
     view = LiveView(meshcat, short)
     while meshcat.GetNumActiveConnections() == 0:
         pass
-    gait = seeded_gait(short)
-    watched = simulate(scenario=short, gait=gait, record=True, viewer=view)
+    simulate(scenario=short, gait=seeded_gait(short), viewer=view)
     assert slept - 1.0 / FRAMES_PER_SECOND <= time.slept <= slept
-    alone = simulate(scenario=short, gait=gait, record=True)
-    assert (watched.metrics, watched.integrator) == (alone.metrics, alone.integrator)
-    xarray.testing.assert_identical(watched.trajectory, alone.trajectory)
 
 
 def test_shows_where_the_robot_is(short, meshcat, visitor, monkeypatch):

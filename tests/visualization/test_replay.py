@@ -91,14 +91,6 @@ def test_frames_are_evenly_spread_over_the_samples(samples, period, frames):
     assert frames == 1 or 1 <= steps.min() <= steps.max() <= steps.min() + 1
 
 
-def test_bodies_move_as_recorded(frames, film):
-    np.testing.assert_allclose(film["times"], frames["time"], rtol=0, atol=1e-5)
-    assert film["bodies"] == frames["body"].values.tolist()
-    poses = film["poses"].reshape(len(frames["time"]), -1, 7)
-    np.testing.assert_allclose(poses[..., :3], frames["p_WB"], rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(poses[..., 3:], frames["q_WB"], rtol=0, atol=ROUNDING)
-
-
 def test_nodes_sit_on_their_bodies(structure, film):
     names = [node["path"][-1].removeprefix("node ") for node in film["nodes"]]
     assert names == list(structure.node_names)

@@ -13,17 +13,8 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH
+from tetra_drake.visualization import scene
 from tetra_drake.visualization.replay import quiet_meshcat
-from tetra_drake.visualization.scene import (
-    COLOURS,
-    MOST_POINTS,
-    add_robot,
-    cable_paths,
-    drawn_radii,
-    floor_points,
-    place_robot,
-    set_surroundings,
-)
 
 UNEVEN = {
     "incline": Incline(slope=0.2),
@@ -39,10 +30,10 @@ def robot_on(terrain):
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
     robot = robot_on(terrain)
-    ground, radius = robot.ground, drawn_radii(robot.structure)[1].min()
+    ground, radius = robot.ground, scene.drawn_radii(robot.structure)[1].min()
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     points = make_walk().p_WN.values
-    set_surroundings(meshcat, robot, points, seen=points[0])
+    scene.set_surroundings(meshcat, robot, points, seen=points[0])
     page = meshcat.StaticHtml()
     objects = {c["path"]: c["object"] for c in commands(page, "/floor/") if "object" in c}
     assert "/floor/slab" not in objects
@@ -65,8 +56,8 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
 def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
     ground = robot_on(terrain).ground
     corners = np.array([[-6, -9], [60, 9]])
-    floor = floor_points(ground, corners)
-    assert floor.shape[0] * floor.shape[1] <= MOST_POINTS
+    floor = scene.floor_points(ground, corners)
+    assert floor.shape[0] * floor.shape[1] <= scene.MOST_POINTS
     inches = floor[:, 0, 0] / INCH
     assert set(range(-6, 61)) <= set(inches.round(9))  # the grid's lines lie on its edges
     middle = (floor[1:, :-1] + floor[:-1, :-1]) / 2
@@ -79,7 +70,7 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
 def test_bodies_of_any_structure_have_their_struts_and_nodes():
     structure = prism.make_prism().structure
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    add_robot(meshcat, structure)
+    scene.add_robot(meshcat, structure)
     page = meshcat.StaticHtml()
     shapes = {c["path"]: c["object"]["geometries"][0] for c in commands(page, "set_object")}
     moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands(page, "set_transform")}
@@ -89,7 +80,7 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
         along = (ends[1] - ends[0]) / shapes[path]["height"]
         np.testing.assert_allclose(moved[path][:3, 2], along, rtol=0, atol=1e-12)
         np.testing.assert_allclose(moved[path][:3, 3], ends.mean(axis=0), rtol=0, atol=1e-12)
-    radii = drawn_radii(structure)[1]
+    radii = scene.drawn_radii(structure)[1]
     assert (radii >= prism.RADII).all()
     for name, radius, p_BN in zip(prism.NODES, radii, structure.p_BN, strict=True):
         (path,) = (path for path in shapes if path.endswith(f"/node {name}"))
@@ -102,12 +93,12 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
 def test_a_sample_places_bodies_and_cables_and_colours_feet():
     walk = make_walk().isel(time=[50])  # T1 is lifted, T2 stands
     robot, meshcat = make_row(), quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    add_robot(meshcat, robot.structure)
-    place_robot(meshcat, robot.structure, walk, per_newton=1e-4)
+    scene.add_robot(meshcat, robot.structure)
+    scene.place_robot(meshcat, robot.structure, walk, per_newton=1e-4)
     page = meshcat.StaticHtml()
     moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands(page, "set_transform")}
     np.testing.assert_array_equal(moved["/robot/T3"][:3, 3], walk.p_WB.values[0, 2])
-    for path, cable in zip(cable_paths(robot.structure), robot.structure.cables, strict=True):
+    for path, cable in zip(scene.cable_paths(robot.structure), robot.structure.cables, strict=True):
         start, end = walk.p_WN.values[0, [cable["node_a"], cable["node_b"]]]
         matrix = moved[path]
         np.testing.assert_allclose(matrix[:3, 3] - matrix[:3, 2] / 2, start, rtol=0, atol=1e-12)
@@ -117,4 +108,4 @@ def test_a_sample_places_bodies_and_cables_and_colours_feet():
     }
     lifted, stands = (colours[f"/robot/{body}/node {body} bottom_left"] for body in ("T1", "T2"))
     assert lifted != stands
-    assert stands[:3] == pytest.approx(hex2color(COLOURS["stance"]))
+    assert stands[:3] == pytest.approx(hex2color(scene.COLOURS["stance"]))

@@ -13,7 +13,6 @@ from helpers.widths import WIDTHS
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.compiled.loop import ROUND
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
@@ -221,18 +220,6 @@ def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
             pool.submit([(endless, gait)], time_budget=0.05)[0].result()
         found = pool.submit([(short, gait)])[0].result()
     assert found.metrics == simulate(scenario=short, gait=gait).metrics
-
-
-@pytest.mark.parametrize(("tetrahedra", "rounds"), [(2, 10), (5, 4), (200, 1)])
-def test_large_robots_make_fewer_steps_between_looks_at_the_time(
-    short, monkeypatch, tetrahedra, rounds
-):
-    scenario = short.with_changes({"robot.tetrahedra": tetrahedra})
-    engine = LaneEngine(prepared(scenario), width=1)
-    asked = []
-    monkeypatch.setattr(engine, "_advance", lambda *arguments: asked.append(arguments[-1]))
-    assert engine.advance(20 * ROUND) == []
-    assert asked == [rounds]
 
 
 def test_an_error_of_the_engine_reaches_those_who_wait(short, monkeypatch):
