@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import itertools
 import multiprocessing
 import os
 import pickle
@@ -99,30 +98,8 @@ class InLanes:
         self._lanes.__exit__(*error)
 
     def submit(self, task: Task) -> Future[Evaluation]:
-        """See Evaluator.submit(). All draws of a task are simulated side by side."""
-        evaluate, evaluated, ended = self._evaluate, Future[Evaluation](), itertools.count(1)
-        simulations = evaluate.simulations(task)
-        results = self._lanes.submit(
-            simulations,
-            record=evaluate.records,
-            time_budget=evaluate.scenario.evolution.time_budget,
-        )
-
-        def end(_: object) -> None:
-            if next(ended) < len(results):
-                return
-            try:
-                draws = [
-                    evaluate.judged(scenario, result.result)
-                    for (scenario, _), result in zip(simulations, results, strict=True)
-                ]
-                evaluated.set_result(evaluate.combined(task, draws))
-            except BaseException as error:
-                evaluated.set_exception(error)
-
-        for result in results:
-            result.add_done_callback(end)
-        return evaluated
+        """See Evaluator.submit()."""
+        return self._evaluate.in_lanes(task, self._lanes)
 
 
 class InProcesses:
@@ -266,13 +243,18 @@ class Evaluations:
             task = self._waiting.popleft()
             self._running[self._evaluator.submit(task)] = task
         done, _ = futures.wait(self._running, timeout, return_when=futures.FIRST_COMPLETED)
-        evaluated = []
+        evaluated, failed = [], None
         for future in done:
-            task = self._running.pop(future)
             try:
-                evaluated.append((task, _result(future)))
+                evaluated.append((self._running[future], _result(future)))
             except BrokenExecutor:
-                self._died.append(task)
+                self._died.append(self._running[future])
+            except Exception:
+                failed = future
+                continue
+            del self._running[future]
+        if failed is not None and not evaluated:
+            _result(failed)  # raises its error, but only after all finished tasks were returned
         return evaluated
 
     def _tried_alone(self, task: Task) -> tuple[Task, Evaluation]:
