@@ -27,7 +27,7 @@ _TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robu
 _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
     "kept": "draws that cost at most a tenth"
 }
-"""Notes on numbers that are no metrics."""
+"""Notes on numbers, by name."""
 
 _NOTHING = 5e-4
 """Threshold for a row of a table: a row is left out if all its numbers, as shown, are smaller."""

@@ -41,7 +41,7 @@ def compute_metrics(
         followed=followed[:, 0],
         right_foot=followed[:, 1 if is_row else 0],
         tip=nodes[:, structure.p_WN[:, 0].argmax()],
-        centre=nodes.mean(axis=1) if is_row else followed[:, 0],  # of a row as recorded
+        centre=nodes.mean(axis=1) if is_row else followed[:, 0],  # for a row, the mean of all nodes
         path=path.centre[np.searchsorted(path.times, steady_from) :, :2],
         heading=path.heading,
         signals=signals,
