@@ -28,9 +28,9 @@ from tetra_drake.evolution.entries import (
     ITERATIONS,
     REEVALUATIONS,
     RecordFile,
+    compressed,
     trial_folder,
 )
-from tetra_drake.evolution.json_lines import compressed
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.reevaluation import BEST_GAITS
 from tetra_drake.evolution.run import Run, load_run

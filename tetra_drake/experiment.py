@@ -158,7 +158,7 @@ def _simulate_again(
 @contextlib.contextmanager
 def _completing(progress: Progress, failing: str) -> Iterator[None]:
     """Context manager for optional work at the end of a run: an error becomes a warning. `failing`
-    is the begin of the warning."""
+    is the beginning of the warning."""
     try:
         yield
     except Exception as error:

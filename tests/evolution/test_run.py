@@ -11,7 +11,6 @@ from helpers.synthetic_run import write_run
 from thinning import last_population
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import load_gait
@@ -74,9 +73,11 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused)
     assert packed.evaluations.equals(plain.evaluations)
     assert packed.iterations.equals(plain.iterations)
     path = run / "trial_00" / "iterations.jsonl"
-    entries = read_lines(path)
-    append_lines(path, [{"more": 1}])
-    assert read_lines(path) == [*entries, {"more": 1}]
+    file = plain.file(path.name, trial=0)
+    entries = file.read()
+    more = {"iteration": len(entries)}
+    file.append([more])
+    assert file.read() == [*entries, more]
     path.with_name("iterations.jsonl.xz").write_bytes(b"no xz")
     with refused(f"{path}.xz", "", ""):
         load_run(run)

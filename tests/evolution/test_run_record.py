@@ -12,8 +12,7 @@ import pytest
 from helpers.analytic import read_record, small_scenario
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import evaluation_entry
-from tetra_drake.evolution.json_lines import json_line
+from tetra_drake.evolution.entries import json_line
 from tetra_drake.evolution.manifest import Method, read_manifest
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
@@ -286,12 +285,11 @@ def test_a_run_is_replaced_when_the_first_line_of_the_new_one_is_written(run_sma
     run = run_small()
     (run / "report.html").touch()
     before = read_record(run)
-    line = evaluation_entry(Task(np.ones(26)), Evaluation(1.0))
     with RunRecord.create(run, scenario=small_scenario(), seed=6, overwrite=True) as record:
         trial = TrialRecord(record, 0)
         assert trial.recall(0, np.zeros(26)) is None
         assert read_record(run) == before
-        trial.keep(line)
+        trial.keep(Task(np.ones(26)), Evaluation(1.0))
     assert sorted(read_record(run)) == [
         *(".lock", "manifest.json", "scenario.yaml", "trial_00/in_progress.jsonl")
     ]
@@ -319,7 +317,7 @@ def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, 
     failed = Evaluation(-math.inf, {}, "why", 1.25)
     path = tmp_path / "trial_00" / "in_progress.jsonl"
     with create(tmp_path) as run:
-        TrialRecord(run, 0).keep(evaluation_entry(Task(genome, index=3, iteration=1), failed))
+        TrialRecord(run, 0).keep(Task(genome, index=3, iteration=1), failed)
         with path.open("a") as file:
             file.write('{"index": 4, "torn')
         record = TrialRecord(run, 0)

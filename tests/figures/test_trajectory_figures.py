@@ -296,13 +296,13 @@ def carried():
     return result_of(robot, prism.slide_prism(robot))
 
 
-def test_a_legend_names_bars_and_the_ends_of_a_row_are_named_where_they_are(carried, walk):
+def test_a_legend_names_bodies_and_the_ends_of_a_row_are_named_in_its_step(carried, walk):
     figure = time_lapse(carried)
     [legend] = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["n0 n4", "n1 n5", "n2 n3"]
     shown = [to_hex(line.get_color()) for line in legend.get_lines()]
     assert shown == struts(pictures(figure)[0])[1].ravel().tolist()
-    first, last = pictures(time_lapse(row(walk)))[0].texts
+    first, last = pictures(one_step(row(walk), time=(0.0, 1.0)))[0].texts
     assert (first.get_text(), last.get_text()) == ("T1", "T5")
     middle = walk.p_WN.sel(axis=["x", "y"])[0].values.reshape(5, 4, 2).mean(axis=1) / INCH
     np.testing.assert_allclose([first.get_position(), last.get_position()], middle[[0, -1]])

@@ -65,10 +65,12 @@ def unit_inertias(structure: Structure) -> np.ndarray:
 def joined_nodes(given: robot_structure.StructureFile) -> dict[str, np.ndarray]:
     """The nodes of a structure file and what joins them, as statics takes them."""
     number = {node: place for place, node in enumerate(given.nodes)}
+    held = [[axis in given.anchors.get(node, "") for axis in "xyz"] for node in given.nodes]
     return {
         "p_WN": np.array(list(given.nodes.values())),
         "body_of_node": np.array([given.body_of_node[node] for node in given.nodes]),
         "cable_ends": np.array([[number[n] for n in cable.nodes] for cable in given.all_cables]),
+        "held": np.array(held),
     }
 
 

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.entries import evaluation_entry
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers.base import Evaluation, Task
@@ -50,27 +50,26 @@ def write_run(
         record.begin()
         for number, iterations in enumerate(trials):
             trial = TrialRecord(record, number)
-            entries, population = [], {}
+            made, population = [], {}
             for iteration, children in enumerate(iterations):
-                begin = len(entries)
+                begin = len(made)
                 for fitness, placed in children:
-                    entry = _entry(len(entries), iteration, fitness, scenario)
-                    entry["metrics"] |= (metrics or {}).get(fitness, {})
-                    entries.append(entry | {"placed": placed})
+                    task, evaluation = _result(len(made), iteration, fitness, scenario)
+                    more = (metrics or {}).get(fitness, {})
+                    made.append((task, replace(evaluation, metrics={**evaluation.metrics, **more})))
                     population |= {} if placed is None else {placed: fitness}
                 finite = [fitness for fitness in population.values() if fitness is not None]
-                given = [entry for entry in entries if entry["fitness"] is not None]
-                best = max(given, key=lambda entry: entry["fitness"], default={})
+                task, best = max(made, key=lambda result: result[1].fitness)
                 ends = iteration == len(iterations) - 1 and number not in unfinished
                 line = {
                     "iteration": iteration,
-                    "evaluations": len(entries),
+                    "evaluations": len(made),
                     "mean_fitness": sum(finite) / len(finite) if finite else None,
-                    "best_fitness": best.get("fitness"),
-                    "best_evaluation": best.get("index"),
+                    "best_fitness": None if best.failure else best.fitness,
+                    "best_evaluation": None if best.failure else task.index,
                     "stop": "all evaluations done" if ends else None,
                 }
-                trial.complete(entries[begin:], line)
+                trial.complete(made[begin:], line, placed=[placed for _, placed in children])
     return directory
 
 
@@ -92,7 +91,7 @@ def write_map(directory: Path, kept: Mapping[int, float]) -> Path:
     return directory
 
 
-def _entry(index, iteration, fitness, scenario):
+def _result(index, iteration, fitness, scenario):
     seed = index if fitness is None else abs(hash(fitness)) % 2**32
     genome = ParameterSpace.of(scenario).random(np.random.default_rng(seed))
     evaluation = Evaluation(-math.inf, failure="fell over", wall_time=0.5)
@@ -101,5 +100,4 @@ def _entry(index, iteration, fitness, scenario):
         inches |= {"twist": 0.0, "lateral_drift": 0.0}
         metrics = {name: value * INCH for name, value in inches.items()}
         evaluation = Evaluation(fitness, metrics, wall_time=0.5)
-    task = Task(genome, index=index, iteration=iteration)
-    return evaluation_entry(task, evaluation)
+    return Task(genome, index=index, iteration=iteration), evaluation

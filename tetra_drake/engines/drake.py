@@ -124,8 +124,8 @@ class _Work:
         self._before = (0, 0, 0)
 
     def total(self) -> tuple[int, int, int]:
-        """Numbers of steps, of derivative evaluations, and of derivative evaluations for
-        Jacobians."""
+        """Numbers of steps, derivative evaluations, and derivative evaluations for Jacobians, in
+        the whole simulation."""
         statistics = dict(self._integrator.GetStatisticsSummary())
         for_jacobian = int(statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0))
         steps, _, jacobian = self._before
@@ -136,11 +136,12 @@ class _Work:
         )
 
     def derivative_evaluations(self) -> int:
-        """Number of derivative evaluations."""
+        """Number of derivative evaluations of the whole simulation."""
         return self._before[1] + self._integrator.get_num_derivative_evaluations()
 
     def keep(self) -> None:
-        """Adds the work so far. Call it before the integrator is initialised again."""
+        """Adds the integrator's work so far to the counter. Call it before the integrator is
+        initialised again."""
         self._before = self.total()
 
 

@@ -8,25 +8,40 @@ trial_00/
   reevaluations.jsonl     gaits evaluated once more on the Drake diagram
 elites.jsonl              the map's gaits on disturbed robots (only with !QualityDiversity)
 
-Each line begins with the name of its run, and in a trial's folder with the number of the trial.
+Each line begins with the name of its run, and in a trial's folder with the number of the trial. It
+ends with a checksum, so that damaged lines are found. Lines are only appended, so that a file
+survives a kill at any moment. NAME.xz holds the earlier lines of NAME, compressed by `xz`, which
+has its own checksums.
 """
 
 from __future__ import annotations
 
+import json
+import lzma
 import math
+import os
+import re
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.json_lines import REMEDY, append_lines, read_lines, repair_torn_line
 from tetra_drake.files import json_number, make_folder
 from tetra_drake.optimizers.base import Evaluation, Task
 
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
+
+REMEDY = (
+    "cut this line and those after it off the file, and `tetra-drake evolve --resume` makes good "
+    "what is missing"
+)
+
+_CHECKSUM = re.compile(rb'(.*), "crc": "([0-9a-f]{8})"\}')
+"""Pattern of a line: its content, then the CRC-32 of the content in hexadecimal digits."""
 
 _COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
 """Key of the number of a line, by file name."""
@@ -71,7 +86,8 @@ def recorded_evaluation(entry: Mapping[str, Any]) -> Evaluation:
 
 @dataclass(frozen=True)
 class RecordFile:
-    """A JSON-lines file of a run. Each line names its run, so foreign lines are found."""
+    """An append-only file of JSON objects, one per line. Each line names its run, so foreign lines
+    are found."""
 
     path: Path
     owner: Mapping[str, Any]
@@ -85,12 +101,19 @@ class RecordFile:
         return cls(trial_folder(directory, trial) / name, {"run": run, "trial": trial})
 
     def read(self) -> list[dict[str, Any]]:
-        """The content of all complete lines, without the keys of `owner`.
+        """The content of all complete lines, compressed or not, without the keys of `owner`. Empty
+        if there is no file.
 
         Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
         to another run or trial.
         """
-        entries = read_lines(self.path)
+        packed = compressed(self.path)
+        try:
+            earlier = lzma.decompress(_read(packed)) if packed.exists() else b""
+        except lzma.LZMAError as error:
+            raise InputError(packed, "", f"cannot be read: {error}") from error
+        entries = _parse(earlier, packed, checksums=False)
+        entries += _parse(_read(self.path), self.path, checksums=True)
         counter = _COUNTERS.get(self.path.name)
         for row, entry in enumerate(entries):
             for key, ours in self.owner.items():
@@ -111,14 +134,62 @@ class RecordFile:
             seen.add(values)
 
     def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
-        """Appends lines; creates the folder if it is missing."""
+        """Appends lines; creates the folder if it is missing. On return the operating system has
+        the lines. A kill during the call damages at most the last line."""
         make_folder(self.path.parent)
-        append_lines(self.path, [{**self.owner, **entry} for entry in entries])
+        text = "".join(json_line({**self.owner, **entry}) for entry in entries)
+        try:
+            with self.path.open("ab") as file:
+                file.write(text.encode())
+        except OSError as error:
+            raise InputError(self.path, "", f"cannot be written: {error.strerror}") from error
 
     def repair(self) -> None:
         """Cuts off an incomplete last line."""
-        repair_torn_line(self.path)
+        content = _read(self.path)
+        if not content or content.endswith(b"\n"):
+            return
+        try:
+            os.truncate(self.path, content.rfind(b"\n") + 1)
+        except OSError as error:
+            raise InputError(self.path, "", f"cannot be written: {error.strerror}") from error
 
     def refuse(self, row: int, problem: str) -> NoReturn:
         """Raises InputError about the line with this number, counted from 0."""
         raise InputError(self.path, f"line {row + 1}", problem)
+
+
+def compressed(path: Path) -> Path:
+    """Path of the compressed file with the lines that precede the lines of `path`."""
+    return path.with_name(path.name + ".xz")
+
+
+def json_line(entry: Mapping[str, Any]) -> str:
+    """An entry as a line of text with a checksum."""
+    text = json.dumps(entry, allow_nan=False).removesuffix("}")
+    return f'{text}, "crc": "{zlib.crc32(text.encode()):08x}"}}\n'
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return b""
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from error
+
+
+def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any]]:
+    """The entries of a file's complete lines. With `checksums`, each line must have a checksum."""
+    entries = []
+    for number, line in enumerate(content.split(b"\n")[:-1], start=1):
+        problem = ""
+        match = _CHECKSUM.fullmatch(line)
+        if match is None and checksums:
+            problem = "it has no checksum"
+        if match is not None and zlib.crc32(match[1]) != int(match[2], 16):
+            problem = "its checksum does not match its content"
+        if problem:
+            raise InputError(file, f"line {number}", f"is damaged: {problem}; {REMEDY}")
+        entries.append(json.loads(line if match is None else match[1] + b"}"))
+    return entries

@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
@@ -26,6 +29,9 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
 from tetra_drake.scenario.scenario import Scenario
+
+if TYPE_CHECKING:
+    from tetra_drake.engines.compiled.lane_pool import LanePool
 
 Objective = Callable[[SimulationResult], float]
 """Function of a result that evolution maximises; -inf or NaN is a failure. A function that reads
@@ -51,28 +57,51 @@ class GaitEvaluation:
         after another; the first draw without metrics ends the evaluation."""
         started = time.perf_counter()
         draws = []
-        for scenario, gait in self.simulations(task):
-            draws.append(self.judged(scenario, functools.partial(self._simulate, scenario, gait)))
+        for scenario, gait in self._simulations(task):
+            draws.append(self._judged(scenario, functools.partial(self._simulate, scenario, gait)))
             if not draws[-1].metrics:
                 break
         wall_time = time.perf_counter() - started
-        return dataclasses.replace(self.combined(task, draws), wall_time=wall_time)
+        return dataclasses.replace(self._combined(task, draws), wall_time=wall_time)
+
+    def in_lanes(self, task: Task, lanes: LanePool) -> Future[Evaluation]:
+        """Future of the evaluation of a vector. All draws are simulated side by side."""
+        simulations, ended = self._simulations(task), itertools.count(1)
+        time_budget = self.scenario.evolution.time_budget
+        results = lanes.submit(simulations, record=self._records, time_budget=time_budget)
+        evaluated = Future[Evaluation]()
+
+        def end(_: object) -> None:
+            if next(ended) < len(results):
+                return
+            try:
+                draws = [
+                    self._judged(scenario, result.result)
+                    for (scenario, _), result in zip(simulations, results, strict=True)
+                ]
+                evaluated.set_result(self._combined(task, draws))
+            except BaseException as error:
+                evaluated.set_exception(error)
+
+        for result in results:
+            result.add_done_callback(end)
+        return evaluated
 
     def __reduce__(self) -> tuple[object, ...]:
         return GaitEvaluation, (self.scenario, self.objective)  # without the caches
 
     @property
-    def records(self) -> bool:
+    def _records(self) -> bool:
         """True if the objective needs the trajectory of each simulation."""
         return bool(getattr(self.objective, "needs_trajectory", False))
 
-    def simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
+    def _simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
         """Scenario and gait of each simulation of a task: one, or one per draw."""
         gait = self._space.gait(task.vector, name=str(task))
         scenarios = [self.scenario] if task.seed is None else self._draws(task.seed)
         return [(scenario, gait) for scenario in scenarios]
 
-    def judged(self, scenario: Scenario, simulation: Callable[[], SimulationResult]) -> Evaluation:
+    def _judged(self, scenario: Scenario, simulation: Callable[[], SimulationResult]) -> Evaluation:
         """Runs one simulation and evaluates its result; failures become failed evaluations."""
         try:
             result = simulation()
@@ -93,7 +122,7 @@ class GaitEvaluation:
             return Evaluation(-math.inf, metrics, reason, wall_time)
         return Evaluation(fitness, metrics, wall_time=wall_time)
 
-    def combined(self, task: Task, draws: Sequence[Evaluation]) -> Evaluation:
+    def _combined(self, task: Task, draws: Sequence[Evaluation]) -> Evaluation:
         """Combines the evaluations of a task's simulations into one."""
         settings, evaluation = self.scenario.disturbances, draws[0]
         if settings is not None and task.seed is not None:
@@ -114,7 +143,7 @@ class GaitEvaluation:
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
         with time_limit(self.scenario.evolution.time_budget):
-            return simulate(scenario=scenario, gait=gait, record=self.records)
+            return simulate(scenario=scenario, gait=gait, record=self._records)
 
     def _fitness(self, result: SimulationResult) -> float:
         if self.objective is None:

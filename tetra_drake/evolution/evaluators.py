@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import itertools
 import multiprocessing
 import os
 import pickle
@@ -21,10 +20,9 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from multiprocessing import resource_tracker
-from multiprocessing.connection import wait as wait_for_any
-from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Protocol, Self
 
 from tetra_drake.errors import InputError
@@ -100,148 +98,88 @@ class InLanes:
         self._lanes.__exit__(*error)
 
     def submit(self, task: Task) -> Future[Evaluation]:
-        """See Evaluator.submit(). All draws of a task are simulated side by side."""
-        evaluate, evaluated, ended = self._evaluate, Future[Evaluation](), itertools.count(1)
-        simulations = evaluate.simulations(task)
-        results = self._lanes.submit(
-            simulations,
-            record=evaluate.records,
-            time_budget=evaluate.scenario.evolution.time_budget,
-        )
-
-        def end(_: object) -> None:
-            if next(ended) < len(results):
-                return
-            try:
-                draws = [
-                    evaluate.judged(scenario, result.result)
-                    for (scenario, _), result in zip(simulations, results, strict=True)
-                ]
-                evaluated.set_result(evaluate.combined(task, draws))
-            except BaseException as error:
-                evaluated.set_exception(error)
-
-        for result in results:
-            result.add_done_callback(end)
-        return evaluated
+        """See Evaluator.submit()."""
+        return self._evaluate.in_lanes(task, self._lanes)
 
 
 class InProcesses:
-    """Evaluates in worker processes. They are spawned, not forked, and end with this process."""
+    """Evaluates in worker processes. They are spawned, not forked, and end with this process.
+
+    Each worker process has its own executor, because all processes of one executor die together.
+    """
 
     def __init__(self, evaluate: Evaluate, workers: int) -> None:
+        self._evaluate = evaluate
         self._threads = futures.ThreadPoolExecutor(workers)
-        self._workers = [_Worker(evaluate) for _ in range(workers)]
-        self._idle = deque(self._workers)
+        self._idle: deque[Executor] = deque()
+        self._lifeline, self._holder = multiprocessing.Pipe(duplex=False)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
-        for worker in self._workers if kind is not None else ():
-            worker.kill()
+        if kind is not None:
+            self._holder.close()
         self._threads.shutdown()
-        for worker in self._workers:
-            worker.end()
+        for executor in self._idle:
+            executor.shutdown()
+        self._holder.close()
+        self._lifeline.close()
 
     def submit(self, task: Task) -> Future[Evaluation]:
         """See Evaluator.submit()."""
-        return self._threads.submit(self._in_process, task)
+        with deaf_to_ctrl_c():
+            return self._threads.submit(self._in_process, task)
 
     def _in_process(self, task: Task) -> Evaluation:
-        worker = self._idle.pop()  # never empty: there are as many workers as threads
+        executor = self._idle.pop() if self._idle else self._started()
+        evaluation = executor.submit(self._evaluate, task).result()
+        self._idle.append(executor)  # unless its process has died
+        return evaluation
+
+    def _started(self) -> Executor:
+        """A new executor with one process, which has loaded the evaluation."""
+        executor = futures.ProcessPoolExecutor(
+            max_workers=1,
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_end_with,
+            initargs=(self._lifeline,),
+            max_tasks_per_child=TASKS_PER_WORKER,
+        )
         try:
-            return worker.evaluate(task)
-        finally:
-            self._idle.append(worker)
-
-
-class _Worker:
-    """A worker process. It is replaced if it dies, and after TASKS_PER_WORKER tasks.
-
-    Each worker has its own executor, because all processes of one executor die together.
-    """
-
-    def __init__(self, evaluate: Evaluate) -> None:
-        self._evaluate = evaluate
-        self._executor: Executor | None = None
-        self._process, self._tasks_left, self._killed = 0, 0, False
-
-    def evaluate(self, task: Task) -> Evaluation:
-        """Evaluates a task; raises BrokenExecutor if the process dies."""
-        if self._executor is None or self._tasks_left == 0:
-            self.end()
-            self._executor = self._start()
-        self._tasks_left -= 1
-        try:
-            return self._executor.submit(self._evaluate, task).result()
-        except BrokenExecutor:
-            self._tasks_left = 0
-            raise
-
-    def _start(self) -> Executor:
-        executor = futures.ProcessPoolExecutor(1, _Context(), initializer=_end_with_parent)
-        try:
-            self._process = executor.submit(_load, self._evaluate).result()
+            executor.submit(_load, self._evaluate).result()
         except BrokenExecutor as error:
             problem = f"do not start, as they say above; it may be that {_UNGUARDED}"
             raise InputError(_SOURCE, "", problem) from error
-        self._tasks_left = TASKS_PER_WORKER
-        if self._killed:
-            executor.shutdown()
-            raise CancelledError
         return executor
 
-    def end(self) -> None:
-        """Ends the process when its task is done."""
-        if self._executor is not None:
-            self._executor.shutdown()
 
-    def kill(self) -> None:
-        """Ends the process at once. It is not replaced."""
-        self._killed = True
-        for process in multiprocessing.active_children():
-            if process.pid == self._process:
-                process.terminate()
+def _end_with(lifeline: Connection) -> None:
+    """Ends this worker process when the other end of the pipe is closed, at the latest by the end
+    of the parent process."""
 
+    def watch() -> None:
+        lifeline.poll(None)
+        os._exit(1)
 
-def _load(evaluate: Evaluate) -> int:
-    """First task of a worker process: loads the function and returns the process id."""
-    return os.getpid()
+    threading.Thread(target=watch, daemon=True).start()
 
 
-class _DeafProcess(SpawnProcess):
-    """A process that ignores Ctrl-C at the terminal, even while it starts."""
-
-    def start(self) -> None:
-        with deaf_to_ctrl_c():
-            super().start()
-
-
-class _Context(SpawnContext):
-    Process = _DeafProcess
+def _load(evaluate: Evaluate) -> None:
+    """First task of a worker process. It does nothing, but the function is loaded for it."""
 
 
 @contextlib.contextmanager
 def deaf_to_ctrl_c() -> Iterator[None]:
-    """Context manager: threads and processes that start in the block never receive Ctrl-C."""
+    """Context manager: threads that start in the block never receive Ctrl-C, nor do processes that
+    start in the block or in these threads."""
     resource_tracker.ensure_running()  # its start would unblock signals, so it starts before
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _end_with_parent() -> None:
-    """Ends this worker process when its parent ends. Otherwise it would wait for work for ever."""
-
-    def watch() -> None:
-        wait_for_any([multiprocessing.parent_process().sentinel])  # type: ignore[union-attr]
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 class OnExecutor:
@@ -300,7 +238,7 @@ class Evaluations:
         """Finished tasks and their evaluations. Returns when at least one is finished, or after
         `timeout` seconds."""
         if self._died and not self._running:
-            return [self._try_alone(self._died.popleft())]
+            return [self._tried_alone(self._died.popleft())]
         while self._waiting and not self._died:
             task = self._waiting.popleft()
             self._running[self._evaluator.submit(task)] = task
@@ -309,7 +247,7 @@ class Evaluations:
         for future in done:
             try:
                 evaluated.append((self._running[future], _result(future)))
-            except _WorkerDied:
+            except BrokenExecutor:
                 self._died.append(self._running[future])
             except Exception:
                 failed = future
@@ -319,10 +257,10 @@ class Evaluations:
             _result(failed)  # raises its error, but only after all finished tasks were returned
         return evaluated
 
-    def _try_alone(self, task: Task) -> tuple[Task, Evaluation]:
+    def _tried_alone(self, task: Task) -> tuple[Task, Evaluation]:
         try:
             return task, _result(self._evaluator.submit(task))
-        except _WorkerDied as error:
+        except BrokenExecutor as error:
             problem = (
                 "its worker died, and once more when nothing else ran, as if memory is short; it "
                 "is not recorded, and the run can be resumed"
@@ -330,21 +268,17 @@ class Evaluations:
             raise InputError(task, "", problem) from error
 
 
-class _WorkerDied(Exception):
-    pass
-
-
 def _result(future: Future[Evaluation]) -> Evaluation:
-    """The result of a future. The death of a worker is _WorkerDied for every executor."""
+    """The result of a future. The death of a worker is BrokenExecutor for every executor."""
     try:
         return future.result()
-    except CancelledError as error:
+    except futures.CancelledError as error:
         problem = "has dropped evaluations, as if its scheduler had ended; the run can be resumed"
         raise InputError("executor", "", problem) from error
     except Exception as error:
         dask = sys.modules.get("distributed")
-        if isinstance(error, BrokenExecutor) or (dask and isinstance(error, dask.KilledWorker)):
-            raise _WorkerDied from error
+        if dask and isinstance(error, dask.KilledWorker):
+            raise BrokenExecutor from error
         raise
 
 

@@ -16,9 +16,9 @@ from tetra_drake.evolution.entries import (
     EVALUATIONS,
     ITERATIONS,
     REEVALUATIONS,
+    REMEDY,
     RecordFile,
 )
-from tetra_drake.evolution.json_lines import REMEDY
 from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path

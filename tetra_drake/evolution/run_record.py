@@ -15,7 +15,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -26,6 +26,7 @@ from tetra_drake.evolution.entries import (
     IN_PROGRESS,
     ITERATIONS,
     RecordFile,
+    evaluation_entry,
     recorded_evaluation,
     trial_folder,
 )
@@ -37,7 +38,7 @@ from tetra_drake.evolution.manifest import (
     write_manifest,
 )
 from tetra_drake.files import check_folder, make_folder
-from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.height_files import RECORDED
 from tetra_drake.scenario.load import SCENARIO
@@ -169,12 +170,23 @@ class TrialRecord:
             self._files[name].refuse(row, _NOT_REPEATED.format("the genome"))
         return recorded_evaluation(entry)
 
-    def keep(self, entry: dict[str, Any]) -> None:
+    def keep(self, task: Task, evaluation: Evaluation) -> None:
         """Saves an evaluation of an incomplete iteration."""
-        self._append(IN_PROGRESS, [entry])
+        self._append(IN_PROGRESS, [evaluation_entry(task, evaluation)])
 
-    def complete(self, evaluations: _Lines, iteration: dict[str, Any]) -> None:
-        """Writes the lines of an iteration; lines that are recorded already are checked."""
+    def complete(
+        self,
+        results: Iterable[tuple[Task, Evaluation]],
+        iteration: dict[str, Any],
+        *,
+        placed: Sequence[int | None] | None,
+    ) -> None:
+        """Writes the lines of an iteration; lines that are recorded already are checked. For
+        `placed` see optimizers.base.Iteration."""
+        evaluations = [evaluation_entry(*result) for result in results]
+        if placed is not None:
+            for entry, member in zip(evaluations, placed, strict=True):
+                entry["placed"] = member
         # The order matters: after a kill in between, a resumed run completes the files.
         self._write(EVALUATIONS, evaluations, first=evaluations[0]["index"])
         self._write(ITERATIONS, [iteration], first=iteration["iteration"])

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import evaluation_entry
 from tetra_drake.evolution.evaluators import Evaluations, Evaluator, evaluate_all
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
@@ -86,7 +85,7 @@ class Trial:
         del self.unevaluated[task.index]
         self._add(task, evaluation)
         if self.unevaluated:
-            self._record.keep(evaluation_entry(task, evaluation))
+            self._record.keep(task, evaluation)
             return False
         self._complete()
         self._advance()
@@ -134,10 +133,6 @@ class Trial:
         for task, evaluation in results:
             if evaluation.fitness > (self._best[1].fitness if self._best else -math.inf):
                 self._best = task, evaluation
-        entries = [evaluation_entry(*result) for result in results]
-        if outcome.placed is not None:
-            for entry, member in zip(entries, outcome.placed, strict=True):
-                entry["placed"] = member
         status = self.status
         all_done = status.evaluations == status.evaluations_at_most
         best_fitness, best_evaluation, distance = None, None, math.nan
@@ -153,7 +148,7 @@ class Trial:
             "stop": ALL_DONE if all_done else outcome.stop,
             **outcome.report,
         }
-        self._record.complete(entries, line)
+        self._record.complete(results, line, placed=outcome.placed)
         status.complete(line, best_distance_in=distance / INCH)
 
     def _save_best(self) -> None:

@@ -184,7 +184,7 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, u
 def _mark_cycles(
     panels: Iterable[Axes], times: np.ndarray, cycle: tuple[float, float] | None
 ) -> None:
-    """Draws a line at the begin of each cycle."""
+    """Draws a line at the beginning of each cycle."""
     if cycle is None:
         return
     start, end = cycle

@@ -144,9 +144,7 @@ def time_lapse(
         way = signed(float(walked.sel(time=now)), unit.digits)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
-    if structure.points_ahead:
-        _name_ends(panels[0], nodes[samples[0]], structure)
-    elif len(looks) <= len(LINE_COLOURS):
+    if len(looks) <= len(LINE_COLOURS):
         legend_below(page, dict(zip(structure.bodies, looks, strict=True)))
     set_title(page, "Time lapse from above: time and distance walked")
     return page
@@ -226,10 +224,10 @@ def one_step(
     wide, above, side = (_range(v, unit) for v in (nodes[..., X], nodes[..., Y], heights))
     shifts = {Y: 0.0, Z: above[0] - side[1]}  # of each view along the page
     high = side[0] + shifts[Z], above[1]
-    columns, height = _fit(instants, wide, high, figure, height_in=3.6)
+    columns, height = _fit(instants, wide, high, figure, height_in=5.5)
     names = structure.bodies if structure.markers.size else (structure.followed,)
     paths_height = 1.1 * math.ceil(len(names) / _PATHS) + 0.4
-    parts = [min(height + 0.4, 3.0 * paths_height), paths_height]
+    parts = [min(height + 0.4, 5.0 * paths_height), paths_height]
     page = page_of(figure, height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
     panels = panels_in_columns(upper, instants, columns, x_label=f"x ({unit.length_name})")

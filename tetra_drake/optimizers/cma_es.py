@@ -48,7 +48,7 @@ class CmaEs(Generational[kinds.CmaEs]):
         affordable = max(1, self.evolution.evaluations // (2 * TRYOUT))
         self._starts = min(self.settings.starts, affordable)
         self._searches: list[_Search] = []
-        """Empty during the sample."""
+        """The searches. Empty until the random sample is evaluated."""
         if not self.settings.sample:
             middle = np.full(self._ranges.size, MIDDLE)
             self._begin(np.vstack([middle, *self._random(self._starts - 1)]))

@@ -41,7 +41,7 @@ class Senses(NamedTuple):
     carriers: Table
     """Index of the body of each contact node (contacts,)."""
     neutral_length: Table
-    """Cable lengths (cables,) without feedback, in m: the lengths in equilibrium."""
+    """Cable lengths (cables,) in m at which the feedback is zero: the lengths in equilibrium."""
     per_length: Table
     """Weight of a cable's elongation in the feedback to its oscillator (cables,), in 1/m."""
     per_load: Table

@@ -67,7 +67,7 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         "least_length_mm": 1e3 * left.min(axis=0),
         "limit_of_length_mm": 1e3 * limits.least_length,
         "peak_power_W": power.max(axis=0),
-        "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # at half of both
+        "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # at half limits
         "mean_power_W": _mean(np.maximum(power, 0.0)[steady]),
         "time_at_a_limit_percent": 100.0 * _mean(limited[steady]),
     }

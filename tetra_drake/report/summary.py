@@ -27,7 +27,7 @@ _TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robu
 _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
     "kept": "draws that cost at most a tenth"
 }
-"""Notes on numbers that are no metrics."""
+"""Notes on numbers, by name."""
 
 _NOTHING = 5e-4
 """Threshold for a row of a table: a row is left out if all its numbers, as shown, are smaller."""
@@ -38,7 +38,8 @@ def metrics_table(
 ) -> Table:
     """Table of fitness and metrics, with a column per gait. A gait is a row of `Run.evaluations`.
 
-    The first row is the metric of the objective. Numbers that are zero for all gaits are left out.
+    The first row is the main metric of the objective. Numbers that are zero for all gaits are left
+    out.
     """
     *_, last = gaits.values()
     first = headline_metric(scenario.objective, last)
@@ -102,7 +103,8 @@ def run_text(run: Run) -> str:
 def results(run: Run) -> list[tuple[str, str]]:
     """The main results of a run: names and values with units.
 
-    Values are of the metric of the objective. The best gait is the fittest.
+    Gaits are described by the main metric of the objective, such as the distance. The best gait is
+    the fittest.
     """
     statuses, best = run.statuses, run.best()
     evaluations = sum(status.evaluations for status in statuses)
@@ -133,8 +135,8 @@ def results(run: Run) -> list[tuple[str, str]]:
 def trials_table(run: Run) -> Table:
     """Table of the trials of a run: initial and final best gait, evaluations, state.
 
-    The gaits are shown by the metric of the objective. "in Drake" is the final best gait evaluated
-    again on the Drake diagram. Columns without values are left out.
+    Gaits are described by the main metric of the objective. "in Drake" is the final best gait,
+    evaluated again on the Drake diagram. Columns without values are left out.
     """
     size, title = _size_and_title(_about(run))
     best = {row["trial"]: row for _, row in run.best().iterrows()}
@@ -156,7 +158,7 @@ def trials_table(run: Run) -> Table:
 
 
 def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[float]:
-    """Metric of the objective for trials_table(), in SI: initial gait, best gait, and best gait
+    """Main metric (SI) of three gaits for trials_table(): initial gait, best gait, and best gait
     evaluated again on the Drake diagram."""
     name, key = _about(run), (best["trial"], best["index"])
     initial = run.initial_best(best["trial"])

@@ -23,19 +23,21 @@ from tetra_drake.simd.lanes import Table
 TOLERANCE = 1e-11
 """Largest remaining force in equilibrium, as a share of the greatest tension or of the weight."""
 LEAST_FORCE = 1e-9
-"""Lower limit (N) of the force that TOLERANCE is a share of."""
+"""Least force (N) that TOLERANCE refers to. It counts if tensions and weight are smaller."""
 
 MOST_STEPS, LEAST_STEPS = 1000, 10
-"""Upper limit of the steps of a search, for few bodies and for as many as a structure can have."""
+"""Largest number of steps of a search: for few bodies, and for the most bodies that are
+possible."""
 
 MOST_WORK = 2e11
-"""Upper limit of steps times the cube of their unknowns, between these: two minutes or so."""
+"""Limit of the work of a search, between MOST_STEPS and LEAST_STEPS: number of steps times the cube
+of the number of unknowns. This takes about two minutes."""
 
 FIRST_REACH, LONGEST_REACH = 0.05, 0.2
 """Largest step of Newton's method at first, and later, as a share of the largest body's radius."""
 OVERSHOOT = 0.9
-"""Limit for the force against the step at its end, as a share of the force along the step at its
-beginning. A step beyond the limit is too long."""
+"""A step is too long if the force at its end points backward and exceeds this share of the force at
+its beginning; only the components along the step count."""
 DIFFERENCE = 1e-7
 """Displacement for finite differences, as a share of the largest body's radius."""
 

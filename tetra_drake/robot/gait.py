@@ -256,7 +256,7 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
 
 
 class HasBestGait(Protocol):
-    """A run, seen only by its best gait."""
+    """An object with a best gait, such as a run."""
 
     def best_gait(self) -> Gait: ...
 

@@ -28,7 +28,7 @@ class DrivenCables(NamedTuple):
     signal: Any
     length: Any
     rate: Any
-    """Rate of the length."""
+    """Rate of the length, in m/s."""
     tension: Any
     free_length: Any
     """Free length; winches change it."""

@@ -106,9 +106,9 @@ class SimulationSection(Section):
     duration: Time = Field(gt=0, le=1e5)
     """Simulated time."""
     steady_from: Time = Field(ge=0)
-    """Time from which the fitness counts (section 2.3)."""
+    """Time at which the steady walk begins, for fitness and metrics (thesis section 2.3)."""
     max_evaluations: int = Field(ge=1)
-    """Evaluations of the derivatives in one simulation."""
+    """Largest number of evaluations of the derivatives in one simulation."""
     sample_period: Time = Field(gt=0)
     """Time between samples of a recorded trajectory."""
 
@@ -124,7 +124,7 @@ class EvolutionSection(Section):
     """Number and length of the trials, for any optimiser."""
 
     trials: int = Field(ge=1, le=1000)
-    """Independent trials, each with a seed of its own."""
+    """Number of independent trials, each with another seed."""
     evaluations: int = Field(ge=1)
     """Number of gaits that a trial evaluates, unless it ends early. !SteadyState evaluates its
     population, then two gaits in each iteration."""

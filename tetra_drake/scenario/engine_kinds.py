@@ -48,7 +48,7 @@ class Compiled(EngineSettings):
     """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
 
     tolerance: Speed = Field(default=1e-4, gt=0)
-    """Permitted error, per step, of the velocity of a body or of its strut tips by rotation."""
+    """Permitted error per step of the velocity of a body; for rotations, of its strut tips."""
     max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
     """Longest step."""
 

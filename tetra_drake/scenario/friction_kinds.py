@@ -41,7 +41,7 @@ class FrictionKind(Section):
     """Meaning of the signs of friction modes in recorded trajectories."""
 
     def law(self) -> FrictionLaw:
-        """Law as the kernels take it."""
+        """The law in the form that the kernels need."""
         raise NotImplementedError
 
     @property

@@ -75,13 +75,13 @@ class Walk:
 
     @property
     def per_steady_time(self) -> float:
-        """1 / the length of the steady stretch."""
+        """1 / duration of the steady stretch."""
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
     @property
     def per_actuator_time(self) -> float:
-        """1 / (the length of the steady stretch times the number of actuators)."""
+        """1 / (duration of the steady stretch times number of actuators)."""
         return self.per_steady_time / max(self.actuators, 1)
 
     @property
@@ -247,7 +247,7 @@ class Metrics:
     """Share of the steady stretch during which a limit of an actuator binds, mean over the
     actuators."""
     lifted_shares: tuple[float, ...] = ()
-    """The share for `lifted` of each body, from T1 on."""
+    """Share of the steady stretch during which each body is off the ground, from T1 on."""
 
     @classmethod
     def of(cls, walk: Walk, *, lacking: Collection[str]) -> Self:

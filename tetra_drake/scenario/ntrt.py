@@ -67,13 +67,13 @@ class Rotation(Section):
 
 
 class Substructure(Section):
-    """Another file as a part of a structure, or of several parts (a/b/c)."""
+    """File that is one part of a structure, or several equal parts (a name such as a/b/c)."""
 
     path: str | None = None
     rotation: Rotation | None = None
     scale: float = Field(default=1.0, gt=0, le=LARGEST)
     offset: Point = Field(default=[0.0, 0.0, 0.0])
-    """Displacement from each of several parts to the next."""
+    """Displacement from each of several equal parts to the next."""
     translation: Point = Field(default=[0.0, 0.0, 0.0])
 
 
@@ -96,7 +96,7 @@ class Parameters(Section):
 
 
 class Builder(Section):
-    """Class and parameters for the pairs with a tag."""
+    """Builder of rods or cables: NTRT's class, and its parameters."""
 
     made_as: Literal[
         "tgRodInfo",
@@ -112,7 +112,7 @@ DEFAULTS = {
     "rod": Builder.model_validate({"class": "tgRodInfo"}),
     "string": Builder.model_validate({"class": "tgBasicActuatorInfo"}),
 }
-"""Builders by tag, for pairs without a builder in their file."""
+"""Builders for pairs without a builder in their file, by a tag of the pairs."""
 
 
 class NtrtFile(Section):
@@ -120,12 +120,13 @@ class NtrtFile(Section):
 
     nodes: dict[str, Point] = Field(default={})
     pair_groups: dict[str, list[Pair]] = Field(default={})
-    """Pairs of nodes by their tags, separated by blanks."""
+    """Lists of pairs of nodes. A key is the tags of its pairs, separated by blanks."""
     builders: dict[str, Builder] = Field(default={})
-    """Builders by the tags that a pair must have."""
+    """Builders. A key is the tags that a pair must have, separated by blanks."""
     substructures: dict[str, Substructure] = Field(default={})
     bond_groups: dict[str, dict[str, list[Pair]]] = Field(default={})
-    """Pairs of nodes by tags and by bonds, in either order."""
+    """Lists of pairs of nodes, by their tags and the bond of two parts (outer key and inner key, in
+    either order)."""
 
 
 @dataclass
@@ -135,7 +136,7 @@ class Assembly:
     nodes: dict[str, np.ndarray] = field(default_factory=dict)
     """Nodes by path, such as "SUBSTRUCTURE.NODE"."""
     pairs: dict[str, list[Pair]] = field(default_factory=dict)
-    """Pairs by their tags, separated by blanks."""
+    """Lists of pairs. A key is the tags of its pairs, separated by blanks."""
     builders: dict[str, Builder] = field(default_factory=dict)
     parts: int = 0
     """Number of added files, one for each substructure."""
@@ -239,7 +240,7 @@ def _bonded_parts(bond: str, parts: list[str], file: Path, key: str) -> Iterable
 def _turned(p: np.ndarray, rotation: Rotation) -> np.ndarray:
     """Points (n, 3) turned by Rodrigues' formula."""
     about = p.mean(axis=0) if rotation.reference is None else np.array(rotation.reference)
-    axis = np.array(rotation.axis) / np.abs(rotation.axis).max()  # so that its square is no 0
+    axis = np.array(rotation.axis) / np.abs(rotation.axis).max()  # its square must not be 0
     axis /= np.linalg.norm(axis)
     angle = math.radians(rotation.angle)
     along = np.outer((p - about) @ axis, axis)

@@ -17,9 +17,9 @@ class SteadyState(Section):
     """The thesis's evolutionary algorithm (Table 6, section 2.3, appendix A)."""
 
     population: int = Field(default=50, ge=2, le=MOST_GAITS)
-    """Gaits that compete."""
+    """Number of gaits in the population."""
     tournament: int = Field(default=5, ge=1, le=MOST_GAITS)
-    """Gaits drawn to select a parent, or a gait that a child replaces."""
+    """Number of gaits that are drawn to select a parent, or the gait that a child replaces."""
     crossover_probability: float = Field(default=0.2, ge=0, le=1)
     """Probability that two children swap a parameter."""
     mutation_probability: float = Field(default=0.7, ge=0, le=1)
@@ -31,9 +31,10 @@ class SteadyState(Section):
     tau_mutation_range: Time = Field(default=0.05, ge=0)
     """Largest change of tau_A in one mutation."""
     stop_rise: float = Field(default=0.03, ge=0)
-    """A trial ends early if the mean fitness rises by less over `stop_window` iterations."""
+    """A trial ends early if the mean fitness rises by less than this in `stop_window`
+    iterations."""
     stop_window: int = Field(default=100, ge=1)
-    """Iterations over which the rise counts."""
+    """Number of iterations for `stop_rise`."""
     stop_after: int = Field(default=200, ge=0)
     """Iteration before which no trial ends early."""
 
@@ -46,9 +47,10 @@ class CmaEs(Section):
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
-    """Vectors in an iteration. The default is 4 + 3 ln n, rounded down, for n parameters."""
+    """Number of vectors in an iteration. The default is 4 + 3 ln n, rounded down, for n
+    parameters."""
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
-    """Random gaits evaluated first."""
+    """Number of random gaits that are evaluated first, the sample."""
     starts: int = Field(default=5, ge=1, le=1000)
     """Number of searches that are tried out; the search with the best gait continues. The first
     search starts at the mean of the best quarter of the sample, the others start at the best gaits
@@ -79,7 +81,8 @@ class QualityDiversity(Section):
     cells: list[Count] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
-    """Draws of disturbances. Each gait of the map is simulated in all of them at the end."""
+    """Number of draws of disturbances. Each gait of the map is simulated in all draws at the
+    end."""
 
     @model_validator(mode="after")
     def _check(self) -> "QualityDiversity":

@@ -23,7 +23,7 @@ Info = core_schema.ValidationInfo
 
 
 class Quantity(float):
-    """Number of a tree, with its SI unit."""
+    """A number in the tree of a scenario, with its SI unit."""
 
     unit: str
 

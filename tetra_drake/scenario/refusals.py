@@ -49,7 +49,7 @@ def hint(name: Any, names: Iterable[str]) -> str:
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
-    """Problem with a name or path that is neither shipped nor a file."""
+    """Text of the error for a name or path that is neither shipped nor a file."""
     last = name.rpartition("/")[2][:_LONGEST_NAME]
     if close := difflib.get_close_matches(last, shipped, n=1):
         return f"no such {what}; did you mean '{close[0]}'?"

@@ -99,7 +99,7 @@ class CableConstants(Section):
     """Tension per rate of the length."""
 
     def constants(self, **others: float) -> dict[str, float]:
-        """These constants and others by name; see physics.cable.CableLaw."""
+        """The constants of this section and `others`, by the names of physics.cable.CableLaw."""
         return {name: getattr(self, name) for name in CableConstants.model_fields} | others
 
 

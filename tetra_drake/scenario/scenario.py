@@ -41,13 +41,14 @@ from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
 
 MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
-"""Largest number of values of all signals in one simulation; about 3 GB."""
+"""Largest number of values of all signals in one simulation, on Drake and on other engines. They
+need about 3 GB."""
 
 _WIDTH = 100
 """Largest number of characters in a line of a printed scenario."""
 
 MOST_SAMPLES = 2_000_000
-"""Largest number of recorded poses of all bodies in one simulation; about 2 GB."""
+"""Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
 
 
 class Scenario(Section):

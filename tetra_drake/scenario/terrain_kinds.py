@@ -73,7 +73,7 @@ class Relief(Section):
         return {}
 
     def save(self, folder: Path) -> None:
-        """Writes the terrain's files to a folder, with their names in a record."""
+        """Writes the files of the terrain to the folder of a record, under new names."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         """The heights of the terrain.
@@ -160,7 +160,8 @@ class Steps(Relief):
 
 
 class Rough(Relief):
-    """Random ground: an independent, uniform height in -2 amplitude to 0 every half wavelength.
+    """Random ground. Heights half a wavelength apart are independent and uniform between -2
+    amplitude and 0.
 
     The mean height is -amplitude. A robot that stands at z = 0 touches the ground without sinking
     in.
@@ -198,7 +199,7 @@ class Obstacles(Relief):
     radius: Length = Field(gt=0)
     """Radius of a bump."""
     spacing: Length = Field(gt=0)
-    """Side of the squares that have a bump each."""
+    """Side of a square of the ground. Each square has one bump."""
     seed: int = Field(ge=0, default=0)
     """Seed of the random positions. The same seed gives the same ground."""
     start: Length | None = None
@@ -210,7 +211,7 @@ class Obstacles(Relief):
         _check_size((spacing, spacing), source, "spacing")
         x, y = _axes((cell, cell), 0.0)
         start = ahead if self.start is None else self.start
-        first = max(-BEHIND, start + self.radius + 1.5 * cell)  # a bump and its controls
+        first = max(-BEHIND, start + self.radius + 1.5 * cell)  # and its control points
         squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
         corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
         generator = np.random.default_rng(self.seed)

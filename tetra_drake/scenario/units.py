@@ -19,7 +19,7 @@ _SMALL = {
     "kg": [(1e-3, "g")],
     "kg/m^3": [(1e3, "g/cm^3")],
 }
-"""Further units for settings, by SI unit: size in SI, and name."""
+"""More units for printed settings, by SI unit: size in SI, and name."""
 
 LARGEST = 1e15
 """Largest size of a number in SI units. Products of several such numbers do not overflow."""

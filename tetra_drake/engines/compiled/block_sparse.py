@@ -140,7 +140,7 @@ def eliminate(rows: Table, schedule: Schedule, i: int, a: int) -> None:
 
 @inlined
 def factors(rows: Table, i: int, c: int) -> tuple[Real, ...]:
-    """Column c of the rows of body i, divided by the pivots."""
+    """Column c of the rows of body i, each number divided by the pivot of its row."""
     return (
         rows[i, 0, c] * rows[i, 0, 0],
         rows[i, 1, c] * rows[i, 1, 1],

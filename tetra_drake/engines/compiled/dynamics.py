@@ -39,9 +39,9 @@ class Solver(NamedTuple):
     columns: Table
     """First column of the block of each pair of coupled bodies (pairs,)."""
     fill_bodies: Table
-    """Bodies in whose rows there are blocks of fill-in (blocks,)."""
+    """Index of the body whose rows contain the block, for each block of fill-in (blocks,)."""
     fill_columns: Table
-    """First columns of the blocks of fill-in (blocks,)."""
+    """First column of each block of fill-in (blocks,)."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:

@@ -23,7 +23,8 @@ from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
 FIRST = SurfaceGrid._fields.index("first")
-"""Column of a grid with the index of its first height. The heights of all lanes are in one row."""
+"""Column of Ground.grid with the index of the first height. It differs between lanes, because one
+table has the heights of all lanes."""
 
 
 class LaneEngine:
