@@ -93,5 +93,12 @@ def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any
             problem = "its checksum does not match its content"
         if problem:
             raise InputError(file, f"line {number}", f"is damaged: {problem}; {REMEDY}")
-        entries.append(json.loads(line if match is None else match[1] + b"}"))
+        try:
+            entry = json.loads(line if match is None else match[1] + b"}")
+        except (ValueError, RecursionError):
+            entry = None
+        if not isinstance(entry, dict):
+            problem = f"is damaged: it is no object of JSON; {REMEDY}"
+            raise InputError(file, f"line {number}", problem)
+        entries.append(entry)
     return entries
