@@ -185,7 +185,10 @@ class _Worker:
         try:
             self._process = executor.submit(_load, self._evaluate).result()
         except BrokenExecutor as error:
-            problem = f"do not start, as they say above; it may be that {_UNGUARDED}"
+            problem = (
+                f"do not start, as they say above; it may be that {_UNGUARDED}, or that memory is "
+                "short"
+            )
             raise InputError(_SOURCE, "", problem) from error
         self._tasks_left = TASKS_PER_WORKER
         if self._killed:
