@@ -144,6 +144,7 @@ def test_sweep_takes_a_single_value_and_a_run():
         (lambda: td.load_run(5), ("load_run", "path")),
         (lambda: td.load_result(None), ("load_result", "folder")),
         (lambda: td.load_gait(5, td.load_scenario("quick")), ("load_gait", "path")),
+        (lambda: td.load_command(5, td.load_scenario("quick")), ("load_command", "path")),
         (lambda: td.evolve("quick", 5), ("evolve", "out")),
     ],
 )

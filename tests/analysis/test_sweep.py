@@ -79,6 +79,7 @@ def test_axes_have_whole_keys_where_the_last_part_says_too_little(short: Scenari
         ({"simulation.durtion": ["1 s"]}, "scenario thesis", "simulation.durtion", "'duration'"),
         ({STIFFNESS: [40.0]}, "scenario thesis", STIFFNESS, "without a unit"),
         ({STIFFNESS: []}, "sweep", STIFFNESS, "no value"),
+        ([STIFFNESS], "sweep", "changes", STIFFNESS),
     ],
 )
 def test_what_cannot_be_swept_is_refused(short, changes, source, key, problem, refused) -> None:

@@ -69,18 +69,23 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused)
     for path in run.rglob("*.jsonl"):
         path.with_name(path.name + ".xz").write_bytes(lzma.compress(path.read_bytes()))
         path.unlink()
-    packed = load_run(run)
-    assert packed.evaluations.equals(plain.evaluations)
-    assert packed.iterations.equals(plain.iterations)
+    compressed = load_run(run)
+    assert compressed.evaluations.equals(plain.evaluations)
+    assert compressed.iterations.equals(plain.iterations)
     path = run / "trial_00" / "iterations.jsonl"
     file = plain.file(path.name, trial=0)
     entries = file.read()
-    more = {"iteration": len(entries)}
+    more = entries[-1] | {"iteration": len(entries)}
     file.append([more])
     assert file.read() == [*entries, more]
-    path.with_name("iterations.jsonl.xz").write_bytes(b"no xz")
-    with refused(f"{path}.xz", "", ""):
+    packed = path.with_name("iterations.jsonl.xz")
+    packed.write_bytes(b"no xz")
+    with refused(packed, "", ""):
         load_run(run)
+    for line in (b"{nonsense\n", b"[1]\n", b"\xff\n", b"[" * 10**5 + b"\n"):
+        packed.write_bytes(lzma.compress(line))
+        with refused(packed, "line 1", "JSON"):
+            load_run(run)
 
 
 def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(tmp_path):

@@ -261,6 +261,30 @@ def test_a_line_without_a_checksum_is_refused(run_small, refused):
         load_run(run)
 
 
+def without(number, key):
+    """The line as it would have been written without a key."""
+
+    def change(line):
+        entry = json.loads(line)
+        del entry["crc"], entry[key]
+        return json_line(entry).encode().strip()
+
+    return with_line(number, change)
+
+
+@pytest.mark.parametrize("name", ["evaluations", "iterations"])
+def test_a_line_that_lacks_a_key_or_has_another_type_is_refused(run_small, refused, name):
+    run = run_small(trials=1)
+    path = run / "trial_00" / f"{name}.jsonl"
+    content = path.read_bytes()
+    for key in json.loads(content.splitlines()[4]).keys() - {"crc", "placed", "mean_fitness"}:
+        for damage in (without(5, key), with_value(5, key, {"distance": []})):
+            path.write_bytes(damage(content))
+            for read in (lambda: load_run(run), lambda: run_small(resume=True)):
+                with refused(path, "line 5", key):
+                    read()
+
+
 def test_a_line_that_is_there_twice_is_refused(run_small, refused):
     run = load_run(run_small(trials=1))
     judged = {"trial": 0, "index": 3, "kept": 1.0, "mean_distance": 0.2}

@@ -13,6 +13,7 @@ from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
+from tetra_drake.scenario.changes import given_changes
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
@@ -57,7 +58,8 @@ def sweep(
     walkers = [given_gait(gait, base) for gait in given]
     if not walkers:
         raise InputError("sweep", "gaits", "found none, expected one at least")
-    changes = {key: _values(key, values) for key, values in changes.items()}
+    swept = given_changes(changes, "sweep")
+    changes = {key: _values(key, values) for key, values in swept.items()}
     combinations = list(itertools.product(*changes.values()))
     scenarios = [base.with_changes(dict(zip(changes, each, strict=True))) for each in combinations]
     outcomes = simulate_many(

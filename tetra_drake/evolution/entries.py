@@ -25,11 +25,14 @@ import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, make_folder
 from tetra_drake.optimizers.base import Evaluation, Task
+from tetra_drake.scenario.metrics import wrong_metric
 
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
@@ -48,6 +51,70 @@ _COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
 
 _UNIQUE = {IN_PROGRESS: ("index",), REEVALUATIONS: ("index",), ELITES: ("trial", "index")}
 """Keys whose values are unique among the lines of a file, by file name."""
+
+
+def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
+    """The metrics. Raises ValueError if one is of a wrong type."""
+    if name := wrong_metric(metrics):
+        raise ValueError(f"{name} is of a wrong type")
+    return metrics
+
+
+class _Line(BaseModel):
+    """Keys and types of a line. Further keys are allowed."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+
+class _Draws(_Line):
+    """Numbers of each draw of disturbances."""
+
+    fitness: Annotated[list[float], Field(min_length=1)]
+    distance: Annotated[list[float], Field(min_length=1)]
+
+
+class _EvaluationLine(_Line):
+    """Keys of an evaluation; `genome` is None in a thinned run."""
+
+    index: int
+    iteration: int
+    genome: list[float] | None
+    metrics: Annotated[dict[str, Any], AfterValidator(_checked)]
+    fitness: float | None
+    failure: str | None
+    wall_time_s: float
+    engine: str
+    placed: int | None = None
+    draws: _Draws | None = None
+
+
+class _IterationLine(_Line):
+    """Keys of an iteration, without the optimiser's report."""
+
+    iteration: int
+    evaluations: int
+    best_fitness: float | None
+    best_evaluation: int | None
+    stop: str | None
+
+
+class _EliteLine(_Line):
+    """Keys of an elite on disturbed robots."""
+
+    trial: int
+    index: int
+    kept: float
+    mean_distance: float | None
+
+
+_LINES: dict[str, type[_Line]] = {
+    EVALUATIONS: _EvaluationLine,
+    IN_PROGRESS: _EvaluationLine,
+    REEVALUATIONS: _EvaluationLine,
+    ITERATIONS: _IterationLine,
+    ELITES: _EliteLine,
+}
+"""What a line is, by file name."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -119,11 +186,20 @@ class RecordFile:
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
                     self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
+            self._check_types(row, entry)
             if counter is not None and entry.get(counter) != row:
                 problem = f"is damaged: {counter} is {entry.get(counter)}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
         self._check_unique(entries)
         return entries
+
+    def _check_types(self, row: int, entry: Mapping[str, Any]) -> None:
+        try:
+            _LINES[self.path.name].model_validate(entry)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            key = ".".join(str(part) for part in first["loc"])
+            self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
 
     def _check_unique(self, entries: Sequence[Mapping[str, Any]]) -> None:
         keys, seen = _UNIQUE.get(self.path.name, ()), set()
@@ -191,5 +267,12 @@ def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any
             problem = "its checksum does not match its content"
         if problem:
             raise InputError(file, f"line {number}", f"is damaged: {problem}; {REMEDY}")
-        entries.append(json.loads(line if match is None else match[1] + b"}"))
+        try:
+            entry = json.loads(line if match is None else match[1] + b"}")
+        except (ValueError, RecursionError):
+            entry = None
+        if not isinstance(entry, dict):
+            problem = f"is damaged: it is no object of JSON; {REMEDY}"
+            raise InputError(file, f"line {number}", problem)
+        entries.append(entry)
     return entries

@@ -150,7 +150,10 @@ class InProcesses:
         try:
             executor.submit(_load, self._evaluate).result()
         except BrokenExecutor as error:
-            problem = f"do not start, as they say above; it may be that {_UNGUARDED}"
+            problem = (
+                f"do not start, as they say above; it may be that {_UNGUARDED}, or that memory is "
+                "short"
+            )
             raise InputError(_SOURCE, "", problem) from error
         return executor
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_text
+from tetra_drake.files import given_path, read_text
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO
@@ -60,6 +60,7 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
 
     Raises InputError, naming file and line, if the file is wrong or does not fit the robot.
     """
+    path = given_path(path, "load_command", "path")
     robot, text = Robot.of(scenario), read_text(path, "command file")
     wanted = [TIME, *command_columns(robot)]
     cells = _cells(text, wanted, path)
@@ -71,7 +72,7 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
         cells[name] = numbers
     table = cells[wanted].to_numpy(dtype=float)
     period = _period(table[:, 0], scenario.cpg.listing_step, path)
-    return Command(Path(path).name, period, scenario.actuation.command_unit * table[:, 1:])
+    return Command(path.name, period, scenario.actuation.command_unit * table[:, 1:])
 
 
 def _cells(text: str, wanted: Sequence[str], path: str | Path) -> pandas.DataFrame:

@@ -28,7 +28,7 @@ from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
-from tetra_drake.scenario.metrics import METRICS, Metrics
+from tetra_drake.scenario.metrics import METRICS, Metrics, wrong_metric
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Section
 
@@ -141,14 +141,11 @@ def _read_result_file(path: Path) -> _ResultFile:
     if isinstance(content, dict):
         content = {name: content[name] for name in _ResultFile.model_fields if name in content}
     file = _ResultFile.from_tree(content, path)
-    shares = file.metrics.get("lifted_shares")
-    if not isinstance(shares, list) or not all(isinstance(share, float) for share in shares):
-        raise InputError(path, "metrics.lifted_shares", "is missing, or no list of numbers")
-    numbers: dict[str, Any] = {"lifted_shares": tuple(shares)}
-    for name in METRICS:
-        if not isinstance(file.metrics.get(name, ""), float | None):
-            raise InputError(path, f"metrics.{name}", "is missing, or no number")
-        numbers[name] = _number(file.metrics[name])
+    metrics = dict.fromkeys([*METRICS, "lifted_shares"], "") | file.metrics
+    if name := wrong_metric(metrics):
+        raise InputError(path, f"metrics.{name}", "is missing, or of a wrong type")
+    numbers: dict[str, Any] = {name: _number(metrics[name]) for name in METRICS}
+    numbers["lifted_shares"] = tuple(metrics["lifted_shares"])
     return file.model_copy(update={"metrics": numbers})
 
 

@@ -54,10 +54,20 @@ def _with_items(base: list[Any], changes: Part, key: str) -> list[Any]:
     return items
 
 
+def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, Any]:
+    """An argument as changes by dotted keys. Raises InputError, naming `source`, for anything
+    else."""
+    if isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes):
+        return changes
+    problem = f"found {changes!r:.60}, expected values by dotted keys, such as {{'cpg.gain': ...}}"
+    raise InputError(source, "changes", problem)
+
+
 def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
     """Converts changes by dotted keys from Python to the tree of a file. The tree may also contain
-    sections."""
+    sections. Raises InputError, naming `source`, if they are none."""
     tree: Tree = Part()
+    changes = given_changes(changes, source)
     for key in sorted(changes, key=lambda key: len(parts_of(key))):  # "robot" before "robot.name"
         *sections, name = parts_of(key)
         place: Any = tree

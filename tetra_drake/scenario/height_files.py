@@ -6,6 +6,7 @@ import hashlib
 import io
 import os
 import re
+import tokenize
 import warnings
 from typing import Any
 
@@ -88,7 +89,7 @@ def _read_heights(path: str) -> np.ndarray:
             return np.loadtxt(text.splitlines(), delimiter="," if "," in text else None, ndmin=2)
     except InputError as error:
         refuse("", f"'{path}': {error.problem}")
-    except (ValueError, TypeError, MemoryError) as error:
+    except (ValueError, TypeError, MemoryError, tokenize.TokenError) as error:
         # The file may be a private one, so the error does not show its content.
         problem = re.sub("string '.*' to float64", "text to a number", str(error))
         refuse("", f"'{path}' cannot be read as heights: {problem}")

@@ -298,6 +298,17 @@ METRICS: dict[str, Metric] = {
 UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
 
+def wrong_metric(metrics: Mapping[str, Any]) -> str:
+    """Name of the first of some metrics in the form of Metrics.to_json() that is of another type
+    there; "" if there is none."""
+    for name, value in metrics.items():
+        numbers = value if name == "lifted_shares" else [value]
+        kinds = float if name == "lifted_shares" else float | None
+        if not isinstance(numbers, list) or not all(isinstance(item, kinds) for item in numbers):
+            return name
+    return ""
+
+
 def inverse(unit: str) -> str:
     """Inverse of an SI unit, such as "s/m" for "m/s"; "" for no unit."""
     above, _, below = unit.partition("/")
