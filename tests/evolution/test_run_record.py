@@ -278,7 +278,7 @@ def test_a_line_that_lacks_a_key_or_has_another_type_is_refused(run_small, refus
     path = run / "trial_00" / f"{name}.jsonl"
     content = path.read_bytes()
     for key in json.loads(content.splitlines()[4]).keys() - {"crc", "placed", "mean_fitness"}:
-        for damage in (without(5, key), with_value(5, key, {"distance": []})):
+        for damage in (without(5, key), with_value(5, key, lambda _: {"distance": []})):
             path.write_bytes(damage(content))
             for read in (lambda: load_run(run), lambda: run_small(resume=True)):
                 with refused(path, "line 5", key):

@@ -63,7 +63,8 @@ def forces_on_bodies(joined: Joined, tensions: np.ndarray) -> np.ndarray:
     """(6 B, ...) about the nodes' centre, torques in N times the size of the structure."""
     p_WN = joined["p_WN"]
     scaled = (p_WN - p_WN.mean(axis=0)) / np.ptp(p_WN, axis=0).max()
-    return cable_wrenches(**joined | {"p_WN": scaled}) @ tensions
+    ends, bodies = joined["cable_ends"], joined["body_of_node"]
+    return cable_wrenches(p_WN=scaled, body_of_node=bodies, cable_ends=ends) @ tensions
 
 
 def test_a_wrench_is_torque_about_the_origin_then_force() -> None:

@@ -31,13 +31,18 @@ class Statics(NamedTuple):
 
 
 def find_statics(
-    *, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray, held: np.ndarray
+    *,
+    p_WN: np.ndarray,
+    body_of_node: np.ndarray,
+    cable_ends: np.ndarray,
+    held: np.ndarray | None = None,
 ) -> Statics:
     """Statics of rigid bodies joined by cables.
 
-    `held` (nodes, 3) is True for each axis of a node along which the world holds it. For the other
-    arguments see cable_wrenches().
+    `held` (nodes, 3) is True for each axis of a node along which the world holds it; by default
+    nothing is held. For the other arguments see cable_wrenches().
     """
+    held = np.zeros(p_WN.shape, dtype=bool) if held is None else held
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
     wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
     allowed = null_space(_motions_of_nodes(p_WN, body_of_node)[held], TOLERANCE)
