@@ -22,7 +22,9 @@ from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-PAIR = Struts(np.array([0, 2]), np.array([1, 3]), np.array([0, 1, 2]), np.array([2.0, 2.0]))
+PAIR = Struts(
+    *map(np.array, ([0, 2], [1, 3], [0, 1, 2])), length=np.full(2, 2.0), radius=np.full(2, 0.1)
+)
 """Two struts of length 2, of two bodies."""
 
 
