@@ -104,7 +104,7 @@ def run_program(folder, call, *, how, launcher=()):
         text=True,
         capture_output=True,
         env=os.environ | as_root | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        timeout=60,
+        timeout=300,  # s; a minute is too short beside other work
         cwd=folder,
     )
 
