@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import functools
 import html
+import inspect
 import os
 import re
 from collections.abc import Iterator
@@ -153,3 +154,14 @@ def test_an_argument_that_stands_for_nothing_is_named(call, named):
         call()
     assert (caught.value.source, caught.value.key) == named
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [n for n in td.__all__ if inspect.isfunction(getattr(td, n))])
+def test_every_parameter_and_the_errors_are_described(name: str) -> None:
+    function = getattr(td, name)
+    about = (inspect.getdoc(function) or "").partition("\nArgs:\n")[2]
+    parameters, _, errors = about.partition("\nRaises:\n")
+    assert re.findall(r"^    (\w+): \S", parameters, re.M) == [
+        *inspect.signature(function).parameters
+    ]
+    assert "InputError: " in errors

@@ -148,7 +148,7 @@ def test_a_gait_with_feedback_is_exported_as_it_walked_once(tmp_path):
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, 2001.0, 0.5, 7.1, float("nan")])
 def test_a_rate_without_meaning_is_refused(short, rate, tmp_path, refused):
-    with refused("--rate", "", "Hz"):
+    with refused("export", "rate", "Hz"):
         export(short, seeded_gait(short), rate=rate, out=tmp_path / "lab")
     assert not list(tmp_path.iterdir())
 

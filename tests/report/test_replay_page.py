@@ -39,7 +39,7 @@ def test_sources_without_motion_and_bad_places_are_refused(tmp_path, folder, run
         with refused(source, "", ""):
             load_or_simulate(source)
     for source in (folder, run):  # they have scenarios of their own
-        with refused("--scenario", "", ""):
+        with refused("replay", "scenario", ""):
             load_or_simulate(source, scenario="thesis")
     with refused(folder, "", ""):
         write_replay(folder, folder)

@@ -44,6 +44,8 @@ def sweep(
     dimension `gait` has the names of the gaits. A failed simulation is NaN.
 
     Args:
+        scenario: a scenario, its name or file, or a run.
+        gaits: a gait, its file or a run, or several of these.
         changes: a value or a list of values by scenario key. Quantities need units, as in
             Scenario.with_changes().
         workers: number of threads, see simulate_many().

@@ -190,7 +190,11 @@ def load_run(path: str | Path) -> Run:
         >>> result = td.simulate(run.scenario, run.best_gait())
         >>> lines = run.iterations.pivot(index="iteration", columns="trial", values="best_fitness")
 
-    Raises InputError if `path` holds no run or the record is damaged.
+    Args:
+        path: the run directory.
+
+    Raises:
+        InputError: if the directory holds no run, or the record is damaged.
     """
     directory = given_path(path, "load_run", "path")
     manifest = read_manifest(directory)

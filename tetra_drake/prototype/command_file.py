@@ -52,13 +52,18 @@ def scenario_beside(path: Path) -> Path | None:
 
 
 def load_command(path: str | Path, scenario: Scenario) -> Command:
-    """Reads a command file for a scenario's robot. Columns may be in any order.
+    """Reads a command file for a scenario's robot.
 
         >>> scenario = td.load_scenario("quick")
         >>> command = td.load_command("lab/command.csv", scenario)
         >>> result = td.simulate(scenario, command=command)
 
-    Raises InputError, naming file and line, if the file is wrong or does not fit the robot.
+    Args:
+        path: the CSV file. Its columns may be in any order.
+        scenario: the scenario of the robot.
+
+    Raises:
+        InputError: names file and line, if the file is wrong or does not fit the robot.
     """
     path = given_path(path, "load_command", "path")
     robot, text = Robot.of(scenario), read_text(path, "command file")

@@ -82,7 +82,7 @@ def check_rate(rate: float, scenario: Scenario) -> None:
     in_range, periods = 0.0 < rate <= most * (1.0 + 1e-9), duration * rate
     if not in_range or abs(periods - round(periods)) > 1e-6 * periods:
         expected = f"at most {most:g} Hz, and a whole number of samples in {duration:g} s"
-        raise InputError("--rate", "", f"found {rate:g} Hz, expected {expected}")
+        raise InputError("export", "rate", f"found {rate:g} Hz, expected {expected}")
 
 
 def load_verdict(loads: Loads, result: SimulationResult) -> str:

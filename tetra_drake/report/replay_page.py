@@ -53,7 +53,7 @@ def load_or_simulate(
     SimulationFailure if the simulation fails.
     """
     if os.path.isdir(source) and scenario is not None:
-        raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")
+        raise InputError("replay", "scenario", f"is for gait files; {source} has its own scenario")
     is_run = os.path.exists(source / MANIFEST)
     if os.path.exists(source / RESULT) and not is_run:
         return load_result(source)

@@ -66,7 +66,11 @@ def load_result(folder: str | Path) -> SimulationResult:
         >>> result = td.load_result("out")
         >>> signals = result.trajectory.signal.sel(oscillator="T1-T2")
 
-    Raises InputError, naming the file, if a file is missing, damaged, or of another scenario.
+    Args:
+        folder: a folder written by `tetra-drake simulate`.
+
+    Raises:
+        InputError: names the file that is missing, damaged, or of another scenario.
     """
     folder = given_path(folder, "load_result", "folder")
     for name in (RESULT, SCENARIO, TRAJECTORY):

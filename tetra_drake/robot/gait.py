@@ -196,8 +196,12 @@ def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
     >>> td.seeded_gait("thesis", 80)
     <Gait random gait 80>
 
-    `scenario` may be a scenario, its name or file, or a run. Raises InputError for anything else,
-    and for a negative seed.
+    Args:
+        scenario: a scenario, its name or file, or a run.
+        seed: an integer, 0 or more. The default gait walks forward on the thesis's scenario.
+
+    Raises:
+        InputError: if an argument cannot be used.
     """
     if not isinstance(seed, Integral) or seed < 0:
         raise InputError("seeded_gait", "seed", f"found {seed!r}, expected an integer, 0 or more")
@@ -229,11 +233,17 @@ class GaitFile(Section):
 
 
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
-    """Reads a gait for the scenario's robot from a gait file, or from `key` of a JSON file.
+    """Reads a gait for the scenario's robot.
 
         >>> gait = td.load_gait("gait.json", td.load_scenario("quick"))
 
-    Raises InputError, naming file and key, if the file is wrong or does not fit the scenario.
+    Args:
+        path: a gait file.
+        scenario: the scenario that the gait must fit.
+        key: key of the gait, if `path` is another JSON file that contains one.
+
+    Raises:
+        InputError: names file and key, if the file is wrong or does not fit the scenario.
     """
     file = _read_file(given_path(path, "load_gait", "path"), key)
     own, weights = Weights.of(scenario), file.weights

@@ -23,13 +23,17 @@ MOST_BYTES = 2**20
 
 
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
-    """Loads a shipped scenario by its name, or a scenario file by its path.
+    """Loads a scenario.
 
         >>> scenario = td.load_scenario("thesis").with_changes({"robot.spacing": "3 in"})
         >>> print(scenario)
 
-    Raises InputError, naming file and key, if the file is wrong, or the structure or height file
-    that it names.
+    Args:
+        name_or_file: the name of a shipped scenario, or the path of a scenario file.
+
+    Raises:
+        InputError: names file and key, if the file is wrong, or a structure file or height file
+            that it names.
     """
     name = str(name_or_file)
     file = _file(name, Path())
