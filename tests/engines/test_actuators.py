@@ -27,6 +27,7 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.strut_contact_kinds import NoStrutContact
 
 LENGTH, FREE_LENGTH, STIFFNESS, DAMPING = 0.2, 0.1, 100.0, 0.4  # L, l0, k, c in SI units
 
@@ -69,7 +70,8 @@ def swaying(actuation: Actuation, *, damping: float, gain: float = 0.0) -> Scena
     times = {"duration": "80 ms", "steady_from": "40 ms", "sample_period": "1 ms"}
     changes = {f"simulation.{key}": value for key, value in times.items()}
     changes |= {"cpg.start_up": 0.0, "cpg.gain": f"{gain} N"}
-    scenario = load_scenario("prism").with_sections(robot=kind, actuation=actuation)
+    parts = {"robot": kind, "actuation": actuation, "strut_contact": NoStrutContact()}
+    scenario = load_scenario("prism").with_sections(**parts)
     return scenario.with_changes(changes)
 
 

@@ -8,16 +8,16 @@ from helpers.anchored import HUNG, SWINGING, floating_prism, scenario_of, suppor
 from helpers.converged import CONVERGED
 from helpers.structures import poses_of, simulated, thrown
 
-from tetra_drake.engines.compiled.engine import ENGINE as COMPILED
-from tetra_drake.engines.drake import ENGINE as DRAKE
+from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
-ENGINES = {"compiled": COMPILED, "drake": DRAKE}
+ENGINES = ["compiled", "drake"]
 G = 9.80665
 
 
@@ -75,7 +75,8 @@ def test_a_bar_held_at_one_end_swings_as_a_physical_pendulum(engine):
         q_WB=np.array([[np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0]]),
     )
     robot = dataclasses.replace(robot, structure=turned)
-    result = ENGINES[engine].simulate(robot, seeded_gait(scenario), record=True)
+    simulation = Simulation(robot, seeded_gait(scenario), record=True)
+    result = engine_of(scenario).simulate(simulation)
     p_WN, times = result.trajectory.p_WN.values, result.trajectory.time.values
     expected = swings(robot, angle, times)
     place = 0.4 * np.stack([-np.sin(expected), 0.0 * expected, -np.cos(expected)], axis=1)
