@@ -193,8 +193,8 @@ def make_structure(scenario: Scenario) -> Structure:
         problem = "found an incline under a robot with anchors, expected level ground"
         raise InputError(scenario.name, "terrain", problem)
     if scenario.robot.offsets:
-        offsets = np.array(scenario.robot.offsets)
-        anchors = structure.anchors
+        offsets, anchors = np.array(scenario.robot.offsets), structure.anchors
+        # Nothing moves along an axis that an anchor holds.
         np.multiply.at(offsets, anchors.carriers, anchors.stiffness == 0.0)
         p_WB = p_WB + offsets
         check_apart(scenario, dataclasses.replace(structure, p_WB=p_WB))

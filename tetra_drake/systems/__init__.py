@@ -1,15 +1,13 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
 
 from tetra_drake.systems.actuators import Actuators
-from tetra_drake.systems.anchors import Anchors
 from tetra_drake.systems.cable_network import CableNetwork
-from tetra_drake.systems.constant_loads import Loads
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
+from tetra_drake.systems.state_forces import Anchors, Loads, StrutContact
 from tetra_drake.systems.steering import Steering
-from tetra_drake.systems.strut_contact import StrutContact
 
 __all__ = [
     "Actuators",
