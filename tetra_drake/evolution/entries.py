@@ -61,7 +61,7 @@ def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Line(BaseModel):
-    """Keys and types of a line. Further keys are allowed."""
+    """Keys and types of a line. Further keys are ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -78,7 +78,7 @@ class _EvaluationLine(_Line):
 
     index: int
     iteration: int
-    genome: list[float] | None
+    genome: Annotated[list[float], Field(min_length=1)] | None
     metrics: Annotated[dict[str, Any], AfterValidator(_checked)]
     fitness: float | None
     failure: str | None
@@ -89,13 +89,14 @@ class _EvaluationLine(_Line):
 
 
 class _IterationLine(_Line):
-    """Keys of an iteration, without the optimiser's report."""
+    """Keys of an iteration; `mean_fitness` is in the report of some optimisers."""
 
     iteration: int
     evaluations: int
     best_fitness: float | None
     best_evaluation: int | None
     stop: str | None
+    mean_fitness: float | None = None
 
 
 class _EliteLine(_Line):
