@@ -1,6 +1,7 @@
 """Manifest of a run: its definition, on disk and in memory.
 
     manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of scenario.yaml
+                     and of these keys
     scenario.yaml    the scenario with all settings; its height file, if any, beside it
 
 The name of a run is a digest of this definition. Each line of the record has the name.
@@ -130,6 +131,8 @@ def read_manifest(directory: Path) -> Manifest:
     except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     file = _File.from_tree(content, path)
+    if file.sha256 != _digest(content):
+        raise InputError(path, "sha256", "does not fit the other keys: they were changed")
     scenario_file = directory / SCENARIO
     scenario = load_scenario(scenario_file)
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
@@ -150,6 +153,7 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
         "objective": manifest.method.objective,
         "optimizer": manifest.method.optimizer,
     }
+    content["sha256"] = _digest(content)
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
@@ -163,7 +167,15 @@ class _File(Section):
     scenario_sha256: str
     objective: str
     optimizer: str
+    sha256: str
+    """Digest of the keys above."""
     thinned: bool = False
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    """SHA-256 of the content of manifest.json, without `sha256` and `thinned`."""
+    rest = {key: value for key, value in content.items() if key not in ("sha256", "thinned")}
+    return _sha256(json.dumps(rest, sort_keys=True))
 
 
 def _sha256(text: str) -> str:
