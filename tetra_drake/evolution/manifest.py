@@ -1,7 +1,7 @@
 """Manifest of a run: its definition, on disk and in memory.
 
-    manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of scenario.yaml
-                     and of these keys
+    manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of these and of
+                     scenario.yaml
     scenario.yaml    the scenario with all settings; its height file, if any, beside it
 
 The name of a run is a digest of this definition. Each line of the record has the name.
@@ -131,14 +131,15 @@ def read_manifest(directory: Path) -> Manifest:
     except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     file = _File.from_tree(content, path)
-    if file.sha256 != _digest(content):
-        raise InputError(path, "sha256", "does not fit the other keys: they were changed")
     scenario_file = directory / SCENARIO
     scenario = load_scenario(scenario_file)
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
     method = Method(file.objective, file.optimizer)
-    return Manifest(scenario, file.seed, file.versions, method, file.run, file.thinned)
+    manifest = Manifest(scenario, file.seed, file.versions, method, file.run, file.thinned)
+    if file.sha256 != _digest(manifest):
+        raise InputError(path, "sha256", "does not fit the other keys: they were changed")
+    return manifest
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
@@ -152,8 +153,8 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
         "scenario_sha256": _sha256(text),
         "objective": manifest.method.objective,
         "optimizer": manifest.method.optimizer,
+        "sha256": _digest(manifest),
     }
-    content["sha256"] = _digest(content)
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
@@ -168,14 +169,14 @@ class _File(Section):
     objective: str
     optimizer: str
     sha256: str
-    """Digest of the keys above."""
+    """SHA-256 of run, seed, versions, objective and optimiser."""
     thinned: bool = False
 
 
-def _digest(content: Mapping[str, Any]) -> str:
-    """SHA-256 of the content of manifest.json, without `sha256` and `thinned`."""
-    rest = {key: value for key, value in content.items() if key not in ("sha256", "thinned")}
-    return _sha256(json.dumps(rest, sort_keys=True))
+def _digest(manifest: Manifest) -> str:
+    """SHA-256 of a manifest without its scenario, which has a digest of its own."""
+    parts = (manifest.run, manifest.seed, dict(manifest.versions), vars(manifest.method))
+    return _sha256(json.dumps(parts, sort_keys=True))
 
 
 def _sha256(text: str) -> str:
