@@ -1,7 +1,7 @@
 """evolve(): what the command does, from Python; and the command evolve."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 from helpers.analytic import Bowl, RandomSearch, in_threads, read_record, small_scenario
@@ -10,6 +10,7 @@ import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluators import OnExecutor
+from tetra_drake.evolution.manifest import write_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run_record import RunRecord
@@ -231,9 +232,8 @@ def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeyp
     with pytest.warns(RuntimeWarning, match="x1"):
         run = tetra_drake.evolve(tiny, tmp_path / "run", reevaluate=False)
     assert run.statuses[0].stop is not None
-    manifest = tmp_path / "run" / "manifest.json"
-    current = run.manifest.versions["numpy"]
-    manifest.write_text(manifest.read_text().replace(f'"{current}"', '"0.9"'))
+    older = {**run.manifest.versions, "numpy": "0.9"}
+    write_manifest(run.directory, replace(run.manifest, versions=older))
     with pytest.warns(RuntimeWarning, match=r"numpy 0\.9"):
         tetra_drake.evolve(None, tmp_path / "run", resume=True, reevaluate=False, report=False)
 

@@ -57,6 +57,18 @@ def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
         RunRecord.resume(run)
 
 
+@pytest.mark.parametrize("key", ["run", "seed", "versions", "objective", "optimizer"])
+def test_a_changed_manifest_is_reported(run_small, refused, key):
+    run = run_small(population=4, iterations=1)
+    manifest = run / "manifest.json"
+    content = json.loads(manifest.read_text())
+    manifest.write_text(json.dumps(content | {"thinned": True}))
+    assert read_manifest(run).thinned
+    manifest.write_text(json.dumps(content | {key: other(content[key])}))
+    with refused(manifest, "sha256", "changed"):
+        read_manifest(run)
+
+
 def test_a_changed_scenario_is_reported(run_small, refused):
     run = run_small(population=4, iterations=1)
     scenario = run / "scenario.yaml"

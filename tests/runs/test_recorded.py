@@ -18,7 +18,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait import ParameterSpace, load_gait
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import INCH
 
@@ -75,6 +75,13 @@ def test_the_diagram_walks_as_recorded():
     walked = simulate(scenario=run.scenario, gait=run.best_gait()).metrics.distance_in
     recorded = run.fittest()["distance"] / INCH
     assert walked == pytest.approx(recorded, rel=0, abs=ROUNDINGS * 0.0022)
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_record_holds_every_value_of_its_scenario(name):
+    """So that another default does not change what the record means."""
+    for file in (tables.HERE / name).rglob(SCENARIO):
+        assert dump_scenario(load_scenario(file)) == file.read_text(encoding="utf-8"), file
 
 
 @pytest.mark.parametrize("name", FOLDERS)

@@ -121,6 +121,11 @@ def test_the_rules_of_merging(changes, expected):
     assert merged(BASE, changes) == BASE | expected
 
 
+def test_a_tag_that_is_no_name_is_refused(scenario, refused):
+    with refused("scenario thesis", "engine", "!Compiled"):
+        scenario.with_changes({f"engine.{TAG}": {"a": 1}})
+
+
 def test_a_robot_from_python_keeps_its_spacing(scenario):
     robot = scenario.robot.model_copy(update={"strut_length": 0.2, "spacing": 0.05})
     assert scenario.with_changes({"robot": robot}).robot == robot

@@ -60,8 +60,11 @@ def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
     return metrics
 
 
+_Count = Annotated[int, Field(ge=0, lt=2**31)]
+
+
 class _Line(BaseModel):
-    """Keys and types of a line. Further keys are allowed."""
+    """Keys and types of a line. Further keys are ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -76,34 +79,35 @@ class _Draws(_Line):
 class _EvaluationLine(_Line):
     """Keys of an evaluation; `genome` is None in a thinned run."""
 
-    index: int
-    iteration: int
-    genome: list[float] | None
+    index: _Count
+    iteration: _Count
+    genome: Annotated[list[float], Field(min_length=1)] | None
     metrics: Annotated[dict[str, Any], AfterValidator(_checked)]
     fitness: float | None
     failure: str | None
     wall_time_s: float
     engine: str
-    placed: int | None = None
+    placed: _Count | None = None
     draws: _Draws | None = None
 
 
 class _IterationLine(_Line):
-    """Keys of an iteration, without the optimiser's report."""
+    """Keys of an iteration; `mean_fitness` is in the report of some optimisers."""
 
-    iteration: int
-    evaluations: int
+    iteration: _Count
+    evaluations: _Count
     best_fitness: float | None
-    best_evaluation: int | None
+    best_evaluation: _Count | None
     stop: str | None
+    mean_fitness: float | None = None
 
 
 class _EliteLine(_Line):
     """Keys of an elite on disturbed robots."""
 
-    trial: int
-    index: int
-    kept: float
+    trial: _Count
+    index: _Count
+    kept: Annotated[float, Field(ge=0, le=1)]
     mean_distance: float | None
 
 

@@ -1,6 +1,7 @@
 """Manifest of a run: its definition, on disk and in memory.
 
-    manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of scenario.yaml
+    manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of these and of
+                     scenario.yaml
     scenario.yaml    the scenario with all settings; its height file, if any, beside it
 
 The name of a run is a digest of this definition. Each line of the record has the name.
@@ -135,7 +136,10 @@ def read_manifest(directory: Path) -> Manifest:
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
     method = Method(file.objective, file.optimizer)
-    return Manifest(scenario, file.seed, file.versions, method, file.run, file.thinned)
+    manifest = Manifest(scenario, file.seed, file.versions, method, file.run, file.thinned)
+    if file.sha256 != _digest(manifest):
+        raise InputError(path, "sha256", "does not fit the other keys: they were changed")
+    return manifest
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
@@ -149,6 +153,7 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
         "scenario_sha256": _sha256(text),
         "objective": manifest.method.objective,
         "optimizer": manifest.method.optimizer,
+        "sha256": _digest(manifest),
     }
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
@@ -163,7 +168,15 @@ class _File(Section):
     scenario_sha256: str
     objective: str
     optimizer: str
+    sha256: str
+    """SHA-256 of run, seed, versions, objective and optimiser."""
     thinned: bool = False
+
+
+def _digest(manifest: Manifest) -> str:
+    """SHA-256 of a manifest without its scenario, which has a digest of its own."""
+    parts = (manifest.run, manifest.seed, dict(manifest.versions), vars(manifest.method))
+    return _sha256(json.dumps(parts, sort_keys=True))
 
 
 def _sha256(text: str) -> str:

@@ -153,7 +153,7 @@ def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
     if not isinstance(value, dict):
         refuse("", f"found {described(value)}; {hint('!', tags)}")
     name = value.get(TAG, next(iter(kinds)))
-    if name not in kinds:
+    if f"!{name}" not in tags:
         refuse("", f"found !{name}; {hint(f'!{name}', tags)}")
     for key in value:
         others = [f"!{other}" for other, kind in kinds.items() if key in keys_of(kind)]
