@@ -1,10 +1,9 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
 
 from tetra_drake.systems.actuators import Actuators
-from tetra_drake.systems.anchors import Anchors
+from tetra_drake.systems.anchors_and_loads import NodeForces
 from tetra_drake.systems.cable_feedback import Feedback
 from tetra_drake.systems.cable_network import CableNetwork
-from tetra_drake.systems.constant_loads import Loads
 from tetra_drake.systems.ground_contact import GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
@@ -12,12 +11,11 @@ from tetra_drake.systems.steering import Steering
 
 __all__ = [
     "Actuators",
-    "Anchors",
     "CableNetwork",
     "Feedback",
     "GroundContact",
-    "Loads",
     "MatsuokaCpg",
+    "NodeForces",
     "StartUpGate",
     "Steering",
 ]

@@ -8,6 +8,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from tetra_drake.physics.forces import compute_anchor_forces, compute_loads
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples
@@ -15,12 +16,11 @@ from tetra_drake.robot.structure import AddBodies
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import (
     Actuators,
-    Anchors,
     CableNetwork,
     Feedback,
     GroundContact,
-    Loads,
     MatsuokaCpg,
+    NodeForces,
     StartUpGate,
     Steering,
 )
@@ -71,9 +71,11 @@ def MakeTensegrityDiagram(
     ground = builder.AddNamedSystem("ground", GroundContact(robot, witness=witness))
     acting = [cables, ground]
     if structure.anchors.nodes.size:
-        acting.append(builder.AddNamedSystem("anchors", Anchors(robot)))
+        anchors = NodeForces(robot, kernel=compute_anchor_forces)
+        acting.append(builder.AddNamedSystem("anchors", anchors))
     if structure.loads.nodes.size:
-        acting.append(builder.AddNamedSystem("loads", Loads(robot)))
+        loads = NodeForces(robot, kernel=compute_loads)
+        acting.append(builder.AddNamedSystem("loads", loads))
     forces = builder.AddNamedSystem("forces", Adder(len(acting), 6 * len(structure.bodies)))
 
     state, signals = plant.get_state_output_port(), start_up.get_output_port()
