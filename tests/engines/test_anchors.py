@@ -12,6 +12,7 @@ from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
+from tetra_drake.report.run_figures import draw_trajectory
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
@@ -162,6 +163,16 @@ def test_a_diagram_has_anchors_and_loads_only_where_the_robot_has():
     assert both - neither == {"anchors", "loads"}
     assert systems(scenario_of(SWINGING)) - neither == {"anchors"}
     assert not systems(scenario_of(HUNG)) & {"anchors", "loads"}
+
+
+def test_pictures_of_a_floating_prism_leave_out_the_ground(tmp_path):
+    scenario = floating_prism()
+    result = simulate(scenario, seeded_gait(scenario, 3), record=True)
+    assert result.trajectory.sizes["contact"] == 0
+    assert result.metrics.lifted == 1.0
+    captions = draw_trajectory(result, tmp_path)
+    assert "ground_forces" not in captions
+    assert {f"{name}.svg" for name in captions} <= {file.name for file in tmp_path.iterdir()}
 
 
 def test_an_offset_moves_a_body_only_along_its_free_axes():

@@ -8,8 +8,9 @@ import re
 import numpy as np
 import pytest
 from helpers import prism
+from helpers.anchored import HUNG, scenario_of
 from helpers.made_up_walk import LOAD, make_row, make_walk
-from helpers.meshcat_page import read_page
+from helpers.meshcat_page import commands, read_page
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
@@ -25,7 +26,7 @@ from tetra_drake.visualization.replay import (
     round_force,
     save_replay,
 )
-from tetra_drake.visualization.scene import THICKEST, THINNEST, cable_paths, drawn_radii
+from tetra_drake.visualization.scene import COLOURS, THICKEST, THINNEST, cable_paths, drawn_radii
 
 ROUNDING = 0.51 * RESOLUTION
 
@@ -77,7 +78,8 @@ def film_of(page):
     (packed,) = re.findall(r"const recording = (.*);\n", page)
     film = json.loads(packed)
     for name in ("poses", "radii", "touches", "arrows", "traces"):
-        film[name] = film["resolution"] * np.cumsum(film[name], axis=1).T
+        rows = np.reshape(film[name], (len(film[name]), len(film["times"])))
+        film[name] = film["resolution"] * np.cumsum(rows, axis=1).T
     return film
 
 
@@ -199,3 +201,26 @@ def test_pages_share_one_version_of_a_viewer(scenario, trajectory, page, tmp_pat
             save(tmp_path / "other.html", viewer=wrong)
     assert other.read_text(encoding="utf-8") == script[:-1]
     assert not (tmp_path / "other.html").exists()
+
+
+def test_a_page_without_ground_shows_anchors_and_no_floor(tmp_path):
+    hung = scenario_of(HUNG, duration=0.2)
+    robot, frames = Robot.of(hung), recorded(hung)
+    save_replay(tmp_path / "page.html", robot=robot, trajectory=frames, title="a robot: hangs")
+    page = read_page(tmp_path / "page.html")
+    film = film_of(page)
+    assert film["contacts"] == []
+    colours = {node["path"][-1]: (node["body"], node["colour"]) for node in film["nodes"]}
+    assert colours["node top"] == (-1, COLOURS["anchor"])
+    assert colours["node a"] == (0, COLOURS["node"])
+    (top,) = [node["place"] for node in film["nodes"] if node["body"] == -1]
+    assert top == [0.0, 0.0, 1.0]
+    assert commands(page, "/robot/world/node top")
+    assert not commands(page, "/floor/")
+    assert "anchored node" in page
+    assert "on the ground</li>" not in page
+
+
+def test_a_page_with_ground_and_no_anchors_has_no_word_of_them(page):
+    assert commands(page, "/floor/")
+    assert "anchored node" not in page

@@ -12,7 +12,7 @@ is MuJoCo's soft contact with a friction cone.
   damping. It breaks free at MUJOCO_FRICTION times the normal force, not after a deflection. A
   sliding node has Coulomb friction; with the reset integrator it slides almost freely.
 
-The ground must be a plane, level or inclined.
+The ground must be a plane, level or inclined, or there is none.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class MujocoEngine(Engine):
             raise InputError(scenario.name, "cpg.feedback", problem)
         if scenario.terrain.plane_slope is None:
             kind = type(scenario.terrain).__name__
-            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
+            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline, or !Nothing"
             raise InputError(scenario.name, "terrain", problem)
         scenario.actuation.check_mujoco(scenario.name)
         scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
