@@ -122,7 +122,7 @@ def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot)
 def test_forces_that_are_not_finite_end_the_search_at_once(scenario, robot, where, refused):
     start = robot.structure.initial_state
     start[7 + 4] = where  # x of T2
-    with refused("thesis", "robot", "not finite, is on 'T1'"):
+    with refused("thesis", "robot", "nan N are left on 'T1'"):
         equilibrium_of(scenario, robot.structure, start)
 
 
@@ -159,16 +159,12 @@ def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
 def test_a_search_ends_after_steps_by_the_robot_alone(robot, refused, monkeypatch, limits, steps):
     for name, value in limits.items():
         monkeypatch.setattr(equilibrium, name, value)
-    taken, displaced = [], equilibrium.displaced
-    monkeypatch.setattr(equilibrium, "displaced", lambda *a: taken.append(a) or displaced(*a))
-    with refused("thesis", "robot", f"no equilibrium until step {steps};"):
+    with refused("thesis", "robot", f"no equilibrium in {steps} steps;"):
         _ = robot.equilibrium
-    assert len(taken) == steps
 
 
-def test_a_search_over_hills_seldom_tries_more_than_two_shifts(monkeypatch):
-    solve, tries, steps, displaced = equilibrium.solve_convex, [], [], equilibrium.displaced
-    monkeypatch.setattr(equilibrium, "solve_convex", lambda *a: tries.append(a) or solve(*a))
-    monkeypatch.setattr(equilibrium, "displaced", lambda *a: steps.append(a) or displaced(*a))
+def test_a_search_factorises_few_matrices(monkeypatch):
+    factorise, tries = equilibrium.factorise, []
+    monkeypatch.setattr(equilibrium, "factorise", lambda *a: tries.append(a) or factorise(*a))
     assert Robot.of(load_scenario("prism")).equilibrium.feet == 3
-    assert len(steps) > 10 and len(tries) <= 3 * len(steps)
+    assert len(tries) < 100

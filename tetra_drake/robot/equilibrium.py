@@ -46,7 +46,7 @@ HOLD = 30.0
 stiffness that this force can have along motions that the springs do not resist."""
 
 POWER_STEPS = 10
-"""Iterations for the direction in which a balance is least stable."""
+"""Iterations for the least stable motion of a balanced robot."""
 
 RESISTED = 1e-6
 """Least share of the greatest displacement of an anchored node by which a motion is resisted."""
@@ -158,12 +158,14 @@ class _Descent:
         self._robot = robot
         self._radius = float(robot.model.bodies.radius.max())
         self._reach = FIRST_REACH * self._radius
-        self._shift = 0.0
+        self._shift = self._rounding = 0.0
         self._arrive(start, force_at_rest(robot, start))
 
     def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
         """Takes a state. Its forces were computed last."""
         self.state, self.force = state, force
+        if not np.isfinite(force).all():
+            return
         self._stiffness = stiffness_at_rest(self._robot)
         self._held = _free_motions(self._robot, state)
         hardest = self._stiffness.diagonal().max()
