@@ -176,7 +176,7 @@ def test_a_sphere_by_the_default_builder(tmp_path: Path) -> None:
             [4, 4, -3],
             -2,
         ),
-        ("offset: [5, 5, 5]", [1, 2, 1]),
+        ("offset: [5, 5, 5]", [1, 2, 1], 0),
     ],
 )
 def test_places_of_substructures(
