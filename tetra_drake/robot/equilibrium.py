@@ -131,8 +131,8 @@ def _reason(left: float) -> str:
 
 
 def _unheld_force(model: Model) -> np.ndarray:
-    """Sum (3,) in N of weights and loads along the axes of the world in which nothing can hold the
-    robot; 0 along the others."""
+    """Sum (3,) in N of weights and loads along x, y and z, where nothing can hold the robot; 0
+    otherwise."""
     weights = np.array([0.0, 0.0, -model.bodies.weight.sum()])
     forces = np.vstack([model.loads.forces, weights])
     total = forces.sum(axis=0)
