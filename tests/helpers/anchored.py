@@ -8,6 +8,7 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.scenario.strut_contact_kinds import NoStrutContact
 from tetra_drake.scenario.terrain_kinds import Nothing
 
 BAR = {"pairs": [["a", "b"]], "diameter": 0.008, "density": 1200.0, "node_diameter": 0.0}
@@ -37,9 +38,11 @@ LOADS = {"n3": [0.0, 0.0, -0.4], "n4": [0.1, 0.0, -0.3]}
 
 
 def scenario_of(tree: dict[str, Any], duration: float = 2.0, **changes: object) -> Scenario:
-    """A structure without ground, its numbers in SI; `actuation="!Winch"` changes a section."""
+    """A structure without ground and contact of struts, its numbers in SI; `actuation="!Winch"`
+    changes a section."""
     robot = StructureFile.model_validate(tree)
-    scenario = load_scenario("prism").with_sections(name="anchored", robot=robot, terrain=Nothing())
+    parts = {"robot": robot, "terrain": Nothing(), "strut_contact": NoStrutContact()}
+    scenario = load_scenario("prism").with_sections(name="anchored", **parts)
     times = {
         "simulation.duration": f"{duration} s",
         "simulation.steady_from": f"{0.5 * duration} s",

@@ -1,5 +1,6 @@
 """Files of NTRT: a prism and a spine, read into structures."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from helpers.structures import joined_nodes
 
 from tetra_drake.errors import InputError
 from tetra_drake.robot.statics import find_statics
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_structure import StructureFile
 
@@ -96,25 +98,74 @@ def test_a_spine_by_substructures(tmp_path: Path) -> None:
     assert names[:5:4] == ["string v1/front v2/front", "string v2/front v3/front"]
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("rise", [-3.0, 0.0, 26.0])
+def test_the_lowest_node_is_set_on_the_ground(tmp_path: Path, rise: float) -> None:
+    given = read(
+        write(tmp_path, PRISM.replace(", 0, ", f", {rise}, ").replace(", 2, ", f", {rise + 2}, "))
+    )
+    heights = [place[2] for place in given.nodes.values()]
+    assert heights == pytest.approx([0.0] * 3 + [0.2] * 3)
+
+
+BALL = """
+nodes: {low: [0, 1, 0], high: [0, 11, 0], ball: [0, 11, 0]}
+pair_groups: {rod: [[low, high]]}
+builders:
+  rod: {class: tgRodInfo, parameters: {density: 0.5, radius: 0.25}}
+  ball: {class: tgSphereInfo, parameters: {density: 0.7, radius: 2, friction: 1}}
+"""
+
+
 @pytest.mark.parametrize(
-    ("entry", "front"),
+    ("text", "node"),
     [
-        ("translation: [1, 2, 3]", [2, 4, 4]),
-        ("rotation: {axis: [0, 2, 0], angle: 90}", [1, 2, -1]),
-        ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1]),
-        ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1]),
-        ("scale: 3", [3, 4, 3]),
-        ("scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}", [4, 4, -3]),
-        ("offset: [5, 5, 5]", [1, 2, 1]),
+        (BALL, "high"),  # its node is where a rod ends
+        (BALL.replace("high: [0, 11, 0], ", "").replace("high", "ball"), "ball"),
     ],
 )
-def test_places_of_substructures(entry: str, front: list[float], tmp_path: Path) -> None:
-    """Turned, then scaled about their centre, then moved."""
+def test_a_sphere_at_the_end_of_a_rod(tmp_path: Path, text: str, node: str) -> None:
+    given = read(write(tmp_path, text))
+    assert given.nodes.keys() == {"low", node}
+    blueprint = given.blueprint()
+    place = blueprint.node_names.index(node)
+    assert blueprint.node_radius[place] == pytest.approx(0.2)
+    assert blueprint.node_radius.sum() == pytest.approx(0.2)
+    rod, ball = 0.5 * math.pi * 0.25**2 * 10.0, 0.7 * 4.0 / 3.0 * math.pi * 2.0**3  # kg
+    assert Structure.of(blueprint).mass == pytest.approx([rod + ball])
+
+
+def test_a_sphere_by_the_default_builder(tmp_path: Path) -> None:
+    text = BALL[: BALL.index("builders")].replace("ball", "sphere")
+    blueprint = read(write(tmp_path, text)).blueprint()
+    assert blueprint.node_radius.tolist() == pytest.approx([0.0, 0.05])
+    assert blueprint.node_density[1] == pytest.approx(1000.0)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("entry", "front", "lowest"),
+    [
+        ("translation: [1, 2, 3]", [2, 4, 4], 2),
+        ("rotation: {axis: [0, 2, 0], angle: 90}", [1, 2, -1], 0),
+        ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1], 0),
+        ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1], -2),
+        ("scale: 3", [3, 4, 3], -2),
+        (
+            "scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}",
+            [4, 4, -3],
+            -2,
+        ),
+        ("offset: [5, 5, 5]", [1, 2, 1], 0),
+    ],
+)
+def test_places_of_substructures(
+    entry: str, front: list[float], lowest: float, tmp_path: Path
+) -> None:
+    """Turned, then scaled about their centre, then moved; then the whole is set on the ground."""
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     file = write(tmp_path, f"substructures: {{v: {{path: vertebra.yaml, {entry}}}}}")
     x, y, z = front
-    assert read(file, unit=1.0).nodes["v/front"] == pytest.approx([z, x, y])
+    assert read(file, unit=1.0).nodes["v/front"] == pytest.approx([z, x, y - lowest])
 
 
 def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> None:
@@ -159,7 +210,8 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
         (SPINE.replace("1.5]", "9e14]"), "substructures", "'v3'"),
         (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), "builders", "'prism_rod'"),
         (PRISM + "  string: {class: tgBasicActuatorInfo}", "builders", "vertical and string"),
-        (SPINE.replace("v3/node_node", "node_edge"), "bond_groups.string.v1/v2/node_edge", "'A/B"),
+        (SPINE.replace("v3/node_node", "node_edge"), "bond_groups.string.v1/v2/node_edge", "edges"),
+        (SPINE.replace("v3/node_node", "edge_node"), "bond_groups.string.v1/v2/edge_node", "'A/B"),
         (SPINE.replace("v3/node", "v4/node"), "bond_groups.string.v1/v2/v4/node_node", "v2, v3"),
         (SPINE.replace("[back,", "[bakc,"), "bond_groups.string.v1/v2/v3/node_node[2]", "'bakc'"),
         ("substructures: {v: {scale: 2}}", "substructures", "0 paths of 'v'"),

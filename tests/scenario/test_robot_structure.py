@@ -59,7 +59,7 @@ def test_a_structure_has_what_its_file_says_in_si() -> None:
     assert given.bodies == (("b", "a", "c"), ("d", "e"), ("f", "g"))
     assert given.body_names == ("b a c", "d e", "bar")
     assert [given.body_of_node[node] for node in "abcdefg"] == [0, 0, 0, 1, 1, 2, 2]
-    assert [given.sphere_of_node[node].node_diameter for node in "abcf"] == [0.016, 0.016, 0, 0.01]
+    assert [given.sphere_of_node[node].diameter for node in "abcf"] == [0.016, 0.016, 0, 0.01]
     # Cables are named by group and nodes; a tension gives the free length.
     assert [cable.name for cable in given.all_cables] == ["side b d", "side c d", "long e f"]
     assert given.all_cables[1] == Member("cables.side.pairs[1]", "side", ("c", "d"))

@@ -97,8 +97,8 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
 
 def _frequencies(unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
     """Natural frequencies (Hz) above LEAST_FREQUENCY."""
-    stiffness = stiffness_at_rest(unactuated, state)
-    stiffness = 0.5 * (stiffness + stiffness.T)
+    force_at_rest(unactuated, state)
+    stiffness = stiffness_at_rest(unactuated)
     # M x'' = -K x with M = L Lᵀ: the squared frequencies are the eigenvalues of L^-1 K L^-T.
     factor = np.linalg.cholesky(_mass_matrix(unactuated))
     scaled = np.linalg.solve(factor, np.linalg.solve(factor, stiffness).T)

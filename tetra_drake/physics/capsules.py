@@ -131,22 +131,27 @@ def find_near_struts(
             near.p_WN[node, axis] = nodes[node, kinematics.P_WN + axis]
 
 
+class Touch(NamedTuple):
+    """Contact of two struts."""
+
+    s: Real
+    """Place on the first axis, 0 at its start, 1 at its end."""
+    t: Real
+    """Place on the second axis."""
+    direction: Vector
+    """Unit vector from the second place to the first."""
+    depth: Real
+    """Depth (m) of the overlap; negative if the struts are apart."""
+
+
 @inlined
 def are_near(struts: Struts, nodes: Table, i: int, j: int, limit: Real) -> bool:
     """True if the axes of two struts are at most `limit` (m) apart in any lane."""
     offset = difference(midpoint(struts, nodes, i), midpoint(struts, nodes, j))
     if not may_be_nearer(offset, 0.5 * (struts.length[i] + struts.length[j]), limit):
         return False
-    return any_lane(axis_distance(struts, nodes, i, j) <= limit)
-
-
-@inlined
-def axis_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
-    """Distance (m) of the axes of two struts where they touch or would touch."""
-    axes = axes_of(struts, nodes, i, j)
-    s, t = contact_places(axes)
-    between = vector_between(axes, s, t)
-    return math.sqrt(dot(between, between))
+    reach = struts.radius[i] + struts.radius[j]
+    return any_lane(reach - find_touch(struts, nodes, i, j).depth <= limit)
 
 
 @inlined
@@ -187,21 +192,28 @@ def place_on(nodes: Table, a: int, b: int, column: int, s: Real) -> Vector:
 
 
 @inlined
-def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j: int) -> None:
-    """Adds the force between two struts to the forces on their nodes."""
+def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
+    """Place, direction and depth of the contact of struts i and j."""
     axes = axes_of(struts, nodes, i, j)
     s, t = contact_places(axes)
     between = vector_between(axes, s, t)
-    square, reach = dot(between, between), struts.radius[i] + struts.radius[j]
-    if not any_lane(square < reach * reach):
-        return
+    square = dot(between, between)
     per_distance = inverse_sqrt(maximum(square, _LEAST_SQUARE))
-    direction = scaled(per_distance, between)
+    depth = struts.radius[i] + struts.radius[j] - square * per_distance
+    return Touch(s, t, scaled(per_distance, between), depth)
+
+
+@inlined
+def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j: int) -> None:
+    """Adds the force between two struts to the forces on their nodes."""
+    s, t, direction, depth = find_touch(struts, nodes, i, j)
+    if not any_lane(depth > 0.0):
+        return
     a_i, b_i, a_j, b_j = struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]
     v_i = place_on(nodes, a_i, b_i, kinematics.V_WN, s)
     v_j = place_on(nodes, a_j, b_j, kinematics.V_WN, t)
     depth_rate = dot(difference(v_j, v_i), direction)
-    force = scaled(normal_force(reach - square * per_distance, depth_rate, law), direction)
+    force = scaled(normal_force(depth, depth_rate, law), direction)
     # A force on a rigid strut, between its nodes, has the effect of its shares on the nodes.
     add_vector(scaled(1.0 - s, force), a_i, kinematics.FORCE, nodes)
     add_vector(scaled(s, force), b_i, kinematics.FORCE, nodes)

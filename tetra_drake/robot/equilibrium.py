@@ -11,41 +11,49 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics import cable, contact
+from tetra_drake.physics.cable import LENGTH, PASSIVE
+from tetra_drake.physics.capsules import PARALLEL
+from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
-from tetra_drake.physics.kinematics import P_WN, move_bodies
+from tetra_drake.physics.kinematics import FORCE, P_WN, move_bodies
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.rigid_motions import rigid_motions
+from tetra_drake.physics.stiffness import stiffness_matrix
 from tetra_drake.robot.statics import null_space
 from tetra_drake.simd.compiling import LOGGER, compiled
 from tetra_drake.simd.lanes import Table
 
-TOLERANCE = 1e-11
-"""Largest remaining force in equilibrium, as a share of the greatest tension or of the weight."""
-LEAST_FORCE = 1e-9
-"""Least force (N) that TOLERANCE refers to. It counts if tensions and weight are smaller."""
+ROUNDING = 8 * np.finfo(float).eps
+"""Largest force left in equilibrium, as a share of the robot's greatest stiffness times its
+farthest coordinate: positions are rounded, and springs turn that into force."""
 
 MOST_STEPS, LEAST_STEPS = 1000, 10
-"""Largest number of steps of a search: for few bodies, and for the most bodies that are
-possible."""
+"""Upper limit of the steps of a search, for few bodies and for as many as a structure can have."""
 
 MOST_WORK = 2e11
-"""Limit of the work of a search, between MOST_STEPS and LEAST_STEPS: number of steps times the cube
-of the number of unknowns. This takes about two minutes."""
+"""Upper limit of steps times the cube of their unknowns, between these: two minutes or so."""
 
-FIRST_REACH, LONGEST_REACH = 0.05, 0.2
-"""Largest step of Newton's method at first, and later, as a share of the largest body's radius."""
-OVERSHOOT = 0.9
-"""A step is too long if the force at its end points backward and exceeds this share of the force at
-its beginning; only the components along the step count."""
-DIFFERENCE = 1e-7
-"""Displacement for finite differences, as a share of the largest body's radius."""
+FIRST_REACH, LONGEST_REACH, SHORTEST_REACH = 0.05, 0.2, 1e-12
+"""Upper limit of a step at first, later, and where the search ends, as shares of the largest body's
+radius."""
+LEAST_GAIN, GOOD_GAIN = 0.1, 0.5
+"""Energy that a step sets free, as a share of the energy by the forces and the stiffness at its
+beginning. Below the first limit a step is too long; above the second, the next may be longer."""
+
+CORRECTIONS = 8
+"""Most corrections of a step."""
+HOLD = 30.0
+"""Shift of a correction, as a multiple of the greatest force over the largest body's radius: the
+stiffness that this force can have along motions that the springs do not resist."""
+
+POWER_STEPS = 10
+"""Iterations for the least stable motion of a balanced robot."""
 
 RESISTED = 1e-6
 """Least share of the greatest displacement of an anchored node by which a motion is resisted."""
 
-LEAST_STIFFNESS = 1e-9
-"""Least stiffness of a stable mode, as a share of the ground's stiffness."""
+LEAST_STIFFNESS = 1e-12
+"""Stiffness of a motion that nothing resists, as a share of the robot's greatest stiffness."""
 
 LONG = 5.0
 """Time (s) after which a long search is announced."""
@@ -77,7 +85,7 @@ class Unactuated(NamedTuple):
     @classmethod
     def of(cls, model: Model) -> Self:
         """The robot of a model, with all cables passive."""
-        cables = model.cables._replace(signal=np.full_like(model.cables.signal, cable.PASSIVE))
+        cables = model.cables._replace(signal=np.full_like(model.cables.signal, PASSIVE))
         return cls(model._replace(cables=cables), Forces.of(model))
 
 
@@ -89,84 +97,170 @@ def find_equilibrium(
     The search goes downhill in potential energy from the state `start` (13 n,) to a minimum.
     Friction bears no load. Raises InputError, naming `source` and a body, if none is found.
     """
-    robot, state = Unactuated.of(model), start
-    weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
-    # Anchors turn the rounding of positions into forces.
-    borne = max(weight, 1e-4 * radius * model.anchors.stiffness.max(initial=0.0))
-    descent = _Descent(robot)
-    reach, announce_at = FIRST_REACH * radius, math.inf
+    unheld = _unheld_force(model)
+    if unheld.any():
+        amounts = ", ".join(f"{force:.3g}" for force in unheld)
+        problem = f"has no equilibrium: nothing holds it against the force [{amounts}] N"
+        raise InputError(source, "robot", f"{problem} of its weight and loads")
+    robot = Unactuated.of(model)
+    descent = _Descent(robot, start)
     most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
-    for count in range(most):
-        force = force_at_rest(robot, state)
-        if not np.isfinite(force).all():
-            break
-        tensions = np.abs(robot.forces.cable_forces[:, cable.TENSION])
-        greatest = max(tensions.max(initial=borne), LEAST_FORCE)
-        if np.abs(force).max() <= TOLERANCE * greatest:
-            lengths = np.round(robot.forces.cable_forces[:, cable.LENGTH], LENGTH_DIGITS)
-            feet = int(np.count_nonzero(robot.forces.ground_forces[:, contact.NORMAL]))
-            return Equilibrium(state, lengths, feet)
+    announce_at, count = math.inf, 0
+    while count < most and not descent.is_at_rest() and descent.step():
+        count += 1
         now = time.perf_counter()
         if count == 1:  # kernels are compiled by now
             announce_at = now + LONG
         if now > announce_at:
             _LOG.warning("%s: finding the robot's equilibrium takes a while", source)
             announce_at = math.inf
-        step = descent.step(state, force)
-        if step is None:
-            break
-        step *= min(1.0, reach / np.abs(step).max())
-        moved = displaced(robot, state, step)
-        if force_at_rest(robot, moved) @ step >= -OVERSHOOT * (force @ step):
-            state, reach = moved, min(2.0 * reach, LONGEST_REACH * radius)
-        else:  # also if the force is NaN because the ends of a cable meet
-            reach = 0.5 * np.abs(step).max()
-    left = np.abs(force.reshape(-1, 6)).max(axis=1)
-    body = int(left.argmax())  # argmax takes the first NaN, if there is one
-    amount = f"{left[body]:.3g} N" if np.isfinite(left[body]) else "which is not finite"
-    found = f"finds no equilibrium until step {count + 1}"
-    problem = f"{found}; the greatest force left, {amount}, is on '{bodies[body]}'"
-    raise InputError(source, "robot", problem)
+    if not descent.is_balanced():
+        left = np.abs(descent.force.reshape(-1, 6)).max(axis=1)
+        body = int(left.argmax())  # argmax takes the first NaN, if there is one
+        found = f"finds no equilibrium in {count} steps; {left[body]:.3g} N are left"
+        raise InputError(source, "robot", f"{found} on '{bodies[body]}': {_reason(left[body])}")
+    force_at_rest(robot, descent.state)
+    lengths = np.round(robot.forces.cable_forces[:, LENGTH], LENGTH_DIGITS)
+    feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
+    return Equilibrium(descent.state, lengths, feet)
+
+
+def _reason(left: float) -> str:
+    if not np.isfinite(left):
+        return "its position is not finite, or two ends of a cable meet"
+    return "it still moves; give positions nearer to an equilibrium, or more tension"
+
+
+def _unheld_force(model: Model) -> np.ndarray:
+    """Sum (3,) in N of weights and loads along x, y and z, where nothing can hold the robot; 0
+    otherwise."""
+    weights = np.array([0.0, 0.0, -model.bodies.weight.sum()])
+    forces = np.vstack([model.loads.forces, weights])
+    total = forces.sum(axis=0)
+    total[np.abs(total) <= ROUNDING * np.abs(forces).sum(axis=0)] = 0.0
+    held = (model.anchors.stiffness > 0.0).any(axis=0)
+    held |= len(model.p_BN) > model.first_node[-1]  # cables from fixed nodes
+    held[2] |= model.ground.contacts.size > 0 and total[2] <= 0.0
+    return np.where(held, 0.0, total)
 
 
 class _Descent:
-    """Newton's method for a minimum of the potential energy."""
+    """Descent to a minimum of the potential energy, by Newton's method.
 
-    def __init__(self, robot: Unactuated) -> None:
+    Stiffness is added to all displacements: a shift. It makes the energy convex and the step as
+    short as the reach, which grows and shrinks with success.
+
+    The energy of a mechanism has long curved valleys, whose sides are up to 10^12 times as steep as
+    their floor. A step along the floor ends on a side. Corrections lead it back to the floor, and
+    only then its energy is judged.
+    """
+
+    def __init__(self, robot: Unactuated, start: np.ndarray) -> None:
         self._robot = robot
-        self._hard = float(contact.NormalForce(*robot.model.ground.normal).stiffness)
-        self._shifts = [0.0, LEAST_STIFFNESS * self._hard]
-        """Stiffnesses (N/m) to try. A step adds the least one that makes the energy convex."""
-        while self._shifts[-1] < math.inf:
-            self._shifts.append(10.0 * self._shifts[-1])
-        self._index = 0
-        """Index of the last step's shift. The next step mostly needs the same shift."""
+        self._radius = float(robot.model.bodies.radius.max())
+        self._reach = FIRST_REACH * self._radius
+        self._shift = self._rounding = 0.0
+        self._arrive(start, force_at_rest(robot, start))
 
-    def step(self, state: np.ndarray, force: np.ndarray) -> np.ndarray | None:
-        """Newton step: displacements (6 n,) that bring the force to zero.
+    def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
+        """Takes a state. Its forces were computed last."""
+        self.state, self.force = state, force
+        if not np.isfinite(force).all():
+            return
+        self._stiffness = stiffness_at_rest(self._robot)
+        self._held = _free_motions(self._robot, state)
+        hardest = self._stiffness.diagonal().max()
+        farthest = np.abs(self._robot.forces.nodes[:, P_WN : P_WN + 3]).max()
+        self._rounding = ROUNDING * hardest * farthest
+        if self._robot.model.strut_contact.acts:
+            # The place where nearly parallel struts touch is rounded 1 / PARALLEL² times as much.
+            pushes = np.abs(self._robot.forces.nodes[:, FORCE : FORCE + 3]).max()
+            self._rounding += ROUNDING / PARALLEL**2 * pushes
+        steepest = np.abs(force).max() / self._radius
+        self._least = LEAST_STIFFNESS * max(hardest, steepest, np.finfo(float).eps)
 
-        If the potential energy is not convex, the displacements lead downhill. The robot as a whole
-        does not move. None if the derivatives of the forces are not finite.
-        """
-        held, stiffness = _free_motions(self._robot, state), stiffness_at_rest(self._robot, state)
-        stiffness = 0.5 * (stiffness + stiffness.T) + self._hard * held @ held.T
-        before = self._index
-        while (step := self._solved(stiffness, force, self._index)) is None:
-            self._index += 1
-            if self._index == len(self._shifts):
-                return None
-        while 0 < self._index <= before:
-            longer = self._solved(stiffness, force, self._index - 1)
-            if longer is None:
+    def is_balanced(self) -> bool:
+        """True if no force is left, except for rounding errors."""
+        return bool(np.abs(self.force).max() <= self._rounding)
+
+    def is_at_rest(self) -> bool:
+        """True if no force is left and the energy is at a minimum."""
+        return self.is_balanced() and self._factor(self._stiffness, self._least) is not None
+
+    def step(self) -> bool:
+        """Goes a step downhill. Returns False if there is none."""
+        while self._reach > SHORTEST_REACH * self._radius and np.isfinite(self.force).all():
+            step, expected = self._fall() if self.is_balanced() else self._newton_step()
+            length = np.abs(step).max()
+            moved, force, step, gain = self._corrected(step, expected)
+            if gain > LEAST_GAIN:
+                if gain > GOOD_GAIN and length > 0.3 * self._reach:
+                    self._reach = min(2.0 * self._reach, LONGEST_REACH * self._radius)
+                self._shift *= 0.1
+                self._arrive(moved, force)
+                return True
+            self._reach = 0.5 * length
+        return False
+
+    def _newton_step(self) -> tuple[np.ndarray, float]:
+        """Displacements (6 n,) with the least shift, and twice the energy that they set free by the
+        stiffness."""
+        self._shift = max(self._shift, self._least)
+        while True:
+            factor = self._factor(self._stiffness, self._shift)
+            if factor is None:
+                self._shift *= 4.0
+                continue
+            step = self._solved(factor, self.force)
+            excess = np.abs(step).max() / self._reach
+            if excess <= 1.0:
+                return step, float(self.force @ step + self._shift * step @ step)
+            self._shift *= min(max(2.0, 0.7 * excess), 100.0)
+
+    def _fall(self) -> tuple[np.ndarray, float]:
+        """As _newton_step(), for a step out of a balance that is not stable."""
+        shift = self._least
+        while (factor := self._factor(self._stiffness, shift)) is None:
+            shift *= 2.0
+        step = np.cos(np.arange(self.force.size))  # any direction
+        for _ in range(POWER_STEPS):
+            step = self._solved(factor, step)
+            step *= self._reach / np.abs(step).max()
+        return step, float(-step @ self._stiffness @ step)
+
+    def _corrected(
+        self, step: np.ndarray, expected: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """State, force, displacements and gain (see LEAST_GAIN) of a step that is led back to the
+        floor of the valley. `expected` is in J, as by _newton_step()."""
+        longest = 0.5 * np.abs(step).max()
+        moved = displaced(self._robot, self.state, step)
+        for count in range(CORRECTIONS + 1):
+            force = force_at_rest(self._robot, moved)
+            gain = (self.force + force) @ step / expected
+            if gain > GOOD_GAIN or count == CORRECTIONS or not np.isfinite(force).all():
                 break
-            self._index, step = self._index - 1, longer
-        return step
+            stiffness = stiffness_at_rest(self._robot)
+            shift = max(HOLD * np.abs(force).max() / self._radius, self._least)
+            while (factor := self._factor(stiffness, shift)) is None:
+                shift *= 4.0
+            correction = self._solved(factor, force)
+            if np.abs(correction).max() > longest:
+                break
+            moved, step = displaced(self._robot, moved, correction), step + correction
+        return moved, force, step, gain
 
-    def _solved(self, stiffness: np.ndarray, force: np.ndarray, index: int) -> np.ndarray | None:
-        """The step with a shift; None if the energy is not convex with this shift."""
-        shifted, step = stiffness + self._shifts[index] * np.eye(len(force)), np.empty_like(force)
-        is_convex = solve_convex(shifted, force, LEAST_STIFFNESS * self._hard, step)
-        return step if is_convex else None
+    def _factor(self, stiffness: np.ndarray, shift: float) -> np.ndarray | None:
+        """Cholesky's factor of the stiffness with a shift; None if the energy is not convex with
+        it."""
+        factor = stiffness + shift * np.eye(len(stiffness))
+        return factor if factorise(factor, 0.5 * self._least) else None
+
+    def _solved(self, factor: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Displacements (6 n,) under a force. The robot as a whole does not move where it is
+        free."""
+        step = solve(factor, force)
+        return step - self._held @ (self._held.T @ step)
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
@@ -187,34 +281,42 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
         [
             of_nodes[model.first_node[-1] :].reshape(-1, 6),
             of_nodes[model.anchors.nodes][model.anchors.stiffness > 0.0],
-            turned.reshape(-1, 6) / np.abs(model.loads.forces).max(initial=LEAST_FORCE),
+            turned.reshape(-1, 6) / np.abs(model.loads.forces).max(initial=np.finfo(float).tiny),
         ]
     )[:, kept]
     free = null_space(resisted, RESISTED)
-    return (motions @ free).reshape(6 * len(p_WB), free.shape[1])
+    orthonormal, _ = np.linalg.qr((motions @ free).reshape(6 * len(p_WB), free.shape[1]))
+    return orthonormal
 
 
 @compiled
-def solve_convex(matrix: Table, right: Table, least: float, x: Table) -> bool:
-    """Solves a symmetric system by Cholesky's method. Returns False if a pivot is at most `least`.
+def factorise(matrix: Table, least: float) -> bool:
+    """Replaces the upper half of a symmetric matrix by Cholesky's factor. Returns False if a pivot
+    is at most `least`.
 
-    The upper half of the matrix is overwritten. LAPACK is not used because its threads wait for
-    each other on busy processors.
+    LAPACK is not used because its threads wait for each other on busy processors.
     """
-    n = right.size
+    n = matrix.shape[0]
     for i in range(n):
         if not matrix[i, i] > least:
             return False
         matrix[i, i:] /= np.sqrt(matrix[i, i])
         for row in range(i + 1, n):
-            matrix[row, row:] -= matrix[i, row] * matrix[i, row:]
-    x[:] = right
-    for i in range(n):
-        x[i] /= matrix[i, i]
-        x[i + 1 :] -= matrix[i, i + 1 :] * x[i]
-    for i in range(n - 1, -1, -1):
-        x[i] = (x[i] - (matrix[i, i + 1 :] * x[i + 1 :]).sum()) / matrix[i, i]
+            if matrix[i, row] != 0.0:  # mostly 0, as bodies have few neighbours
+                matrix[row, row:] -= matrix[i, row] * matrix[i, row:]
     return True
+
+
+@compiled
+def solve(factor: Table, right: Table) -> Table:
+    """Solves a symmetric system that was factorised by factorise()."""
+    n, x = right.size, right.copy()
+    for i in range(n):
+        x[i] /= factor[i, i]
+        x[i + 1 :] -= factor[i, i + 1 :] * x[i]
+    for i in range(n - 1, -1, -1):
+        x[i] = (x[i] - (factor[i, i + 1 :] * x[i + 1 :]).sum()) / factor[i, i]
+    return x
 
 
 @compiled
@@ -222,10 +324,10 @@ def force_at_rest(robot: Unactuated, state: Table) -> Table:
     """Generalized force (6 n,) at rest: [t_W / radius; f_W] at each body's origin. Contact nodes
     stick at their positions."""
     model, forces = robot.model, robot.forces
-    modes = np.zeros((forces.ground_forces.shape[0], contact.MODE_COLUMNS))
+    modes = np.zeros((forces.ground_forces.shape[0], MODE_COLUMNS))
     generalized = np.empty(6 * (state.size // 13))
     move_robot(model, state, forces)
-    contact.update_modes(state, forces.nodes, model.ground, forces.frames, modes)
+    update_modes(state, forces.nodes, model.ground, forces.frames, modes)
     compute_forces(model, state, modes, np.zeros(1), True, forces, generalized)
     radius = model.bodies.radius.max()
     for body in range(generalized.size // 6):
@@ -244,17 +346,11 @@ def displaced(robot: Unactuated, state: Table, step: Table) -> Table:
     return moved
 
 
-@compiled
-def stiffness_at_rest(robot: Unactuated, state: Table) -> Table:
-    """Stiffness matrix (6 n, 6 n) in N/m: minus the derivative of the forces with respect to the
-    displacements."""
-    count, half = state.size // 13 * 6, DIFFERENCE * robot.model.bodies.radius.max()
-    stiffness, motion = np.empty((count, count)), np.zeros(count)
-    for j in range(count):
-        motion[j] = half
-        ahead = force_at_rest(robot, displaced(robot, state, motion))
-        motion[j] = -half
-        behind = force_at_rest(robot, displaced(robot, state, motion))
-        motion[j] = 0.0
-        stiffness[:, j] = (behind - ahead) / (2.0 * half)
-    return stiffness
+def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
+    """Stiffness matrix (6 n, 6 n) in N/m at the last computed state, for the displacements of
+    displaced()."""
+    matrix = stiffness_matrix(robot.model, robot.forces)
+    per_radius = np.tile(
+        np.repeat([1.0 / robot.model.bodies.radius.max(), 1.0], 3), len(matrix) // 6
+    )
+    return per_radius[:, np.newaxis] * matrix * per_radius

@@ -13,7 +13,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics import cable
-from tetra_drake.physics.capsules import NearStruts, axis_distance, find_near_struts
+from tetra_drake.physics.capsules import NearStruts, find_near_struts, find_touch
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, NormalForce
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.forces import Forces
@@ -246,7 +246,7 @@ def check_apart(scenario: Scenario, structure: Structure) -> None:
     nodes = moved_nodes(structure, state)
     find_near_struts(struts, contact, structure.radius, state, nodes, near)
     for i, j in near.pairs[: near.count[0]].tolist():
-        depth = struts.radius[i] + struts.radius[j] - axis_distance(struts, nodes, i, j)
+        depth = find_touch(struts, nodes, i, j).depth
         if depth > allowed:
             first, second = structure.strut_name(i), structure.strut_name(j)
             found = f"struts '{first}' and '{second}' overlap by {1e3 * depth:.3g} mm at the start"

@@ -1,8 +1,9 @@
 """Reader of the YAML structures of NTRT, the NASA Tensegrity Robotics Toolkit.
 
 In NTRT y is up and masses are in kg. The unit of length is open; forces (kg length/s^2) and
-densities (kg/length^3) depend on it. Settings of motors and contacts, and bonds of nodes with
-edges, are not read.
+densities (kg/length^3) depend on it. Structures begin anywhere, also below the ground: here the
+lowest node is set on it. Settings of motors and contacts, and bonds of nodes with edges, are not
+read.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from tetra_drake.scenario.robot_structure import (
     MOST_PAIRS,
     CableGroup,
     Pair,
+    SphereGroup,
     StructureFile,
     StrutGroup,
 )
@@ -81,7 +83,7 @@ class Parameters(Section):
     """Parameters of a builder, with NTRT's defaults."""
 
     radius: float = Field(default=0.5, gt=0)
-    """Radius of a rod. For a cable, the radius of its spool, which is not used."""
+    """Radius of a rod or a sphere. For a cable, the radius of its spool, which is not used."""
     density: float = Field(default=1.0, gt=0)
     stiffness: float = Field(default=1000.0, gt=0)
     damping: float = Field(default=10.0, ge=0)
@@ -96,10 +98,11 @@ class Parameters(Section):
 
 
 class Builder(Section):
-    """Builder of rods or cables: NTRT's class, and its parameters."""
+    """Class and parameters for the pairs with a tag; of spheres, for the nodes with a name."""
 
     made_as: Literal[
         "tgRodInfo",
+        "tgSphereInfo",
         "tgBasicActuatorInfo",
         "tgBasicContactCableInfo",
         "tgKinematicActuatorInfo",
@@ -111,8 +114,12 @@ class Builder(Section):
 DEFAULTS = {
     "rod": Builder.model_validate({"class": "tgRodInfo"}),
     "string": Builder.model_validate({"class": "tgBasicActuatorInfo"}),
+    "sphere": Builder.model_validate({"class": "tgSphereInfo"}),
 }
-"""Builders for pairs without a builder in their file, by a tag of the pairs."""
+"""Builders by tag, for pairs and nodes without a builder in their file."""
+
+SAME_PLACE = 1e-6
+"""Distance below which a sphere is at a node of a pair."""
 
 
 class NtrtFile(Section):
@@ -231,6 +238,9 @@ def _check_size(count: int, most: int, file: Path, key: str) -> None:
 def _bonded_parts(bond: str, parts: list[str], file: Path, key: str) -> Iterable[tuple[str, str]]:
     """Neighbours in a row of substructures, for a bond such as "a/b/c/node_node"."""
     *names, kind = bond.split("/")
+    if kind == "node_edge":
+        problem = f"found the bond '{bond}'; bonds between nodes and edges are not supported"
+        raise InputError(file, key, problem)
     if kind != "node_node" or len(names) < 2 or not set(names) <= set(parts):
         expected = f"expected 'A/B/node_node' with A and B of {', '.join(parts)}"
         raise InputError(file, key, f"found the bond '{bond}', {expected}")
@@ -252,14 +262,18 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     """The tree of a structure file for a file of NTRT.
 
     unit: length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z (up).
-    A substructure's nodes are named "SUBSTRUCTURE/NODE", groups by their tags joined by slashes, as
-    dots separate keys. Raises InputError that names file and key, for substructures too.
+    The lowest node is at z = 0. A substructure's nodes are named "SUBSTRUCTURE/NODE", groups by
+    their tags joined by slashes, as dots separate keys. Raises InputError that names file and key,
+    for substructures too.
     """
     whole = Assembly()
     whole.add_file(file)
-    structure = StructureFile.model_construct(nodes={}, struts={}, cables={})
+    structure = StructureFile.model_construct(nodes={}, struts={}, cables={}, spheres={})
+    _add_spheres(structure, whole, unit)
+    ground = min((p_W[1] for p_W in whole.nodes.values()), default=0.0)
     for name, p_W in whole.nodes.items():
-        structure.nodes[_without_dots(name)] = (unit * p_W[[2, 0, 1]]).tolist()
+        forward, left, up = p_W[[2, 0, 1]]
+        structure.nodes[_without_dots(name)] = [unit * forward, unit * left, unit * (up - ground)]
     for tags, pairs in whole.pairs.items():
         name = _without_dots(tags).replace(" ", "/")
         named_pairs = [[_without_dots(node) for node in pair] for pair in pairs]
@@ -282,6 +296,28 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     return Tree(written(structure.model_dump()))
 
 
+def _add_spheres(structure: StructureFile, whole: Assembly, unit: float) -> None:
+    """Adds the spheres of nodes that are named as a builder of spheres. A sphere's node may be at
+    the place of a node of a pair; then it is removed, as it is the same node."""
+    used = {node for pairs in whole.pairs.values() for pair in pairs for node in pair}
+    for tags, builder in (DEFAULTS | whole.builders).items():
+        if builder.made_as != "tgSphereInfo":
+            continue
+        nodes = []
+        for name in [name for name in whole.nodes if name.rpartition(".")[2] == tags]:
+            place = whole.nodes[name]
+            here = [one for one in used if np.abs(whole.nodes[one] - place).max() < SAME_PLACE]
+            if name not in used and here:
+                del whole.nodes[name]
+            nodes.append(_without_dots(name if name in used or not here else here[0]))
+        if nodes:
+            structure.spheres[_without_dots(tags)] = SphereGroup.model_construct(
+                nodes=nodes,
+                diameter=2.0 * builder.parameters.radius * unit,
+                density=builder.parameters.density / unit**3,
+            )
+
+
 def _without_dots(name: str) -> str:
     return name.replace(".", "/")
 
@@ -289,7 +325,8 @@ def _without_dots(name: str) -> str:
 def _builder_of(tags: str, builders: dict[str, Builder], file: Path) -> Builder:
     """The builder for a pair with these tags: from the file, or NTRT's default."""
     for choice in (builders, DEFAULTS):
-        fitting = [name for name in choice if set(name.split()) <= set(tags.split())]
+        of_pairs = [name for name, one in choice.items() if one.made_as != "tgSphereInfo"]
+        fitting = [name for name in of_pairs if set(name.split()) <= set(tags.split())]
         if len(fitting) > 1:
             problem = f"found the builders {' and '.join(fitting)} for '{tags}', expected one"
             raise InputError(file, "builders", problem)

@@ -83,6 +83,24 @@ class StrutGroup(Section):
     file."""
 
 
+class SphereGroup(Section):
+    """Solid spheres of one make at nodes, in place of the spheres of their struts."""
+
+    nodes: list[str] = Field(min_length=1)
+    """The nodes at their centres."""
+    diameter: Length = Field(gt=0)
+    """Diameter of a sphere."""
+    density: Density = Field(gt=0)
+    """Density of a sphere."""
+
+
+class Sphere(NamedTuple):
+    """Sphere at a node."""
+
+    diameter: float
+    density: float
+
+
 class CableGroup(CableConstants):
     """Cables of one make, which never push."""
 
@@ -151,6 +169,7 @@ class StructureFile(Section):
     """Coordinates [x, y, z] of each node, near an equilibrium."""
     struts: dict[Name, StrutGroup] = Field(min_length=1)
     cables: dict[Name, CableGroup] = Field(default={})
+    spheres: dict[Name, SphereGroup] = Field(default={})
     actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, their nodes in either order."""
     masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
@@ -212,7 +231,7 @@ class StructureFile(Section):
             struts=np.array([[number[node] for node in strut.nodes] for strut in struts]),
             strut_radius=np.array([group.diameter / 2 for group in groups]),
             strut_density=np.array([group.density for group in groups]),
-            node_radius=np.array([one.node_diameter / 2 if one else 0.0 for one in spheres]),
+            node_radius=np.array([one.diameter / 2 if one else 0.0 for one in spheres]),
             node_density=np.array([one.density if one else 0.0 for one in spheres]),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
@@ -268,10 +287,15 @@ class StructureFile(Section):
         return of_bodies | {node: WORLD for node in self.nodes if node not in of_bodies}
 
     @cached_property
-    def sphere_of_node(self) -> dict[str, StrutGroup]:
-        """Group of struts that gives each node its sphere: the group of the node's first strut."""
-        last_first = reversed(self.all_struts)
-        return {node: self.struts[strut.group] for strut in last_first for node in strut.nodes}
+    def sphere_of_node(self) -> dict[str, Sphere]:
+        """Sphere of each node of a strut: its own one, or by the node's first strut."""
+        spheres: dict[str, Sphere] = {}
+        for strut in reversed(self.all_struts):
+            group = self.struts[strut.group]
+            spheres |= dict.fromkeys(strut.nodes, Sphere(group.node_diameter, group.density))
+        for own in self.spheres.values():
+            spheres |= dict.fromkeys(own.nodes, Sphere(own.diameter, own.density))
+        return spheres
 
     @cached_property
     def free_lengths(self) -> tuple[float, ...]:
@@ -372,6 +396,9 @@ class StructureFile(Section):
         if self.contacts != "all":
             for place, node in enumerate(self.contacts):
                 self._check_moving(f"contacts[{place}]", node)
+        for name, group in self.spheres.items():
+            for place, node in enumerate(group.nodes):
+                self._check_moving(f"spheres.{name}.nodes[{place}]", node)
         if not self.contact_nodes:
             refuse("contacts", "found none, expected one node at least")
         check_one_per_body("offsets", self.offsets, self.body_count)

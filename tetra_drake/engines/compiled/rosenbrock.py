@@ -15,8 +15,8 @@ are the rates of the velocities v. The rates of the positions are explicit:
     q2 = v + h k1 - 2 q1 + γ h k2
 
 A contains the stiff terms: dampings (a symmetric matrix with a block for each pair of bodies joined
-by cables) and the stiffness of contacts and anchors. A new law with stiffness needs no Jacobian; a new law with
-damping must return dT/d(dl/dt).
+by cables) and the stiffness of contacts and anchors. A new law with stiffness needs no Jacobian; a
+new law with damping must return dT/d(dl/dt).
 
 The term df/dt is a difference of forces along the motion. It contains the effect of signals, and of
 positions as far as A lacks it. Without df/dt, the method would be of order 1 where damping

@@ -1,0 +1,241 @@
+"""Rest of anything: what falls over, hangs, swings, is slack, heavy, stiff, or held by nothing."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.anchored import BAR, HUNG, SWINGING, floating_prism, scenario_of, supported_prism
+
+from tetra_drake.physics.cable import TENSION
+from tetra_drake.physics.forces import Forces, compute_strut_forces
+from tetra_drake.robot import equilibrium
+from tetra_drake.robot.equilibrium import (
+    Unactuated,
+    displaced,
+    force_at_rest,
+    stiffness_at_rest,
+)
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.simd.packed import Packed
+
+G = 9.80665
+LOOSE = {"stiffness": 100.0, "damping": 0.0, "free_length": 0.5}
+
+
+def on_ground(tree: dict[str, Any], **changes: Any) -> Robot:
+    return Robot.of(scenario_of(tree, **changes).with_sections(terrain=Flat()))
+
+
+def places(robot: Robot) -> dict[str, np.ndarray]:
+    """Positions of the nodes at rest, in m."""
+    p_WN = node_positions(robot.structure, robot.equilibrium.state)
+    return dict(zip(robot.structure.node_names, p_WN, strict=True))
+
+
+def greatest_force(robot: Robot) -> float:
+    """Greatest force left at rest, in N."""
+    return float(np.abs(force_at_rest(Unactuated.of(robot.model), robot.equilibrium.state)).max())
+
+
+def tensions(robot: Robot) -> np.ndarray:
+    """At rest, in N."""
+    resting = Unactuated.of(robot.model)
+    force_at_rest(resting, robot.equilibrium.state)
+    return resting.forces.cable_forces[:, TENSION].copy()
+
+
+@pytest.mark.parametrize("lean", [0.0, 1e-9, 0.3])
+def test_a_bar_that_stands_on_its_end_falls(lean):
+    top = [0.2 * math.sin(lean), 0.0, 0.2 * math.cos(lean)]
+    robot = on_ground({"nodes": {"a": [0.0, 0.0, 0.0], "b": top}, "struts": {"bar": BAR}})
+    a, b = places(robot).values()
+    depth = robot.weight / 2.0 / robot.scenario.ground.stiffness
+    assert [a[2], b[2]] == pytest.approx([-depth, -depth], abs=1e-12)
+    assert robot.equilibrium.feet == 2
+
+
+def test_a_cube_on_its_corner_falls_on_a_face():
+    # With the corners of a cube as nodes; its diagonal is upright at first.
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 0.1
+    across, along = np.array([1.0, -1.0, 0.0]) / math.sqrt(2.0), np.array([1.0, 1.0, -2.0])
+    axes = np.array([across, along / math.sqrt(6.0), np.ones(3) / math.sqrt(3.0)])
+    names = [f"n{i}" for i in range(8)]
+    nodes = dict(zip(names, (corners @ axes.T).tolist(), strict=True))
+    pairs = [
+        [names[i], names[j]]
+        for i in range(8)
+        for j in range(i)
+        if np.isclose(np.linalg.norm(corners[i] - corners[j]), 0.1)
+    ]
+    robot = on_ground({"nodes": nodes, "struts": {"edge": BAR | {"pairs": pairs}}})
+    depth = robot.weight / 4.0 / robot.scenario.ground.stiffness
+    heights = np.sort([place[2] for place in places(robot).values()])
+    assert heights == pytest.approx([-depth] * 4 + [0.1 - depth] * 4, abs=1e-12)
+
+
+def test_bodies_lie_where_they_are_if_their_cable_is_slack():
+    nodes = {"a": [0.0, 0.0, 0.0], "b": [0.2, 0.0, 0.0], "c": [0.0, 0.1, 0.0], "d": [0.2, 0.1, 0.0]}
+    struts = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}}
+    cables = {"tie": LOOSE | {"pairs": [["a", "c"]]}}
+    robot = on_ground({"nodes": nodes, "struts": struts, "cables": cables})
+    for node, place in places(robot).items():
+        assert place[:2] == pytest.approx(nodes[node][:2], abs=1e-9)
+    assert tensions(robot).tolist() == [0.0]
+    assert robot.equilibrium.feet == 4
+
+
+def test_what_floats_without_tension_is_at_rest_as_it_is():
+    nodes = {"a": [0.0, 0.0, 0.0], "b": [0.2, 0.0, 0.0], "c": [0.0, 0.1, 0.3], "d": [0.2, 0.1, 0.0]}
+    struts = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}}
+    cables = {"tie": LOOSE | {"pairs": [["a", "c"]]}}
+    tree = {"nodes": nodes, "struts": struts, "cables": cables, "gravity": 0.0}
+    for node, place in places(Robot.of(scenario_of(tree))).items():
+        assert place.tolist() == pytest.approx(nodes[node], abs=1e-15)
+
+
+def test_a_chain_of_bars_hangs_straight_from_wherever_it_is_let_go():
+    # A mechanism that only gravity holds: three bars and three cables, all bent at first.
+    nodes = {
+        "top": [0.0, 0.0, 2.0],
+        "a": [0.3, 0.1, 2.0],
+        "b": [0.5, 0.1, 2.1],
+        "c": [0.6, 0.3, 2.1],
+        "d": [0.8, 0.3, 2.0],
+        "e": [0.8, 0.2, 1.8],
+        "f": [0.9, 0.0, 1.9],
+    }
+    struts = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"], ["e", "f"]]}}
+    line = {"pairs": [["top", "a"], ["b", "c"], ["d", "e"]], "free_length": 0.2}
+    tree = {"nodes": nodes, "struts": struts, "cables": {"line": LOOSE | line}}
+    robot = Robot.of(scenario_of(tree | {"anchors": {"top": "xyz"}}))
+    mass = robot.structure.mass
+    below = np.array([mass.sum(), mass[1:].sum(), mass[2]]) * G  # N, borne by each cable
+    assert tensions(robot) == pytest.approx(below, rel=1e-9)
+    bars = [np.linalg.norm(np.subtract(nodes[j], nodes[i])) for i, j in struts["bar"]["pairs"]]
+    end = 2.0 - sum(bars) - (0.2 + below / 100.0).sum()
+    assert places(robot)["f"] == pytest.approx([0.0, 0.0, end], abs=1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e6, 1e9])
+def test_a_pendulum_swings_down_however_stiff_its_cable(stiffness, monkeypatch):
+    # From level; uncorrected straight steps would number (stiffness * length / weight)^(1/3).
+    monkeypatch.setattr(equilibrium, "MOST_STEPS", 60)
+    line = HUNG["cables"]["line"] | {"stiffness": stiffness}
+    aside = {"top": [0.0, 0.0, 1.0], "a": [0.4, 0.0, 1.0], "b": [0.6, 0.0, 1.0]}
+    robot = Robot.of(scenario_of(HUNG | {"nodes": aside, "cables": {"line": line}}))
+    weight = robot.weight
+    length = 0.4 + weight / stiffness
+    assert places(robot)["a"] == pytest.approx([0.0, 0.0, 1.0 - length], abs=1e-8)
+    assert tensions(robot) == pytest.approx([weight], rel=1e-6)
+
+
+def scaled(size: float, mass: float, stiffness: float, **changes: Any) -> Robot:
+    """The shipped prism with other size, mass and stiffness, as factors."""
+    tree = read_structure("prism").model_dump()
+    tree["nodes"] = {node: (size * np.array(p)).tolist() for node, p in tree["nodes"].items()}
+    bar = tree["struts"]["bar"]
+    bar |= {"diameter": size * bar["diameter"], "node_diameter": size * bar["node_diameter"]}
+    bar["density"] *= mass / size**3
+    for cable in tree["cables"].values():
+        cable["free_length"] *= size
+        cable["stiffness"] *= stiffness
+    robot = on_ground(tree, **changes)
+    ground = {"ground.stiffness": stiffness * robot.scenario.ground.stiffness}
+    return Robot.of(robot.scenario.with_numbers(ground))
+
+
+@pytest.mark.parametrize(
+    ("size", "mass", "stiffness"),
+    [(1.0, 1e3, 1e3), (1e3, 1e6, 1e3), (1e-2, 1e-4, 1e-2), (1e3, 1.0, 1e-3)],
+)
+def test_structures_that_are_alike_rest_alike(size, mass, stiffness):
+    """Where mass is to size times stiffness as before, all lengths are to size."""
+    one, other = places(scaled(1.0, 1.0, 1.0)), places(scaled(size, mass, stiffness))
+    for node, place in one.items():
+        assert other[node] / size == pytest.approx(place, abs=1e-10)
+
+
+@pytest.mark.parametrize(("mass", "stiffness"), [(1e3, 1.0), (1e5, 1.0), (1.0, 1e6), (1e-6, 1.0)])
+def test_heavy_and_light_structures_rest(mass, stiffness):
+    robot = scaled(1.0, mass, stiffness)
+    heights = np.array([place[2] for place in places(robot).values()])
+    load = robot.scenario.ground.stiffness * np.maximum(0.0, -heights).sum()
+    assert load == pytest.approx(robot.weight, rel=1e-5)
+    # Rounding of the farthest coordinate, times the stiffness of all springs of a body.
+    hardest = max(robot.scenario.ground.stiffness, 100.0 * stiffness)
+    assert (
+        greatest_force(robot) < 1e-15 * 20.0 * hardest * np.abs(list(places(robot).values())).max()
+    )
+
+
+def test_a_heavy_structure_rests_on_its_own_struts():
+    # Its cables cannot hold it, so it lies on the ground, with bars on each other.
+    touching = {"strut_contact": "!HuntCrossley {stiffness: 1 MN/m, dissipation: 1 s/m}"}
+    robot = scaled(1.0, 10.0, 0.1, **touching)
+    heights = np.array([place[2] for place in places(robot).values()])
+    load = robot.scenario.ground.stiffness * np.maximum(0.0, -heights).sum()
+    assert load == pytest.approx(robot.weight, rel=1e-5)
+    memory = Forces.of(robot.model)
+    pushes = np.empty(18)
+    compute_strut_forces(Packed((robot.model, memory)), robot.structure.initial_state, pushes)
+    assert pushes.any() and np.ptp(heights) < 0.1
+
+
+def test_struts_that_cross_at_first_come_apart():
+    # The upper triangle is turned until all three bars, of the same lengths, meet on the axis.
+    tree = read_structure("prism").model_dump()
+    length = np.linalg.norm(np.subtract(tree["nodes"]["n4"], tree["nodes"]["n0"]))
+    height = math.sqrt(length**2 - 0.2**2)
+    for node, below in (("n4", "n0"), ("n5", "n1"), ("n3", "n2")):
+        x, y, _ = tree["nodes"][below]
+        tree["nodes"][node] = [-x, -y, height]
+    crossed, apart = places(on_ground(tree)), places(Robot.of(load_scenario("prism")))
+    for node, place in apart.items():
+        assert crossed[node][2] == pytest.approx(place[2], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("tree", "force"),
+    [
+        ({**HUNG, "cables": {}, "anchors": {}, "nodes": SWINGING["nodes"]}, "0, 0, -"),
+        ({**SWINGING, "anchors": {"a": "yz"}, "loads": {"b": [0.3, 0.0, 0.0]}}, "0.3, 0, 0"),
+    ],
+)
+def test_what_nothing_holds_is_told(tree, force, refused):
+    scenario = scenario_of(tree)
+    with refused("anchored", "robot", f"nothing holds it against the force [{force}"):
+        Robot.of(scenario)
+
+
+def test_what_flies_off_the_ground_is_told(refused):
+    bar = {"nodes": SWINGING["nodes"], "struts": {"bar": BAR}}
+    up = bar | {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.4, 0.0, 0.0]}, "loads": {"a": [0, 0, 9.0]}}
+    with refused("anchored", "robot", "nothing holds it against the force [0, 0, 8."):
+        on_ground(up)
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        lambda: Robot.of(load_scenario("thesis")),
+        lambda: Robot.of(load_scenario("mast")),
+        lambda: Robot.of(supported_prism()),
+        lambda: Robot.of(floating_prism()),
+        lambda: Robot.of(scenario_of(HUNG)),
+    ],
+)
+def test_stiffness_is_how_forces_change(robot):
+    resting, state = Unactuated.of(robot().model), robot().equilibrium.state
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        motion = 1e-6 * rng.normal(size=len(state) // 13 * 6)
+        ahead = force_at_rest(resting, displaced(resting, state, motion))
+        behind = force_at_rest(resting, displaced(resting, state, -motion))
+        force_at_rest(resting, state)
+        expected = stiffness_at_rest(resting) @ motion
+        assert 0.5 * (behind - ahead) == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
