@@ -8,7 +8,7 @@ from tetra_drake.physics.actuator import DRIVE
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.tally import Tally, look, observe
+from tetra_drake.physics.tally import Tally, observe, update_clearance
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import compiled
@@ -73,4 +73,4 @@ def observe_states(
         forces.drives[:, DRIVE] = drives[k]
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
         observe(tally, robot, times[k], states[k], signals[k], forces)
-        look(tally, robot, states[k], forces.nodes)
+        update_clearance(tally, robot, states[k], forces.nodes)

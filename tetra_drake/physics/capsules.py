@@ -63,7 +63,7 @@ class Search(NamedTuple):
     """Distance that a node may move before the next search."""
 
 
-class StrutContact(NamedTuple):
+class StrutContactLaw(NamedTuple):
     """Contact of the struts in the form of the kernels."""
 
     acts: bool
@@ -103,7 +103,7 @@ def near_sizes(struts: Struts) -> dict[str, int]:
 @functools.partial(compiled, nogil=True)  # a call of its own, as searches are rare
 def find_near_struts(
     struts: Struts,
-    contact: StrutContact,
+    contact: StrutContactLaw,
     radius: Table,
     state: Table,
     nodes: Table,

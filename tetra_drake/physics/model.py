@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 from tetra_drake.physics.actuator import Actuator
 from tetra_drake.physics.cable import Cables
-from tetra_drake.physics.capsules import StrutContact
+from tetra_drake.physics.capsules import StrutContactLaw
 from tetra_drake.physics.contact import Ground
-from tetra_drake.physics.node_forces import Anchors, Loads
+from tetra_drake.physics.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.physics.struts import Struts
 from tetra_drake.simd.lanes import Table
 
@@ -54,11 +54,11 @@ class Model(NamedTuple):
     actuator: Actuator
     couplings: Couplings
     ground: Ground
-    anchors: Anchors
-    loads: Loads
+    anchors: AnchorSprings
+    loads: NodeLoads
     bodies: Bodies
     struts: Struts
-    strut_contact: StrutContact
+    strut_contact: StrutContactLaw
     isotropic: bool
     """True if each body has the same moment of inertia about all axes."""
     slack: bool

@@ -10,7 +10,7 @@ from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Table
 
 
-class Anchors(NamedTuple):
+class AnchorSprings(NamedTuple):
     """Springs and dampers that hold nodes of bodies along axes of the world; SI units."""
 
     nodes: Table
@@ -25,7 +25,7 @@ class Anchors(NamedTuple):
     """Damping (anchors, 3) along x, y and z; 0 along a free axis."""
 
 
-class Loads(NamedTuple):
+class NodeLoads(NamedTuple):
     """Constant forces on nodes."""
 
     nodes: Table
@@ -35,7 +35,7 @@ class Loads(NamedTuple):
 
 
 @inlined
-def anchor_force(anchors: Anchors, nodes: Table, i: int) -> Vector:
+def anchor_force(anchors: AnchorSprings, nodes: Table, i: int) -> Vector:
     """Force (N) of anchor i on its node, in the world frame. `nodes` is the table of
     `kinematics`."""
     node = anchors.nodes[i]
@@ -47,14 +47,14 @@ def anchor_force(anchors: Anchors, nodes: Table, i: int) -> Vector:
 
 
 @inlined
-def add_anchor_forces(anchors: Anchors, nodes: Table) -> None:
+def add_anchor_forces(anchors: AnchorSprings, nodes: Table) -> None:
     """Adds the forces of all anchors to the forces on the nodes."""
     for i in range(anchors.nodes.size):
         add_vector(anchor_force(anchors, nodes, i), anchors.nodes[i], FORCE, nodes)
 
 
 @inlined
-def add_loads(loads: Loads, nodes: Table) -> None:
+def add_loads(loads: NodeLoads, nodes: Table) -> None:
     """Adds all loads to the forces on the nodes."""
     for i in range(loads.nodes.size):
         add_vector(vector_at(loads.forces, i, 0), loads.nodes[i], FORCE, nodes)

@@ -164,7 +164,7 @@ class Tally(NamedTuple):
     signals: Annotated[Table, "signals"]
     """Signals (N) at the end of the latest step."""
     clearance: Annotated[Table, 1, math.inf]
-    """Least distance between struts, in m; see look()."""
+    """Least distance between struts, in m; see update_clearance()."""
     effort: Effort
     roughness: Roughness
     lifted: Lifted
@@ -208,7 +208,7 @@ def observe(
 
 
 @inlined
-def look(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
+def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
     """Updates the clearance for a state (13 bodies,). It is too slow to be called at every step.
     `nodes` is the table of physics.kinematics."""
     radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]

@@ -15,7 +15,7 @@ from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 from tetra_drake.physics import cable, kinematics
 from tetra_drake.physics.capsules import Search
 from tetra_drake.physics.model import Couplings
-from tetra_drake.physics.node_forces import Anchors, Loads
+from tetra_drake.physics.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.physics.struts import Struts
 from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import Equilibrium
@@ -119,10 +119,10 @@ class Structure(Blueprint):
         return Couplings(first.copy(), second.copy(), first_cable, held_bodies)
 
     @property
-    def anchors(self) -> Anchors:
+    def anchors(self) -> AnchorSprings:
         """The anchors of the bodies' nodes. They hold the nodes where the blueprint has them."""
         nodes = np.flatnonzero(self.anchor_stiffness.any(axis=1))
-        return Anchors(
+        return AnchorSprings(
             nodes,
             carriers=self.carriers[nodes],
             places=self.p_WN[nodes],
@@ -131,10 +131,10 @@ class Structure(Blueprint):
         )
 
     @property
-    def loads(self) -> Loads:
+    def loads(self) -> NodeLoads:
         """The constant forces on nodes."""
         nodes = np.flatnonzero(self.node_load.any(axis=1))
-        return Loads(nodes, self.node_load[nodes])
+        return NodeLoads(nodes, self.node_load[nodes])
 
     @functools.cached_property
     def node_shares(self) -> np.ndarray:

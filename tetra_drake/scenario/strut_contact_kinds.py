@@ -14,7 +14,7 @@ from tetra_drake.scenario.quantities import InverseSpeed, Stiffness
 from tetra_drake.scenario.section import Kinds, Section
 
 if TYPE_CHECKING:
-    from tetra_drake.physics.capsules import Search, StrutContact
+    from tetra_drake.physics.capsules import Search, StrutContactLaw
 
 
 class NoStrutContact(Section):
@@ -22,11 +22,11 @@ class NoStrutContact(Section):
 
     tag: ClassVar[str] = "Nothing"
 
-    def law(self, search: Search) -> StrutContact:
+    def law(self, search: Search) -> StrutContactLaw:
         """The law in the form of the kernels. `search` has the distances of the search."""
-        from tetra_drake.physics.capsules import StrutContact
+        from tetra_drake.physics.capsules import StrutContactLaw
 
-        return StrutContact(acts=False, normal=np.zeros(2), search=np.array(search))
+        return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
 
 
 class HuntCrossley(Section):
@@ -39,13 +39,13 @@ class HuntCrossley(Section):
     """Hunt-Crossley dissipation c, as Drake's. It lowers the restitution of an impact at a low
     speed v: e = 1 - 2/3 c v."""
 
-    def law(self, search: Search) -> StrutContact:
+    def law(self, search: Search) -> StrutContactLaw:
         """The law in the form of the kernels. `search` has the distances of the search."""
-        from tetra_drake.physics.capsules import StrutContact
+        from tetra_drake.physics.capsules import StrutContactLaw
         from tetra_drake.physics.contact import NormalForce
 
         normal = NormalForce(self.stiffness, damping=self.stiffness * self.dissipation)
-        return StrutContact(acts=True, normal=np.array(normal), search=np.array(search))
+        return StrutContactLaw(acts=True, normal=np.array(normal), search=np.array(search))
 
 
 StrutContactKind = Annotated[NoStrutContact | HuntCrossley, Kinds()]

@@ -18,7 +18,7 @@ from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.friction import friction_damping
 from tetra_drake.physics.kinematics import P_BN_W
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.node_forces import Anchors
+from tetra_drake.physics.node_forces import AnchorSprings
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.physics.vectors import cross, put_vector, vector_at
 from tetra_drake.simd.compiling import inlined, merged
@@ -319,7 +319,7 @@ def add_held_cable(robot: Model, forces: Forces, i: int, time: Real, rows: Table
 
 
 @inlined
-def add_anchor(anchors: Anchors, nodes: Table, i: int, time: Real, rows: Table) -> None:
+def add_anchor(anchors: AnchorSprings, nodes: Table, i: int, time: Real, rows: Table) -> None:
     """Adds time * damping + time² * stiffness of an anchor."""
     k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
     c_x, c_y, c_z = vector_at(anchors.damping, i, 0)

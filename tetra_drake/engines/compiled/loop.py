@@ -28,7 +28,7 @@ from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.tally import Tally, look, observe
+from tetra_drake.physics.tally import Tally, observe, update_clearance
 from tetra_drake.simd.compiling import compiled, inlined, merged
 from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, by_lane, maximum, minimum, select
 
@@ -159,7 +159,7 @@ def advance(constants: Constants, lanes: LaneState, log: Log, live: bool, rounds
             ended |= iterate(constants, lanes, log, live)
         robot, state = constants.robot, lanes.step.state
         move_robot(robot, state, lanes.forces)
-        look(lanes.tally, robot, state, lanes.forces.nodes)
+        update_clearance(lanes.tally, robot, state, lanes.forces.nodes)
         if ended:
             return
 
