@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 _FREQUENCIES = 5
 """Number of natural frequencies that are printed."""
+_NOISE = 1e-9
+"""Forces of anchors up to this share of the greatest are rounding errors."""
 
 _SURROUNDINGS = "prism"
 """Shipped scenario with the ground and friction for structure files."""
@@ -45,7 +47,8 @@ def structure_text(study: EquilibriumStudy) -> str:
     structure = robot.structure
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
     on_ground = " on the ground" if structure.contacts.size else ""
-    count = f"{len(structure.bodies)} bodies, {len(structure.node_names)} nodes"
+    bodies = len(structure.bodies)
+    count = f"{bodies} {'body' if bodies == 1 else 'bodies'}, {len(structure.node_names)} nodes"
     lines = [
         f"{robot.scenario.name}: {count}, {len(structure.cables)} cables, "
         f"{structure.signals} oscillators, {rounded(1e3 * structure.mass.sum(), 4)} g",
@@ -74,7 +77,8 @@ def _bodies_table(study: EquilibriumStudy) -> Table:
 
 def _anchors_table(study: EquilibriumStudy) -> Table:
     forces = study.nodes.loc[study.robot.structure.held.any(axis=1), "anchor_x":"anchor_z"]
-    pounds = (forces / POUND_FORCE).itertuples()
+    noise = _NOISE * forces.abs().to_numpy().max()
+    pounds = (forces.where(forces.abs() > noise, 0.0) / POUND_FORCE).itertuples()
     rows = [[str(node), *map(rounded, pushes)] for node, *pushes in pounds]
     return Table(["anchor", *(f"force along {axis} (lbf)" for axis in "xyz")], rows)
 
