@@ -14,6 +14,7 @@ from pydrake.multibody.tree import RotationalInertia
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.physics.kinematics import FORCE
+from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
@@ -74,7 +75,7 @@ def study_equilibrium(robot: Robot) -> EquilibriumStudy:
         ),
         nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-        frequencies=_frequencies(unactuated, equilibrium.state),
+        frequencies=_frequencies(structure, unactuated, equilibrium.state),
     )
 
 
@@ -95,10 +96,10 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
     return node_positions(structure, equilibrium_of(weightless, structure, start).state)
 
 
-def _frequencies(unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
+def _frequencies(structure: Structure, unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
     """Natural frequencies (Hz) above LEAST_FREQUENCY."""
     force_at_rest(unactuated, state)
-    stiffness = stiffness_at_rest(unactuated)
+    stiffness = condensed(stiffness_at_rest(unactuated), structure, unactuated, state)
     # M x'' = -K x with M = L Lᵀ: the squared frequencies are the eigenvalues of L^-1 K L^-T.
     factor = np.linalg.cholesky(_mass_matrix(unactuated))
     scaled = np.linalg.solve(factor, np.linalg.solve(factor, stiffness).T)

@@ -20,7 +20,8 @@ from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.physics.model import Bodies, Model
 from tetra_drake.physics.oscillator import Network, steered_input
-from tetra_drake.robot.equilibrium import Equilibrium, find_equilibrium
+from tetra_drake.robot.elastic_struts import axial_forces, elastic_struts, with_elongations
+from tetra_drake.robot.equilibrium import Equilibrium, Unactuated, find_equilibrium
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import START_DEPTH, make_ground
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions, turn_with_slope
@@ -36,6 +37,10 @@ LEAST_MOTION = 0.01
 """Least change of a cable's length that signals should cause, as a share of the length."""
 DEEPEST = 1e-3
 """Largest depth of a node in the ground at the start, as a share of the structure's height."""
+MOST_CORRECTIONS = 100
+"""Upper limit of the corrections of the lengths of elastic struts."""
+SAME_LENGTH = 1e-10
+"""Change (m) of a strut's length below which its correction ends."""
 SteeringSignal = Callable[[float], float]
 """Function from time (s) to the turn, -1 to 1."""
 
@@ -212,11 +217,37 @@ def undisturbed_structure(scenario: Scenario) -> Structure:
     if not blueprint.settles:
         return placed
     up = np.array([0.0, 0.0, _lift(scenario, placed)])
-    equilibrium = equilibrium_of(scenario, dataclasses.replace(placed, p_WB=placed.p_WB + up))
-    poses = equilibrium.state[: 7 * len(placed.bodies)].reshape(-1, 7)
+    resting = _at_rest(scenario, dataclasses.replace(placed, p_WB=placed.p_WB + up))
+    if not elastic_struts(blueprint).size:
+        return resting
+    elongation = np.zeros(len(blueprint.struts))
+    for _ in range(MOST_CORRECTIONS):
+        before = elongation
+        elongation = axial_forces_at_rest(scenario, resting) / blueprint.strut_stiffness
+        longer = Structure.of(with_elongations(blueprint, elongation))
+        resting = _at_rest(
+            scenario, dataclasses.replace(longer, q_WB=resting.q_WB, p_WB=resting.p_WB)
+        )
+        if np.abs(elongation - before).max() < SAME_LENGTH:
+            return resting
+    problem = "are too soft: their lengths find no equilibrium; give more axial_stiffness"
+    raise InputError(scenario.name, "robot.struts", problem)
+
+
+def _at_rest(scenario: Scenario, structure: Structure) -> Structure:
+    """The structure in equilibrium, near its initial pose."""
+    equilibrium = equilibrium_of(scenario, structure)
+    poses = equilibrium.state[: 7 * len(structure.bodies)].reshape(-1, 7)
     return dataclasses.replace(
-        placed, q_WB=poses[:, :4], p_WB=poses[:, 4:], equilibrium=equilibrium
+        structure, q_WB=poses[:, :4], p_WB=poses[:, 4:], equilibrium=equilibrium
     )
+
+
+def axial_forces_at_rest(scenario: Scenario, structure: Structure) -> np.ndarray:
+    """Axial forces (struts,) in N on the struts of a structure in equilibrium; negative in
+    compression."""
+    model = make_model(scenario.with_sections(terrain=Flat()), structure)
+    return axial_forces(structure, Unactuated.of(model), structure.initial_state)
 
 
 def _lift(scenario: Scenario, placed: Structure) -> float:

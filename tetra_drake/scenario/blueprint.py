@@ -43,6 +43,8 @@ class Blueprint:
     """Radii of the struts (struts,)."""
     strut_density: np.ndarray
     """Densities of the struts (struts,), solid cylinders."""
+    strut_stiffness: np.ndarray
+    """Axial stiffness of the struts (struts,); infinite for rigid struts."""
     node_radius: np.ndarray
     """Radii of the spheres at the nodes (nodes,); 0 for no sphere."""
     node_density: np.ndarray

@@ -7,6 +7,7 @@ the world frame (x forward, y left, z up), near a static equilibrium.
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
@@ -81,6 +82,10 @@ class StrutGroup(Section):
     node_diameter: Length = Field(ge=0)
     """Diameter of the spheres; 0 for none. A node has one sphere, from its first strut in the
     file."""
+    axial_stiffness: Stiffness | None = Field(default=None, gt=0)
+    """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load a strut
+    is as long as its nodes are apart in the file. The axial force in equilibrium shortens it, and
+    natural frequencies know its stiffness; in motion it keeps its length."""
 
 
 class SphereGroup(Section):
@@ -231,6 +236,7 @@ class StructureFile(Section):
             struts=np.array([[number[node] for node in strut.nodes] for strut in struts]),
             strut_radius=np.array([group.diameter / 2 for group in groups]),
             strut_density=np.array([group.density for group in groups]),
+            strut_stiffness=np.array([group.axial_stiffness or math.inf for group in groups]),
             node_radius=np.array([one.diameter / 2 if one else 0.0 for one in spheres]),
             node_density=np.array([one.density if one else 0.0 for one in spheres]),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
@@ -386,6 +392,7 @@ class StructureFile(Section):
         self._check_sizes()
         self._check_places()
         self._check_bodies()
+        self._check_elastic_struts()
         self._check_tensions()
         self._check_actuated()
         self._check_anchors()
@@ -478,6 +485,15 @@ class StructureFile(Section):
             one, other = (self.body_names[self.body_of_node[nodes[0]]] for nodes in joined[:2])
             problem = f"no cables lead from the body '{other}' to '{one}'"
             refuse("cables", f"{problem}, expected all bodies to be joined")
+
+    def _check_elastic_struts(self) -> None:
+        """Refuses an axial stiffness of struts whose forces would depend on the others of a
+        body."""
+        for strut in self.all_struts:
+            body = self.bodies[self.body_of_node[strut.nodes[0]]]
+            if self.struts[strut.group].axial_stiffness is not None and len(body) > 2:
+                problem = f"the strut {strut.name} is part of a rigid body of several struts"
+                refuse(f"struts.{strut.group}.axial_stiffness", problem)
 
     def _check_tensions(self) -> None:
         for cable, free_length in zip(self.all_cables, self.free_lengths, strict=True):

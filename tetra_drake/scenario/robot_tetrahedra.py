@@ -199,6 +199,7 @@ class Tetrahedra(Section):
             p_FN=np.tile(p_FN, (n, 1)),
             struts=np.array(struts),
             strut_radius=np.full(len(struts), self.strut_diameter / 2),
+            strut_stiffness=np.full(len(struts), math.inf),
             strut_density=np.full(len(struts), self.density),
             node_radius=np.full(4 * n, self.node_diameter / 2),
             node_density=np.full(4 * n, self.density),
