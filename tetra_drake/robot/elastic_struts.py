@@ -24,31 +24,33 @@ def elastic_struts(blueprint: Blueprint) -> np.ndarray:
 
 
 def axial_forces(structure: Structure, unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Axial forces (struts,) in N on the struts at rest in a state; negative in compression."""
+    """Axial forces (struts,) in N on the struts at rest in a state; negative in compression.
+
+    The force on each end counts by the end's distance from the centre of mass, which stays where it
+    is as a strut becomes longer.
+    """
     force_at_rest(unactuated, state)
     forces = unactuated.forces.nodes[:, FORCE : FORCE + 3]
+    p_WN, p_BN = node_positions(structure, state), structure.p_BN
     node_a, node_b = structure.struts.T
-    axes = _axes(structure, state)
-    axial: np.ndarray = 0.5 * ((forces[node_b] - forces[node_a]) * axes).sum(axis=1)
+    lengths = structure.strut_table.length
+    axes = (p_WN[node_b] - p_WN[node_a]) / lengths[:, np.newaxis]
+    axes_B = (p_BN[node_b] - p_BN[node_a]) / lengths[:, np.newaxis]
+    axial = np.zeros(len(lengths))
+    for ends in (node_a, node_b):
+        distance = (p_BN[ends] * axes_B).sum(axis=1)
+        axial += (forces[ends] * axes).sum(axis=1) * distance / lengths
     return axial
 
 
-def with_elongations(blueprint: Blueprint, elongation: np.ndarray) -> Blueprint:
-    """A blueprint whose struts are longer by `elongation` (struts,) in m, at both ends alike."""
-    p_FN = _lengthened(blueprint.p_FN, blueprint.struts, elongation)
-    return dataclasses.replace(blueprint, p_FN=p_FN)
-
-
-def _lengthened(points: np.ndarray, struts: np.ndarray, elongation: np.ndarray) -> np.ndarray:
-    """Positions (nodes, 3) of nodes whose struts are longer by `elongation` (struts,) than at the
-    given points."""
-    node_a, node_b = struts.T
-    along = points[node_b] - points[node_a]
-    shift = (0.5 * elongation / np.linalg.norm(along, axis=1))[:, np.newaxis] * along
-    moved = points.copy()
-    np.add.at(moved, node_a, -shift)
-    np.add.at(moved, node_b, shift)
-    return moved
+def with_elongations(structure: Structure, elongation: np.ndarray) -> Structure:
+    """A structure whose struts are longer by `elongation` (struts,) in m. The bodies keep their
+    centres of mass, masses and inertias."""
+    p_BN = structure.p_BN.copy()
+    for strut in elastic_struts(structure):
+        share = elongation[strut] / structure.strut_table.length[strut]
+        p_BN[structure.struts[strut]] *= 1.0 + share
+    return dataclasses.replace(structure, p_BN=p_BN)
 
 
 def condensed(
@@ -66,7 +68,7 @@ def condensed(
         for sign in (-1.0, 1.0):
             elongation = np.zeros(len(lengths))
             elongation[strut] = sign * ELONGATION * lengths[strut]
-            p_BN = _lengthened(structure.p_BN, structure.struts, elongation)
+            p_BN = with_elongations(structure, elongation).p_BN
             longer = Unactuated.of(unactuated.model._replace(p_BN=p_BN))
             axial = axial_forces(structure, longer, state)[elastic]
             ends.append((force_at_rest(longer, state), axial))
@@ -76,12 +78,3 @@ def condensed(
     own += np.diag(structure.strut_stiffness[elastic])
     reduced: np.ndarray = stiffness - coupling @ np.linalg.solve(own, coupling.T)
     return reduced
-
-
-def _axes(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Unit vectors (struts, 3) along the struts in a state, in the world frame."""
-    p_WN = node_positions(structure, state)
-    node_a, node_b = structure.struts.T
-    along = p_WN[node_b] - p_WN[node_a]
-    axes: np.ndarray = along / np.linalg.norm(along, axis=1, keepdims=True)
-    return axes

@@ -224,7 +224,7 @@ def undisturbed_structure(scenario: Scenario) -> Structure:
     for _ in range(MOST_CORRECTIONS):
         before = elongation
         elongation = axial_forces_at_rest(scenario, resting) / blueprint.strut_stiffness
-        longer = Structure.of(with_elongations(blueprint, elongation))
+        longer = with_elongations(placed, elongation)
         resting = _at_rest(
             scenario, dataclasses.replace(longer, q_WB=resting.q_WB, p_WB=resting.p_WB)
         )

@@ -1,0 +1,32 @@
+"""Predictions for measured robots: the page's claims."""
+
+import measured
+import numpy as np
+import pytest
+
+
+def test_the_simplex_is_as_high_as_measured_up_to_a_load_of_1_kn():
+    under_load = measured.simplex_under_load()
+    moderate = under_load[under_load["load"] < 1.01]
+    assert len(moderate) > 8
+    np.testing.assert_allclose(moderate["H"], moderate["H measured"], atol=1.0)  # mm
+    for kind in ("CB", "CT", "CV"):
+        np.testing.assert_allclose(moderate[kind], moderate[f"{kind} measured"], rtol=0.05)
+
+
+def test_the_simplex_vibrates_faster_with_more_self_stress():
+    slow, fast = (measured.simplex_frequency(stress) for stress in measured.SELF_STRESSES)
+    assert slow == pytest.approx(2.28, abs=0.02) and fast == pytest.approx(2.72, abs=0.02)
+
+
+def test_the_spine_rests_where_the_authors_statics_wants_it():
+    poses = measured.spine_poses()
+    for axis in ("x_m", "y_m"):
+        np.testing.assert_allclose(poses[f"predicted_{axis}"], poses[f"wanted_{axis}"], atol=5e-5)
+    angles = np.degrees(poses["predicted_rad"] - poses["wanted_rad"])
+    assert np.abs(angles).max() < 0.01
+
+
+def test_the_jumper_rises_as_on_the_page():
+    rise, clearance = measured.jump(share=0.2, damping=2.0)
+    assert rise == pytest.approx(0.34, abs=0.01) and clearance > 0.06
