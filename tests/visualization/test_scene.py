@@ -70,7 +70,7 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
 @pytest.mark.parametrize("inches", [60, 1200])
 def test_a_large_flat_floor_has_lines_every_six_inches(inches, robot):
     corners = np.array([[-6, -600], [inches, 600]])
-    floor = floor_points(robot.ground, corners)
+    floor = scene.floor_points(robot.ground, corners)
     spacing = 1 if inches == 60 else 6
     assert np.diff(floor[:, 0, 0]) == pytest.approx(spacing * INCH)
     assert floor[0, 0].tolist() == pytest.approx([-6 * INCH, -600 * INCH, 0.0])
