@@ -8,7 +8,9 @@ import pytest
 from helpers.anchored import BAR, HUNG, SWINGING, floating_prism, scenario_of, supported_prism
 
 from tetra_drake.physics.cable import TENSION
+from tetra_drake.physics.capsules import find_touch
 from tetra_drake.physics.forces import Forces, compute_strut_forces
+from tetra_drake.report.structure_page import robot_of_file
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.equilibrium import (
     Unactuated,
@@ -16,8 +18,8 @@ from tetra_drake.robot.equilibrium import (
     force_at_rest,
     stiffness_at_rest,
 )
-from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.robot import Robot, make_model
+from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.terrain_kinds import Flat
@@ -163,14 +165,13 @@ def test_structures_that_are_alike_rest_alike(size, mass, stiffness):
 @pytest.mark.parametrize(("mass", "stiffness"), [(1e3, 1.0), (1e5, 1.0), (1.0, 1e6), (1e-6, 1.0)])
 def test_heavy_and_light_structures_rest(mass, stiffness):
     robot = scaled(1.0, mass, stiffness)
-    heights = np.array([place[2] for place in places(robot).values()])
-    load = robot.scenario.ground.stiffness * np.maximum(0.0, -heights).sum()
-    assert load == pytest.approx(robot.weight, rel=1e-5)
-    # Rounding of the farthest coordinate, times the stiffness of all springs of a body.
+    p_WN = np.array(list(places(robot).values()))
+    # Rounding of the farthest coordinate (2e-16), times the stiffness of all springs of a body.
     hardest = max(robot.scenario.ground.stiffness, 100.0 * stiffness)
-    assert (
-        greatest_force(robot) < 1e-15 * 20.0 * hardest * np.abs(list(places(robot).values())).max()
-    )
+    rounding = 2e-14 * hardest * np.abs(p_WN).max()
+    assert greatest_force(robot) < rounding
+    load = robot.scenario.ground.stiffness * np.maximum(0.0, -p_WN[:, 2]).sum()
+    assert load == pytest.approx(robot.weight, rel=1e-9, abs=3.0 * rounding)
 
 
 def test_a_heavy_structure_rests_on_its_own_struts():
@@ -239,3 +240,53 @@ def test_stiffness_is_how_forces_change(robot):
         force_at_rest(resting, state)
         expected = stiffness_at_rest(resting) @ motion
         assert 0.5 * (behind - ahead) == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("c", "d"),
+    [
+        ([0.01, -0.1, 0.106], [0.02, 0.1, 0.107]),  # the second bar lies across the first
+        ([0.01, 0.003, 0.104], [0.05, 0.1, 0.13]),  # it ends there
+        ([0.103, 0.003, 0.104], [0.2, 0.1, 0.13]),  # both do
+    ],
+)
+def test_stiffness_is_how_forces_change_where_struts_touch(c, d):
+    tree = {
+        "nodes": {"a": [-0.1, 0.0, 0.1], "b": [0.1, 0.0, 0.1], "c": c, "d": d},
+        "struts": {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}},
+        "cables": {"slack": LOOSE | {"pairs": [["a", "c"]]}},
+        "gravity": 0.0,
+    }
+    touching = {"strut_contact": "!HuntCrossley {stiffness: 1 MN/m, dissipation: 1 s/m}"}
+    scenario = scenario_of(tree, **touching).with_sections(terrain=Flat())
+    structure = Structure.of(scenario.robot.blueprint())
+    resting, state = Unactuated.of(make_model(scenario, structure)), structure.initial_state
+    pushes = force_at_rest(resting, state)
+    assert np.abs(pushes).max() > 500.0
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        motion = 1e-7 * rng.normal(size=12)
+        ahead = force_at_rest(resting, displaced(resting, state, motion))
+        behind = force_at_rest(resting, displaced(resting, state, -motion))
+        force_at_rest(resting, state)
+        stiffness = stiffness_at_rest(resting)
+        expected = motion @ stiffness @ motion
+        # The smoothing for parallel struts, 1e-4 of the squares of both lengths, is approximate.
+        error = 1e-4 * np.abs(stiffness).max() * (motion @ motion)
+        assert 0.5 * (behind - ahead) @ motion == pytest.approx(expected, abs=error)
+
+
+def test_a_structure_file_may_have_struts_that_overlap(tmp_path):
+    text = """
+unit: m
+nodes: {a: [-0.1, 0, 0], b: [0.1, 0, 0], c: [0, -0.1, 0.005], d: [0, 0.1, 0.005]}
+struts:
+  bar: {pairs: [[a, b], [c, d]], diameter: 8 mm, density: 1200 kg/m^3, node_diameter: 0 m}
+cables:
+  tie: {pairs: [[a, c], [b, d]], stiffness: 100 N/m, damping: 0 N*s/m, free_length: 0.5 m}
+"""
+    (tmp_path / "crossed.yaml").write_text(text)
+    robot = robot_of_file(str(tmp_path / "crossed.yaml"))
+    nodes = moved_nodes(robot.structure, robot.equilibrium.state)
+    pressed = robot.weight / robot.scenario.strut_contact.stiffness
+    assert find_touch(robot.model.struts, nodes, 0, 1).depth < pressed

@@ -6,6 +6,7 @@ Without Chromium the tests skip; where CI is set they fail instead.
 import base64
 import contextlib
 import io
+import json
 import os
 import re
 import subprocess
@@ -21,11 +22,15 @@ from helpers.synthetic_run import write_run
 from matplotlib.colors import hex2color, rgb_to_hsv
 from matplotlib.image import imread
 
+from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.report.run_page import write_report
+from tetra_drake.report.structure_page import save_structure_page
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import frame_samples, save_replay
 from tetra_drake.visualization.scene import COLOURS
@@ -275,3 +280,18 @@ def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, m
         page.locator(f"a[href='{replay.name}']").first.click()
         animation.wait_until_loaded(page)
         assert page.evaluate("film.duration") == pytest.approx(0.3)
+
+
+def test_bodies_with_slashes_in_their_names_are_where_they_rest(browser, tmp_path):
+    """Such as those of NTRT's substructures."""
+    tree = read_structure("prism").model_dump() | {"actuated": {}}
+    text = json.dumps(tree).replace('"n', '"leg/n').replace('"leg/nod', '"nod')
+    given = StructureFile.model_validate(json.loads(text))
+    robot = Robot.of(load_scenario("prism").with_sections(robot=given))
+    save_structure_page(study_equilibrium(robot), tmp_path / "prism.html")
+    with opened(browser, (tmp_path / "prism.html").as_uri()) as loaded:
+        loaded.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
+        for name, place in zip(robot.structure.bodies, robot.structure.p_WB, strict=True):
+            path = ["robot", *name.split("/")]
+            found = loaded.evaluate(f"viewer.scene_tree.find({path}).object.position.toArray()")
+            assert found == pytest.approx(place.tolist(), abs=1e-4)

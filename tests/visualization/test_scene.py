@@ -67,6 +67,16 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
         assert floor.shape[:2] == (67, 19)  # nothing between whole inches
 
 
+@pytest.mark.parametrize("inches", [60, 1200])
+def test_a_large_flat_floor_has_lines_every_six_inches(inches, robot):
+    corners = np.array([[-6, -600], [inches, 600]])
+    floor = scene.floor_points(robot.ground, corners)
+    spacing = 1 if inches == 60 else 6
+    assert np.diff(floor[:, 0, 0]) == pytest.approx(spacing * INCH)
+    assert floor[0, 0].tolist() == pytest.approx([-6 * INCH, -600 * INCH, 0.0])
+    assert floor[-1, -1].tolist() == pytest.approx([inches * INCH, 600 * INCH, 0.0])
+
+
 def test_bodies_of_any_structure_have_their_struts_and_nodes():
     structure = prism.make_prism().structure
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))

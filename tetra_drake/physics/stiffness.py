@@ -1,8 +1,8 @@
 """Stiffness matrix of a robot at rest: second derivatives of its potential energy.
 
-They are exact, except that struts are taken to touch at fixed places. Finite differences of forces
-lose half of the digits, which hides the softest motions of a robot that is a billion times as stiff
-in other directions.
+They are exact, except where nearly parallel struts touch. Finite differences of forces lose half of
+the digits, which hides the softest motions of a robot that is a billion times as stiff in other
+directions.
 """
 
 from __future__ import annotations
@@ -21,17 +21,18 @@ WORLD = -1
 
 
 class Springs(NamedTuple):
-    """Springs between two points of different bodies, or of a body and the world."""
+    """Springs between points of two bodies, or of a body and the world. The displacements (k,) of a
+    spring are those of both bodies, times their motions."""
 
     body_a: np.ndarray
     """Indices of the first bodies (springs,)."""
     body_b: np.ndarray
-    p_a: np.ndarray
-    """Vectors (springs, 3) in m from the origins of the first bodies to the first points."""
-    p_b: np.ndarray
+    motion_a: np.ndarray
+    """Displacements (springs, k, 6) by the six motions of the first bodies; see
+    rigid_motions()."""
+    motion_b: np.ndarray
     stiffness: np.ndarray
-    """Derivatives (springs, 3, 3) in N/m of the force on the first point, by the displacement of
-    the second."""
+    """Second derivatives (springs, k, k) of the energy with respect to the displacements."""
 
 
 def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
@@ -66,8 +67,8 @@ def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     return Springs(
         carriers[cables.node_a],
         carriers[cables.node_b],
-        p_BN_W[cables.node_a],
-        p_BN_W[cables.node_b],
+        rigid_motions(p_BN_W[cables.node_a]),
+        -rigid_motions(p_BN_W[cables.node_b]),
         (lengthwise - sideways)[:, None, None] * along + sideways[:, None, None] * np.eye(3),
     )
 
@@ -81,37 +82,62 @@ def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     axes = np.concatenate([presses[:, None] * vertical, anchors.stiffness])
     nodes = np.concatenate([ground.contacts, anchors.nodes])
     p_BN_W = forces.nodes[nodes, kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    world = np.full(len(nodes), WORLD)
-    return Springs(carriers[nodes], world, p_BN_W, p_BN_W, axes[:, None] * np.eye(3))
+    world, motion = np.full(len(nodes), WORLD), rigid_motions(p_BN_W)
+    return Springs(carriers[nodes], world, motion, -motion, axes[:, None] * np.eye(3))
 
 
 def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """Contacts of struts as springs along the lines between their nearest points."""
+    """Contacts of struts as springs. Their displacements (12,) are those of the ends of the first
+    strut, then of the second."""
     near, struts, nodes = forces.near_struts, robot.struts, forces.nodes
-    stiffness = contact.NormalForce(*robot.strut_contact.normal).stiffness
-    bodies, points, springs = [], [], []
+    law = contact.NormalForce(*robot.strut_contact.normal)
+    ends, stiffness = [], []
     for i, j in near.pairs[: near.count[0]].tolist():
         touch = capsules.find_touch(struts, nodes, i, j)
-        if touch.depth <= 0.0:
-            continue
-        bodies.append((carriers[struts.node_a[i]], carriers[struts.node_a[j]]))
-        ends = (
-            (struts.node_a[i], struts.node_b[i], touch.s),
-            (struts.node_a[j], struts.node_b[j], touch.t),
-        )
-        points.append([capsules.place_on(nodes, a, b, kinematics.P_BN_W, x) for a, b, x in ends])
-        springs.append(stiffness * np.outer(touch.direction, touch.direction))
-    body_a, body_b = np.array(bodies, dtype=int).reshape(-1, 2).T
-    p_a, p_b = np.array(points, dtype=float).reshape(-1, 2, 3).transpose(1, 0, 2)
-    return Springs(body_a, body_b, p_a, p_b, np.array(springs, dtype=float).reshape(-1, 3, 3))
+        if touch.depth > 0.0:
+            axes = capsules.axes_of(struts, nodes, i, j)
+            distance = struts.radius[i] + struts.radius[j] - touch.depth
+            stiffness.append(_stiffness_of_touch(touch, axes, distance, law.stiffness))
+            ends.append([struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]])
+    of_touch = np.array(ends, dtype=int).reshape(-1, 4)
+    p_BN_W = nodes[of_touch, kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    motions = rigid_motions(p_BN_W.reshape(-1, 3)).reshape(-1, 4, 3, 6)
+    motion_a, motion_b = motions.copy(), motions.copy()
+    motion_a[:, 2:], motion_b[:, :2] = 0.0, 0.0
+    return Springs(
+        carriers[of_touch[:, 0]],
+        carriers[of_touch[:, 2]],
+        motion_a.reshape(-1, 12, 6),
+        motion_b.reshape(-1, 12, 6),
+        np.array(stiffness, dtype=float).reshape(-1, 12, 12),
+    )
+
+
+def _stiffness_of_touch(
+    touch: capsules.Touch, axes: capsules.Axes, distance: float, stiffness: float
+) -> np.ndarray:
+    """Second derivatives (12, 12) of the energy of a contact of struts, with respect to the
+    displacements of their ends. The contact moves along the struts, unless it is at an end."""
+    n, u, v = np.array(touch.direction), np.array(axes.u), np.array(axes.v)
+    shares = np.array([1.0 - touch.s, touch.s, touch.t - 1.0, -touch.t])
+    sideways = (np.eye(3) - np.outer(n, n)) / distance
+    bend = np.kron(np.outer(shares, shares), sideways)
+    moves = [0.0 < place < 1.0 for place in (touch.s, touch.t)]
+    if any(moves):
+        along = np.array([u, -v])
+        by_place = np.kron(shares, along @ sideways)
+        by_place += np.kron([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]], n)
+        curvature = along @ sideways @ along.T
+        curvature[0, 0] += capsules.PARALLEL**2 * axes.uu / distance
+        by_place, curvature = by_place[moves], curvature[moves][:, moves]
+        bend -= by_place.T @ np.linalg.solve(curvature, by_place)
+    nearer = np.kron(shares, n)
+    return stiffness * (np.outer(nearer, nearer) - touch.depth * bend)
 
 
 def _add_springs(springs: Springs, blocks: np.ndarray) -> None:
     """Adds the stiffness of springs to the blocks (bodies + 1, bodies + 1, 6, 6)."""
-    ends = (
-        (springs.body_a, rigid_motions(springs.p_a)),
-        (springs.body_b, -rigid_motions(springs.p_b)),
-    )
+    ends = (springs.body_a, springs.motion_a), (springs.body_b, springs.motion_b)
     for body, motion in ends:
         for other, other_motion in ends:
             added = np.einsum("sia,sij,sjb->sab", motion, springs.stiffness, other_motion)

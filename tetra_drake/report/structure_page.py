@@ -12,7 +12,7 @@ from tetra_drake.analysis.equilibrium import EquilibriumStudy
 from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Robot, undisturbed_structure
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
@@ -34,11 +34,13 @@ _SURROUNDINGS = "prism"
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     """The robot of a structure file on flat ground with Coulomb friction, for MuJoCo.
 
-    A file of NTRT needs a `unit` of length. Raises InputError that names file and key.
+    A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in some of
+    NTRT's; in equilibrium they touch. Raises InputError that names file and key.
     """
     structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
     surroundings = load_scenario(_SURROUNDINGS).with_changes({"friction.stiffness": "0 N/m"})
-    return Robot.of(surroundings.with_sections(name=name, robot=structure, engine=Mujoco()))
+    scenario = surroundings.with_sections(name=name, robot=structure, engine=Mujoco())
+    return Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
 
 
 def structure_text(study: EquilibriumStudy) -> str:

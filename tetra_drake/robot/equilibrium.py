@@ -23,7 +23,7 @@ from tetra_drake.robot.statics import null_space
 from tetra_drake.simd.compiling import LOGGER, compiled
 from tetra_drake.simd.lanes import Table
 
-ROUNDING = 8 * np.finfo(float).eps
+ROUNDING = 64 * np.finfo(float).eps
 """Largest force left in equilibrium, as a share of the robot's greatest stiffness times its
 farthest coordinate: positions are rounded, and springs turn that into force."""
 
@@ -169,7 +169,8 @@ class _Descent:
             return
         self._stiffness = stiffness_at_rest(self._robot)
         self._held = _free_motions(self._robot, state)
-        hardest = self._stiffness.diagonal().max()
+        cables = self._robot.model.cables.law.stiffness  # also of those that are slack here
+        hardest = max(self._stiffness.diagonal().max(), cables.max(initial=0.0))
         farthest = np.abs(self._robot.forces.nodes[:, P_WN : P_WN + 3]).max()
         self._rounding = ROUNDING * hardest * farthest
         if self._robot.model.strut_contact.acts:

@@ -207,13 +207,16 @@ def make_structure(scenario: Scenario) -> Structure:
     return dataclasses.replace(structure, p_WB=p_WB, q_WB=q_WB)
 
 
-def undisturbed_structure(scenario: Scenario) -> Structure:
-    """The structure of a scenario's robot at its start on flat ground, without offsets."""
+def undisturbed_structure(scenario: Scenario, *, may_overlap: bool = False) -> Structure:
+    """The structure of a scenario's robot at its start on flat ground, without offsets. With
+    `may_overlap`, struts that touch may overlap at the given positions: the search for equilibrium
+    moves them apart."""
     blueprint = scenario.robot.blueprint()
     if not scenario.terrain.is_ground:
         blueprint = dataclasses.replace(blueprint, contacts=np.array([], dtype=np.int64))
     placed = Structure.of(blueprint)
-    check_apart(scenario, placed)
+    if not may_overlap:
+        check_apart(scenario, placed)
     if not blueprint.settles:
         return placed
     up = np.array([0.0, 0.0, _lift(scenario, placed)])

@@ -60,7 +60,7 @@ window.addEventListener("load", () => {
     points.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(points.length);
 
   // The objects of the scene.
-  const body_objects = bodies.map((name) => find("robot", name));
+  const body_objects = bodies.map((name) => find("robot", ...name.split("/")));
   const cable_objects = cables.map(({path}) => find(...path));
   const feet = contacts.map((node) => mesh(find(...nodes[node].path)));
   const force_arrows = contacts.map(() => arrow(colours.force));

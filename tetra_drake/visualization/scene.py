@@ -51,6 +51,9 @@ MARGIN, UNEVEN_MARGIN = 4.5, 1.5
 smaller one, because it needs much space in a page."""
 MOST_POINTS = 5_000
 """Approximate largest number of points of uneven ground."""
+MOST_SQUARES = 200_000
+"""Largest number of square inches of flat ground. On a larger floor, only every sixth line is
+drawn."""
 
 _FINEST = 12  # points per inch of uneven ground, at most
 _BEND = 1e-6  # m; the ground is straight if second differences of heights are smaller
@@ -227,10 +230,15 @@ def floor_corners(points: np.ndarray, margin: float) -> np.ndarray:
 def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
     """Points of the ground (rows, columns, 3) in m, between corners (2, 2) in whole inches.
 
-    Rows are along x, columns along y. There are points at every inch. Where the ground bends, there
-    are points in between, as many as MOST_POINTS allows.
+    Rows are along x, columns along y. There are points at every inch, or at every six inches on
+    flat ground beyond MOST_SQUARES. Where the ground bends, there are points in between, as many as
+    MOST_POINTS allows.
     """
     (x_low, y_low), (x_high, y_high) = corners
+    if ground.flat and (x_high - x_low) * (y_high - y_low) > MOST_SQUARES:
+        rows, columns = np.arange(x_low, x_high + 1, 6), np.arange(y_low, y_high + 1, 6)
+        x, y = np.meshgrid(rows * INCH, columns * INCH, indexing="ij")
+        return np.stack([x, y, np.zeros_like(x)], axis=-1)
     for per_inch in range(1 if ground.flat else _FINEST, 0, -1):
         rows = np.arange(x_low * per_inch, x_high * per_inch + 1)
         columns = np.arange(y_low * per_inch, y_high * per_inch + 1)
@@ -318,7 +326,8 @@ def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
             points = line[::6] if np.ptp(line[:, 2]) == 0.0 else line
             (six_inches if round(position) % 6 == 0 else inches).append(points)
     # Lines are a little above the floor. Otherwise the floor would hide parts of them.
-    _add_lines(meshcat, "/floor/inch", inches, lift=0.0002, colour=rgba(inch))
+    if inches:
+        _add_lines(meshcat, "/floor/inch", inches, lift=0.0002, colour=rgba(inch))
     _add_lines(meshcat, "/floor/six_inches", six_inches, lift=0.0004, colour=rgba("six_inches"))
 
 
