@@ -8,10 +8,10 @@ import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram
 
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import Engine
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sample, Sampler, drives_of, motion_of
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
@@ -43,7 +43,7 @@ class DrakeEngine(Engine):
 
     can_be_watched = True
 
-    def simulate(self, simulation: Simulation) -> SimulationResult:
+    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         robot, viewer = simulation.robot, simulation.viewer
         settings, engine = robot.scenario.simulation, robot.scenario.settings_of(Drake)
         start_up = robot.scenario.cpg.start_up

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from tetra_drake.engines import ENGINES
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
@@ -47,9 +47,9 @@ class Engine:
             changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
             scenario = scenario.with_changes(changes)
         with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
-            self.simulate(Simulation(Robot.of(scenario), seeded_gait(scenario), record=True))
+            self.simulate(GaitSimulation(Robot.of(scenario), seeded_gait(scenario), record=True))
 
-    def simulate(self, simulation: Simulation) -> SimulationResult:
+    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         """Simulates a gait. Raises the same errors as engines.simulate.simulate()."""
         raise NotImplementedError
 
@@ -62,7 +62,7 @@ class Engine:
     def outcome(self, scenario: Scenario, gait: Gait, *, record: bool) -> Outcome:
         """Simulates one gait. Returns its result or its failure."""
         try:
-            return self.simulate(Simulation(Robot.of(scenario), gait, record=record))
+            return self.simulate(GaitSimulation(Robot.of(scenario), gait, record=record))
         except SimulationFailure as failure:
             return failure
 

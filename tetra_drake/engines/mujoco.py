@@ -28,9 +28,9 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
@@ -90,7 +90,7 @@ class MujocoEngine(Engine):
         scenario.actuation.check_mujoco(scenario.name)
         scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
-    def simulate(self, simulation: Simulation) -> SimulationResult:
+    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         robot, gait, steering = simulation.robot, simulation.gait, simulation.steering
         self.check(robot.scenario)
         settings, step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step

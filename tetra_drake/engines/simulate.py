@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+from tetra_drake.engines.gait_simulation import GaitSimulation, Viewer
 from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
-from tetra_drake.engines.simulation import Simulation, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
@@ -58,13 +58,13 @@ def simulate(
         if gait is not None or steering is not None:
             raise InputError("simulate", "command", "excludes a gait, and steering")
         robot = commanded_robot(scenario, command)
-        simulation = Simulation(robot, command.gait, record=record, viewer=viewer)
+        simulation = GaitSimulation(robot, command.gait, record=record, viewer=viewer)
         result = engine.simulate(simulation)
         return dataclasses.replace(result, scenario=scenario)  # the caller's, with a network
     if gait is None:
         raise InputError("simulate", "gait", "is needed, or a command")
     robot, gait = Robot.of(scenario), given_gait(gait, scenario)
-    simulation = Simulation(robot, gait, record=record, viewer=viewer, steering=steering)
+    simulation = GaitSimulation(robot, gait, record=record, viewer=viewer, steering=steering)
     return engine.simulate(simulation)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.loop import Constants, LaneState
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
@@ -44,7 +44,7 @@ class Prepared:
     """State at t = 0, with scratch memory."""
 
     @classmethod
-    def of(cls, simulation: Simulation) -> Prepared:
+    def of(cls, simulation: GaitSimulation) -> Prepared:
         """Prepares a simulation. Raises InputError if gait or steering do not fit the scenario."""
         robot, gait, record = simulation.robot, simulation.gait, simulation.record
         settings, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up

@@ -1,4 +1,4 @@
-"""Simulation: what an engine simulates, and for whom."""
+"""GaitSimulation: what an engine simulates, and for whom."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Viewer(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation:
+class GaitSimulation:
     """What an engine simulates: a robot that walks with a gait."""
 
     robot: Robot
