@@ -12,6 +12,11 @@ if TYPE_CHECKING:
     import xarray
 
 
+MARK_DECIMALS = 9
+"""Decimals of the times (s) at which a step must end. A step between two times that differ in
+rounding would be too short."""
+
+
 class Viewer(Protocol):
     """Observer that shows a simulation while it runs."""
 

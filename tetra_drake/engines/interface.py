@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from tetra_drake.engines import ENGINES
 from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.stepper import Stepper
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
@@ -52,6 +53,13 @@ class Engine:
     def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         """Simulates a gait. Raises the same errors as engines.simulate.simulate()."""
         raise NotImplementedError
+
+    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> Stepper:
+        """A stepper for `count` robots like the first one. Raises InputError if the engine cannot
+        pause."""
+        scenario = first.robot.scenario
+        problem = f"found '{scenario.engine_name}', which does not simulate in control periods"
+        raise InputError(f"scenario {scenario.name}", "engine", problem)
 
     def simulate_many(
         self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int

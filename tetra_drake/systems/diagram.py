@@ -88,7 +88,7 @@ def MakeTensegrityDiagram(
     builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
     if len(robot.starting_drives()):
         actuators = builder.AddNamedSystem("actuators", Actuators(robot))
-        builder.Connect(cables.GetOutputPort("rates"), actuators.GetInputPort("rates"))
+        builder.Connect(cables.GetOutputPort("drive_rates"), actuators.GetInputPort("rates"))
         builder.Connect(actuators.get_output_port(), cables.GetInputPort("drives"))
         builder.ExportOutput(actuators.get_output_port(), "drives")
     if structure.signals and scenario.cpg.feedback:

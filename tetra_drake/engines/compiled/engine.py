@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.compiled.lane_stepper import LaneStepper
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
@@ -37,6 +38,9 @@ class CompiledEngine(Engine):
         while not engine.advance(_BODY_STEPS):
             check_time()
         return engine.result(0)
+
+    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> LaneStepper:
+        return LaneStepper(first, count=count, threads=threads)
 
     def simulate_many(
         self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
