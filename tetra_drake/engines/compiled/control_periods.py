@@ -53,7 +53,11 @@ def read(parts: loop.Parts, readings: Packed[Readings]) -> None:
     """Writes the readings of the simulations, a row for each of the first lanes."""
     _, lanes, _, _ = unpacked(parts)
     to = unpacked(readings)
-    clock, state, nodes = by_lane(lanes.clock), by_lane(lanes.step.state), by_lane(lanes.forces.nodes)
+    clock, state, nodes = (
+        by_lane(lanes.clock),
+        by_lane(lanes.step.state),
+        by_lane(lanes.forces.nodes),
+    )
     cables, loads = by_lane(lanes.forces.cable_forces), by_lane(lanes.forces.ground_forces)
     bodies = to.q_WB.shape[1]
     for lane in range(to.time.size):
