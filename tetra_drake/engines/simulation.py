@@ -6,12 +6,14 @@ import dataclasses
 import math
 import numbers
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, Viewer
 from tetra_drake.engines.interface import engine_of
+from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.physics.cable import CableLaw
@@ -89,8 +91,9 @@ class Simulation:
         first = self._gait_simulation(self.robot)
         self._stepper = engine_of(scenario).stepper(first, count=count, threads=workers)
         self._robots = [self.robot] * count
-        self._law = CableLaw(*np.empty((3, count, self.robot.driven.size)))
-        self._signals = np.empty((count, self.robot.driven.size))
+        shape = count, self.robot.driven.size
+        self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
+        self._signals = np.empty(shape)
         self._steps = np.zeros(count, dtype=int)
         self.failures: list[SimulationFailure | None] = [None] * count
         """Failure of each robot (N,): Diverged or StepBudgetExceeded; None if there is none. Its
@@ -247,6 +250,29 @@ class Simulation:
             raise InputError("Simulation", "indices", problem)
         found: list[int] = places.astype(int).tolist()
         return found
+
+
+def simulate_controlled(
+    scenario: Scenario,
+    controller: Controller,
+    *,
+    control_period: float,
+    record: bool,
+    viewer: Viewer | None,
+) -> SimulationResult:
+    """Simulates a robot that follows a controller. Raises the same errors as simulate()."""
+    simulation = Simulation(
+        scenario,
+        control_period=control_period,
+        record=record,
+        viewer=viewer,
+        name=getattr(controller, "__name__", "controller"),
+    )
+    while not simulation.ended[0]:
+        check_time()
+        readings = simulation.state.rows(0)
+        simulation.step(controller(float(readings.time), readings))
+    return simulation.result()
 
 
 def _actions(

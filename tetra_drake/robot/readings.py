@@ -92,23 +92,43 @@ class Readings(NamedTuple):
 def first_readings(robot: Robot) -> Readings:
     """The readings of a robot at its start, where its actuators follow the first sample of its
     command."""
-    model, state = robot.model, robot.structure.initial_state[np.newaxis]
-    forces = Forces.of(model)
-    cable_forces, ground_forces = forces.cable_forces[np.newaxis], forces.ground_forces[np.newaxis]
-    forces_along(
-        model,
-        state,
-        robot.starting_modes()[np.newaxis],
-        robot.commanded[:1],
-        robot.starting_drives()[np.newaxis],
-        Forces.of(model),
-        cable_forces,
-        ground_forces,
+    return readings_at(
+        robot,
+        time=0.0,
+        state=robot.structure.initial_state,
+        modes=robot.starting_modes(),
+        signals=robot.commanded[0],
+        drives=robot.starting_drives(),
     )
+
+
+def readings_at(
+    robot: Robot,
+    *,
+    time: float,
+    state: np.ndarray,
+    modes: np.ndarray,
+    signals: np.ndarray,
+    drives: np.ndarray,
+    ground_forces: np.ndarray | None = None,
+) -> Readings:
+    """The readings of a robot at a time (s).
+
+    Args:
+        state: state (13 n,) of the bodies.
+        modes: modes of the contact nodes; see physics.contact.
+        signals: signals (m,) in N.
+        drives: states of the actuators (drives,).
+        ground_forces: table `ground_forces` of an engine with its own law of contact.
+    """
+    model, forces, sample = robot.model, Forces.of(robot.model), np.newaxis
+    cables, ground = np.copy(forces.cable_forces[sample]), np.copy(forces.ground_forces[sample])
+    given = state[sample], modes[sample], signals[sample], drives[sample]
+    forces_along(model, *given, forces, cables, ground)
     return Readings.of(
         robot.structure,
-        time=0.0,
-        state=state[0],
-        cable_forces=cable_forces[0],
-        ground_forces=ground_forces[0],
+        time=time,
+        state=state,
+        cable_forces=cables[0],
+        ground_forces=ground[0] if ground_forces is None else ground_forces,
     )
