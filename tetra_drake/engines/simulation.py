@@ -36,11 +36,11 @@ CONTROL_PERIOD = 0.02
 class Simulation:
     """Robots side by side that are advanced by control periods.
 
-        >>> simulation = td.Simulation("quick", count=8, control_period=0.02)
-        >>> readings = simulation.reset(seed=1)
+        >>> simulation = td.Simulation(td.load_scenario("quick"), count=4)
+        >>> driven, readings = simulation.robot.driven, simulation.reset(seed=1)
         >>> while not simulation.ended.all():
-        ...     readings = simulation.step(policy(readings))
-        >>> simulation.result(0).metrics.distance_in
+        ...     readings = simulation.step(simulation.rest + 3.0 * readings.rates[:, driven])
+        >>> inches = [simulation.result(place).metrics.distance_in for place in range(4)]
 
     An action is a setpoint of an actuator, by the kind of `actuation`: a force (N) of !Force, a
     free length (m) of a !Winch, a tension (N) of a !TensionMotor. It is held for a control period.
