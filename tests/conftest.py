@@ -8,7 +8,7 @@ import pytest
 from helpers.analytic import BOWL, record_run, small_scenario
 from helpers.widths import WIDEST
 
-from tetra_drake.engines.compiled import lane_pool
+from tetra_drake.engines.compiled import lane_pool, lane_stepper
 from tetra_drake.errors import InputError
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import Structure
@@ -62,7 +62,8 @@ def few_widths() -> Iterator[None]:
     """One lane or as many as fit this processor, as each width is compiled for half a minute or
     more; the numbers are the same with any."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lane_pool, "lanes_for", lambda walks: 1 if walks <= 1 else WIDEST)
+        for module in (lane_pool, lane_stepper):
+            patch.setattr(module, "lanes_for", lambda walks: 1 if walks <= 1 else WIDEST)
         yield
 
 

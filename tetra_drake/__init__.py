@@ -20,6 +20,7 @@ Functions, and the main attributes of their results:
     sweep               metrics of gaits on a grid of changed scenarios, an xarray.Dataset
     load_result         the result in a folder of the command `tetra-drake simulate`
     evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (pandas tables)
+    Simulation          robots in control periods: reset(), step(actions), state
     load_command        commands for actuators from a file, for simulate(scenario, command=...)
 
 Figures are functions in tetra_drake.figures: gait_diagram(result) from
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from tetra_drake.analysis.sweep import sweep as sweep
     from tetra_drake.engines.simulate import simulate as simulate
     from tetra_drake.engines.simulate import simulate_many as simulate_many
+    from tetra_drake.engines.simulation import Simulation as Simulation
     from tetra_drake.evolution.run import load_run as load_run
     from tetra_drake.experiment import evolve as evolve
     from tetra_drake.prototype.command_file import load_command as load_command
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
 __version__ = "0.3.0"
 
 _HOMES = {
+    "Simulation": "tetra_drake.engines.simulation",
     "evolve": "tetra_drake.experiment",
     "load_command": "tetra_drake.prototype.command_file",
     "load_gait": "tetra_drake.robot.gait",

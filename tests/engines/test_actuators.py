@@ -16,8 +16,8 @@ from helpers.actuations import LIMITED
 from helpers.quantities import with_unit
 from helpers.states import body_velocities
 
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import engine_of
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.inertia import XX
 from tetra_drake.robot.gait import seeded_gait
@@ -77,7 +77,7 @@ def swaying(actuation: Actuation, *, damping: float, gain: float = 0.0) -> Scena
 
 def trajectory_of(robot: Robot) -> xarray.Dataset:
     gait = seeded_gait(robot.scenario)
-    result = engine_of(robot.scenario).simulate(Simulation(robot, gait, record=True))
+    result = engine_of(robot.scenario).simulate(GaitSimulation(robot, gait, record=True))
     return result.trajectory
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.prepared import Prepared
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
@@ -42,7 +42,7 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
 
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
     """Result and motion of a robot that walks by a seeded gait on the compiled engine."""
-    prepared = Prepared.of(Simulation(robot, seeded_gait(robot.scenario, seed), record=True))
+    prepared = Prepared.of(GaitSimulation(robot, seeded_gait(robot.scenario, seed), record=True))
     engine = LaneEngine(prepared, width=1)
     engine.load(0, prepared)
     while not engine.advance(100_000):

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-import time
+import weakref
+from time import perf_counter
 
 import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram
 
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import Engine
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sample, Sampler, drives_of, motion_of
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import make_dataset
+from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.systems import HeldSignals
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies of 1e-3 and above
@@ -43,65 +47,109 @@ class DrakeEngine(Engine):
 
     can_be_watched = True
 
-    def simulate(self, simulation: Simulation) -> SimulationResult:
-        robot, viewer = simulation.robot, simulation.viewer
-        settings, engine = robot.scenario.simulation, robot.scenario.settings_of(Drake)
-        start_up = robot.scenario.cpg.start_up
-        diagram = MakeTensegrityDiagram(robot, simulation.gait, steering=simulation.steering)
-        simulator = MakeSimulator(diagram, engine)
-        integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
-        signals, observer = diagram.GetOutputPort("signals"), Observer(robot)
-        drives_at = drives_of(diagram)
-        work = _Work(integrator)
-        aimer = _StepAimer(diagram, simulator, engine, work)
-        times = motion_times(settings, record=simulation.record)
-        sampler = Sampler(diagram, times, max_step=engine.max_step)
+    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
+        settings = simulation.robot.scenario.simulation
+        diagram = MakeTensegrityDiagram(
+            simulation.robot, simulation.gait, steering=simulation.steering
+        )
+        walk = _DiagramWalk(simulation, diagram)
+        for instant in (0.0, settings.steady_from, settings.duration):
+            walk.advance_to(instant)
+        return walk.result()
 
-        def after_step(context: Context) -> None:
-            # Nothing here may change the simulation, whether it is recorded or watched or not.
-            check_time()
-            bodies, now = state.Eval(context), context.get_time()
-            velocities = bodies[7 * len(robot.structure.bodies) :]
-            _check(settings, now, velocities, work)
-            aimer.aim(context, velocities)
-            sampler.after_step(context)
-            observer.add(now, bodies, signals.Eval(context), drives_at(context))
-            if now == start_up and robot.structure.signals:  # the event is after this step
-                cpg = diagram.GetSubsystemByName("cpg")
-                begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
-                observer.add(now, bodies, begun, drives_at(context))
-            if viewer is not None and viewer.wants(now):
-                viewer.show(make_dataset(robot, motion_of(diagram, [Sample.of(context)])))
+    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> SerialStepper:
+        return SerialStepper(_ControlledWalk, first.robot.structure, count=count)
 
-        simulator.set_monitor(after_step)
-        started = time.perf_counter()
+
+class _DiagramWalk:
+    """Simulation of a robot's diagram."""
+
+    def __init__(self, simulation: GaitSimulation, diagram: Diagram) -> None:
+        robot, engine = simulation.robot, simulation.robot.scenario.settings_of(Drake)
+        self._simulation, self._diagram, self._engine = simulation, diagram, engine
+        self._simulator = MakeSimulator(diagram, engine)
+        self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
+        self._drives_at, self._observer = drives_of(diagram), Observer(robot)
+        self._work = _Work(self._simulator.get_integrator())
+        self._aimer = _StepAimer(diagram, self._simulator, engine, self._work)
+        times = motion_times(robot.scenario.simulation, record=simulation.record)
+        self._sampler = Sampler(diagram, times, max_step=engine.max_step)
+        self._wall_time = 0.0
+        # A bound method in place of the lambda would keep the diagram alive for ever.
+        this = weakref.proxy(self)
+        self._simulator.set_monitor(lambda context: this._after_step(context))
+
+    def advance_to(self, time: float) -> None:
+        """Simulates to a time (s). Raises Diverged or StepBudgetExceeded."""
+        started = perf_counter()
         try:
-            for instant in (0.0, settings.steady_from, settings.duration):
-                simulator.AdvanceTo(instant)
+            self._simulator.AdvanceTo(time)
         except SimulationFailure:
             raise
         except RuntimeError as error:
             # Errors of Drake: the step became too small, or the state is not finite.
-            now, reason = simulator.get_context().get_time(), str(error).strip()
+            now, reason = self._simulator.get_context().get_time(), str(error).strip()
             raise Diverged(time=now, reason=reason.splitlines()[0]) from error
-        wall_time = time.perf_counter() - started
+        finally:
+            self._wall_time += perf_counter() - started
 
-        steps, derivative_evaluations, jacobian_evaluations = work.total()
+    def result(self) -> SimulationResult:
+        """The result, at the end."""
+        steps, derivative_evaluations, jacobian_evaluations = self._work.total()
         return make_result(
-            robot,
-            simulation.gait,
-            sampler.motion(),
-            totals=observer.totals(),
+            self._simulation.robot,
+            self._simulation.gait,
+            self._sampler.motion(),
+            totals=self._observer.totals(),
             work=IntegratorWork(
-                scheme=engine.scheme,
-                accuracy=engine.accuracy,
+                scheme=self._engine.scheme,
+                accuracy=self._engine.accuracy,
                 steps=steps,
                 derivative_evaluations=derivative_evaluations,
                 jacobian_evaluations=jacobian_evaluations,
             ),
-            wall_time=wall_time,
-            record=simulation.record,
+            wall_time=self._wall_time,
+            record=self._simulation.record,
         )
+
+    def _after_step(self, context: Context) -> None:
+        # Nothing here may change the simulation, whether it is recorded or watched or not.
+        check_time()
+        robot, viewer = self._simulation.robot, self._simulation.viewer
+        bodies, now = self._state.Eval(context), context.get_time()
+        velocities = bodies[7 * len(robot.structure.bodies) :]
+        _check(robot.scenario.simulation, now, velocities, self._work)
+        self._aimer.aim(context, velocities)
+        self._sampler.after_step(context)
+        drives = self._drives_at(context)
+        self._observer.add(now, bodies, self._signals.Eval(context), drives)
+        begins = now == robot.scenario.cpg.start_up and self._diagram.HasSubsystemNamed("cpg")
+        if begins:  # the event is after this step
+            cpg = self._diagram.GetSubsystemByName("cpg")
+            begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
+            self._observer.add(now, bodies, begun, drives)
+        if viewer is not None and viewer.wants(now):
+            viewer.show(make_dataset(robot, motion_of(self._diagram, [Sample.of(context)])))
+
+
+class _ControlledWalk(_DiagramWalk):
+    """Simulation of a robot's diagram with signals that are held between pauses."""
+
+    def __init__(self, simulation: GaitSimulation) -> None:
+        robot = simulation.robot
+        self._held = HeldSignals(robot)
+        super().__init__(simulation, MakeTensegrityDiagram(robot, None, controller=self._held))
+        self._context = self._held.GetMyMutableContextFromRoot(
+            self._simulator.get_mutable_context()
+        )
+
+    def hold(self, signals: np.ndarray) -> None:
+        """Sets the signals (m,) in N from now on."""
+        self._held.Hold(self._context, signals)
+
+    def readings(self) -> Readings:
+        """The readings of the robot now."""
+        return self._held.Read(self._context)
 
 
 def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:

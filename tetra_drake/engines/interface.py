@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from tetra_drake.engines import ENGINES
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.stepper import Stepper
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
@@ -47,11 +48,18 @@ class Engine:
             changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
             scenario = scenario.with_changes(changes)
         with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
-            self.simulate(Simulation(Robot.of(scenario), seeded_gait(scenario), record=True))
+            self.simulate(GaitSimulation(Robot.of(scenario), seeded_gait(scenario), record=True))
 
-    def simulate(self, simulation: Simulation) -> SimulationResult:
+    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         """Simulates a gait. Raises the same errors as engines.simulate.simulate()."""
         raise NotImplementedError
+
+    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> Stepper:
+        """A stepper for `count` robots like the first one. Raises InputError if the engine cannot
+        pause."""
+        scenario = first.robot.scenario
+        problem = f"found '{scenario.engine_name}', which does not simulate in control periods"
+        raise InputError(f"scenario {scenario.name}", "engine", problem)
 
     def simulate_many(
         self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
@@ -62,7 +70,7 @@ class Engine:
     def outcome(self, scenario: Scenario, gait: Gait, *, record: bool) -> Outcome:
         """Simulates one gait. Returns its result or its failure."""
         try:
-            return self.simulate(Simulation(Robot.of(scenario), gait, record=record))
+            return self.simulate(GaitSimulation(Robot.of(scenario), gait, record=record))
         except SimulationFailure as failure:
             return failure
 

@@ -28,9 +28,10 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
@@ -40,6 +41,7 @@ from tetra_drake.results.result import IntegratorWork, SimulationResult, make_re
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes
+from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import Structure, node_positions
@@ -90,38 +92,18 @@ class MujocoEngine(Engine):
         scenario.actuation.check_mujoco(scenario.name)
         scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
-    def simulate(self, simulation: Simulation) -> SimulationResult:
+    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         robot, gait, steering = simulation.robot, simulation.gait, simulation.steering
         self.check(robot.scenario)
-        settings, step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
-        steps = max(1, round(settings.duration / step))
-        if steps > settings.max_evaluations:
-            reason = f"{steps} steps exceed the budget of {settings.max_evaluations}"
-            raise StepBudgetExceeded(time=0.0, reason=reason)
-        times = motion_times(settings, record=simulation.record)
-        steps_kept = np.rint(times / step).astype(int)
-        signals = signals_at(robot, gait, step * np.arange(steps), steering=steering)
-        simulator, observer = _Simulator(robot), Observer(robot)
-        started = time.perf_counter()
-        states = simulator.run(signals, steps_kept, observer)
-        wall_time = time.perf_counter() - started
-        totals = observer.totals()
-        is_damped = robot.structure.cables["damping"].any()
-        if robot.model.slack and is_damped and totals.tension.of_all[0] <= 0.0:
-            reason = "a cable went slack, and the damper of MuJoCo's tendon would push"
-            raise SimulationFailure(time=float(totals.time[0]), reason=reason)
-        signals_kept = signals_at(robot, gait, times, steering=steering)
-        return make_result(
-            robot,
-            gait,
-            simulator.motion(times, states, signals_kept),
-            totals=totals,
-            work=IntegratorWork(
-                scheme=INTEGRATOR, accuracy=step, steps=steps, derivative_evaluations=steps
-            ),
-            wall_time=wall_time,
-            record=simulation.record,
-        )
+        walk = _MujocoWalk(simulation)
+        signals = signals_at(robot, gait, walk.step * np.arange(walk.steps), steering=steering)
+        walk.run(signals)
+        walk.signals[:] = signals_at(robot, gait, walk.times, steering=steering)
+        return walk.result()
+
+    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> SerialStepper:
+        self.check(first.robot.scenario)
+        return SerialStepper(_MujocoWalk, first.robot.structure, count=count)
 
     def simulate_many(
         self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
@@ -176,6 +158,7 @@ class _Simulator:
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
+        self._data = mujoco.MjData(self._model)
         self._step = robot.scenario.settings_of(Mujoco).step
         height = max(
             0.0, node_positions(robot.structure, robot.structure.initial_state)[:, 2].min()
@@ -189,31 +172,18 @@ class _Simulator:
         names = np.array(robot.structure.node_names)[robot.structure.contacts]
         self._contacts = [self._model.site(name).id for name in names]
 
-    def run(self, signals: Array, steps_kept: Array, observer: Observer) -> Array:
-        """Simulates and returns MuJoCo's states (time, qpos, qvel) after the steps `steps_kept`.
-
-        `signals` (steps, n) drive the cables. `observer` gets states along the way. Raises
-        Diverged.
-        """
-        from mujoco.rollout import Rollout
-
-        data = self._mujoco.MjData(self._model)
+    def start(self) -> Array:
+        """MuJoCo's state at the start."""
         kind = self._mujoco.mjtState.mjSTATE_FULLPHYSICS
         state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
-        self._mujoco.mj_getState(self._model, data, state, kind)
-        kept = np.tile(state, (len(steps_kept), 1))
-        observer.add(0.0, self.body_states(state[np.newaxis])[0], signals[0], _NO_DRIVES)
-        with Rollout(nthread=0) as rollout:
-            for first in range(0, len(signals), _STRETCH):
-                check_time()
-                forces = self._controls(signals[first : first + _STRETCH])
-                (states,), _ = rollout.rollout(self._model, [data], state, forces)
-                here = (first < steps_kept) & (steps_kept <= first + len(states))
-                kept[here] = states[steps_kept[here] - first - 1]
-                state = states[-1]
-                self._observe(observer, states, signals, first)
-                self._check(states, first)
-        return kept
+        self._mujoco.mj_getState(self._model, self._mujoco.MjData(self._model), state, kind)
+        return state
+
+    def roll_out(self, rollout: Any, state: Array, signals: Array) -> Array:
+        """MuJoCo's states (time, qpos, qvel) after each step from a state, with a row of signals
+        (steps, n) for each step."""
+        (states,), _ = rollout.rollout(self._model, [self._data], state, self._controls(signals))
+        return states
 
     def _controls(self, signals: Array) -> Array:
         """MuJoCo's controls (steps, actuators) for signals (steps, n). Anchors and loads have the
@@ -222,9 +192,12 @@ class _Simulator:
         controls[:, : self._motors.size] = signals[:, self._motors]
         return controls
 
-    def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
+    def observe(
+        self, observer: Observer, states: Array, signals: Array, *, first: int, begin: int
+    ) -> None:
         """Passes states to an observer: every _OBSERVED-th one, and the state at the end of the
-        start-up. `states` are after step `first` and the following ones."""
+        start-up. `states` are after step `first` and the following ones. `signals` begin at step
+        `begin`."""
         begins = round(self._robot.scenario.cpg.start_up / self._step)
         observed = np.arange(first + 1, first + len(states) + 1)
         rows = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
@@ -232,10 +205,10 @@ class _Simulator:
             return
         steps: list[int] = observed[rows].tolist()
         for step, state in zip(steps, self.body_states(states[rows]), strict=True):
-            now = signals[min(step, len(signals) - 1)]
+            now = signals[min(step - begin, len(signals) - 1)]
             observer.add(self._step * step, state, now, _NO_DRIVES)
 
-    def _check(self, states: Array, first: int) -> None:
+    def check(self, states: Array, first: int) -> None:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
         step `first` and the following ones."""
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
@@ -287,6 +260,97 @@ class _Simulator:
         nodes = data.site_xpos[self._contacts]
         axes = ground_axes(nodes, self._robot.ground)
         return (axes @ forces[:, :, None])[:, :, 0]
+
+
+class _MujocoWalk:
+    """Simulation of a robot in MuJoCo, in stretches."""
+
+    def __init__(self, simulation: GaitSimulation) -> None:
+        """Raises StepBudgetExceeded if the duration has too many steps."""
+        self._simulation, robot = simulation, simulation.robot
+        settings, self.step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
+        self.steps = max(1, round(settings.duration / self.step))
+        if self.steps > settings.max_evaluations:
+            reason = f"{self.steps} steps exceed the budget of {settings.max_evaluations}"
+            raise StepBudgetExceeded(time=0.0, reason=reason)
+        self.times = motion_times(settings, record=simulation.record)
+        """Times (s) of the samples."""
+        self.signals = np.zeros((len(self.times), robot.structure.signals))
+        """Signals (times, m) in N of the samples."""
+        self._steps_kept = np.rint(self.times / self.step).astype(int)
+        self._simulator, self._observer = _Simulator(robot), Observer(robot)
+        self._state = self._simulator.start()
+        self._kept = np.tile(self._state, (len(self.times), 1))
+        self._done, self._held, self._wall_time = 0, self.signals[0], 0.0
+
+    def hold(self, signals: Array) -> None:
+        """Sets the signals (m,) in N from now on."""
+        self._held = signals.copy()
+
+    def advance_to(self, time: float) -> None:
+        """Simulates to the step that is nearest to a time (s). Raises Diverged."""
+        steps = round(time / self.step) - self._done
+        self.run(np.tile(self._held, (max(0, steps), 1)))
+
+    def run(self, signals: Array) -> None:
+        """Simulates a step for each row of signals (steps, m). Raises Diverged."""
+        from mujoco.rollout import Rollout
+
+        started, begin, simulator = time.perf_counter(), self._done, self._simulator
+        if begin == 0 and len(signals):
+            self.signals[0] = signals[0]
+            start = simulator.body_states(self._kept[:1])[0]
+            self._observer.add(0.0, start, signals[0], _NO_DRIVES)
+        with Rollout(nthread=0) as rollout:
+            for first in range(0, len(signals), _STRETCH):
+                check_time()
+                some = signals[first : first + _STRETCH]
+                states = simulator.roll_out(rollout, self._state, some)
+                self._state, done = states[-1], self._done
+                here = (done < self._steps_kept) & (self._steps_kept <= done + len(states))
+                rows = self._steps_kept[here] - done - 1
+                self._kept[here], self.signals[here] = states[rows], some[rows]
+                simulator.observe(self._observer, states, signals, first=done, begin=begin)
+                simulator.check(states, done)
+                self._done += len(states)
+        self._wall_time += time.perf_counter() - started
+
+    def readings(self) -> Readings:
+        """The readings of the robot now."""
+        now, states, signals = np.array([self.step * self._done]), self._state, self._held
+        moment = self._simulator.motion(now, states[np.newaxis], signals[np.newaxis])
+        assert moment.ground_forces is not None
+        return readings_at(
+            self._simulation.robot,
+            time=float(now[0]),
+            state=moment.states[0],
+            modes=moment.modes[0],
+            signals=signals,
+            drives=_NO_DRIVES,
+            ground_forces=moment.ground_forces[0],
+        )
+
+    def result(self) -> SimulationResult:
+        """The result, at the end. Raises SimulationFailure if a damped cable went slack."""
+        robot, totals = self._simulation.robot, self._observer.totals()
+        is_damped = robot.structure.cables["damping"].any()
+        if robot.model.slack and is_damped and totals.tension.of_all[0] <= 0.0:
+            reason = "a cable went slack, and the damper of MuJoCo's tendon would push"
+            raise SimulationFailure(time=float(totals.time[0]), reason=reason)
+        return make_result(
+            robot,
+            self._simulation.gait,
+            self._simulator.motion(self.times, self._kept, self.signals),
+            totals=totals,
+            work=IntegratorWork(
+                scheme=INTEGRATOR,
+                accuracy=self.step,
+                steps=self.steps,
+                derivative_evaluations=self.steps,
+            ),
+            wall_time=self._wall_time,
+            record=self._simulation.record,
+        )
 
 
 def _add_floor(world: Element, robot: Robot) -> None:

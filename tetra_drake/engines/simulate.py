@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+from tetra_drake.engines.gait_simulation import GaitSimulation, Viewer
 from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
-from tetra_drake.engines.simulation import Simulation, Viewer
+from tetra_drake.engines.simulation import CONTROL_PERIOD, Controller, simulate_controlled
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
@@ -22,11 +23,13 @@ def simulate(
     gait: GivenGait | None = None,
     *,
     command: Command | None = None,
+    controller: Controller | None = None,
+    control_period: float = CONTROL_PERIOD,
     record: bool = False,
     viewer: Viewer | None = None,
     steering: SteeringSignal | float | None = None,
 ) -> SimulationResult:
-    """Simulates a gait, or a command for actuators, on a scenario.
+    """Simulates a gait, a command for actuators, or a controller, on a scenario.
 
         >>> scenario = td.load_scenario("quick")
         >>> result = td.simulate(scenario, td.seeded_gait(scenario, 80), record=True)
@@ -39,6 +42,9 @@ def simulate(
         scenario: a scenario, its name or file, or a run.
         gait: a gait, its file, or a run; a run means its best gait.
         command: a command in place of a gait; see load_command().
+        controller: a function in place of a gait, from the time (s) and the readings of the robot
+            (see robot.readings.Readings) to an action for each driven cable (see Simulation).
+        control_period: time (s) between actions of the controller.
         record: records the trajectory.
         viewer: observer that shows the robot during the simulation.
         steering: the turn, -1 to 1, in place of the gait's turn; or a function from time (s) to the
@@ -54,17 +60,23 @@ def simulate(
     if viewer is not None:
         check_can_be_watched(scenario)
     engine = engine_of(scenario)
+    if controller is not None:
+        if gait is not None or command is not None or steering is not None:
+            raise InputError("simulate", "controller", "excludes a gait, a command, and steering")
+        return simulate_controlled(
+            scenario, controller, control_period=control_period, record=record, viewer=viewer
+        )
     if command is not None:
         if gait is not None or steering is not None:
             raise InputError("simulate", "command", "excludes a gait, and steering")
         robot = commanded_robot(scenario, command)
-        simulation = Simulation(robot, command.gait, record=record, viewer=viewer)
+        simulation = GaitSimulation(robot, command.gait, record=record, viewer=viewer)
         result = engine.simulate(simulation)
         return dataclasses.replace(result, scenario=scenario)  # the caller's, with a network
     if gait is None:
-        raise InputError("simulate", "gait", "is needed, or a command")
+        raise InputError("simulate", "gait", "is needed, or a command, or a controller")
     robot, gait = Robot.of(scenario), given_gait(gait, scenario)
-    simulation = Simulation(robot, gait, record=record, viewer=viewer, steering=steering)
+    simulation = GaitSimulation(robot, gait, record=record, viewer=viewer, steering=steering)
     return engine.simulate(simulation)
 
 

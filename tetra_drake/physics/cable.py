@@ -58,9 +58,10 @@ def law_of(cables: Cables, i: int) -> CableLaw:
     return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i])
 
 
-DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6
-"""Columns of the table `cable_forces` (cables, 6), and their number: direction from node a to node
-b in the world frame, length l (m), tension T (N), and the derivative dT/d(dl/dt) (N s/m)."""
+DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6, 7
+"""Columns of the table `cable_forces` (cables, 7), and their number: direction from node a to node
+b in the world frame, length l (m), tension T (N), the derivative dT/d(dl/dt) (N s/m), and the rate
+dl/dt (m/s)."""
 
 
 @inlined

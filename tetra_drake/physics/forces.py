@@ -126,7 +126,7 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
         if write_parts:
             put_vector(direction, i, cable.DIRECTION, parts)
             parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
-            parts[i, cable.TENSION_PER_RATE] = tension_per_rate
+            parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
 
 
 @inlined

@@ -52,6 +52,15 @@ def commanded_robot(scenario: Scenario, command: Command) -> Robot:
     return dataclasses.replace(robot, commanded=signals)
 
 
+def controlled_robot(scenario: Scenario) -> Robot:
+    """The robot of a scenario, with one signal for each driven cable. Its command is a single
+    sample, with which the actuators do at the start what they would do without a network."""
+    robot, actuation = robot_without_network(scenario), scenario.actuation
+    setpoints = actuation.commands(Robot.of(scenario).starting_cables())
+    law = CableLaw.of(robot.structure.cables[robot.driven])
+    return dataclasses.replace(robot, commanded=actuation.signals(setpoints, law)[np.newaxis])
+
+
 def robot_without_network(scenario: Scenario) -> Robot:
     """The robot of a scenario, with one signal for each driven cable.
 

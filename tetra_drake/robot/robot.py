@@ -164,15 +164,18 @@ class Robot:
 
     def starting_drives(self) -> np.ndarray:
         """States of the actuators at t = 0 (drives,); see physics.actuator."""
+        drives: np.ndarray = self.scenario.actuation.drives(self.starting_cables())
+        return drives
+
+    def starting_cables(self) -> DrivenCables:
+        """Properties of the driven cables at t = 0."""
         driven, length = self.structure.cables[self.driven], self._starting_lengths()
         rate: Any = np.zeros(len(driven))
         law, signal = cable.CableLaw.of(driven), rate
         if len(self.commanded):
             signal = self.commanded[0, driven["signal"]]
         tension = np.maximum(cable.cable_tension(length, rate, signal, law), 0.0)
-        cables = DrivenCables(law, signal, length, rate, tension, law.free_length)
-        drives: np.ndarray = self.scenario.actuation.drives(cables)
-        return drives
+        return DrivenCables(law, signal, length, rate, tension, law.free_length)
 
     def _starting_lengths(self) -> Any:
         """Lengths of the driven cables (driven cables,) in m at t = 0."""

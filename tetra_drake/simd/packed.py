@@ -46,7 +46,7 @@ class PackedKind(types.Type):
 
 
 class Packed(Generic[Values]):
-    """A nested tuple of arrays, integers and booleans, as one argument of a kernel.
+    """A nested tuple of arrays, fields, integers and booleans, as one argument of a kernel.
 
     The arrays are not copied, so a kernel sees later changes. Packing takes half a millisecond; for
     a few calls, pass the tuple itself. Raises ValueError for an array that cannot be a Field.
@@ -67,9 +67,10 @@ def _pack(value: Any, words: list[int]) -> types.Type:
         named = hasattr(value, "_fields")
         return types.NamedTuple(kinds, type(value)) if named else types.Tuple(kinds)
     if isinstance(value, np.ndarray):
-        field = FieldArray(value, any_size=True)
-        words += [field.address, *field.shape]
-        return field.kind
+        value = FieldArray(value, any_size=True)
+    if isinstance(value, FieldArray):
+        words += [value.address, *value.shape]
+        return value.kind
     words.append(int(value))
     return types.boolean if isinstance(value, bool) else types.intp
 

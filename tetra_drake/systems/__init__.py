@@ -5,6 +5,7 @@ from tetra_drake.systems.cable_network import CableNetwork
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
+from tetra_drake.systems.sampled_controller import HeldSignals, SampledController
 from tetra_drake.systems.start_up_gate import StartUpGate
 from tetra_drake.systems.state_forces import Anchors, Loads, StrutContact
 from tetra_drake.systems.steering import Steering
@@ -15,8 +16,10 @@ __all__ = [
     "CableNetwork",
     "Feedback",
     "GroundContact",
+    "HeldSignals",
     "Loads",
     "MatsuokaCpg",
+    "SampledController",
     "StartUpGate",
     "Steering",
     "StrutContact",

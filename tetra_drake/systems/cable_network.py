@@ -23,11 +23,13 @@ class CableNetwork(LeafSystem):
     | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
     | tensions          | (cables,)      | N      | tension of each cable                    |
     | lengths           | (cables,)      | m      | length of each cable                     |
-    | cable_forces      | (6 cables,)    | SI     | table of physics.cable, row by row       |
-    | rates             | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
+    | rates             | (cables,)      | m/s    | rate of each cable's length              |
+    | cable_forces      | (7 cables,)    | SI     | table of physics.cable, row by row       |
+    | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
-    With `robot.cables.slack`, a cable goes slack instead of pushing. The ports `drives` and `rates`
-    exist only if the kind of actuators has states.
+    `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
+    loop. With `robot.cables.slack`, a cable goes slack instead of pushing. The ports `drives` and
+    `drive_rates` exist only if the kind of actuators has states.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -37,21 +39,23 @@ class CableNetwork(LeafSystem):
         # The kernel writes to these arrays at every call.
         self._forces, self._force = Forces.of(robot.model), np.empty(6 * bodies)
         self._parts = Packed((robot.model, self._forces))
-        state, signals = np.empty(13 * bodies), np.empty(structure.signals)
+        state, self._no_signals = np.empty(13 * bodies), np.zeros(structure.signals)
         self._compute_forces = machine_code(
-            compute_cable_forces, self._parts, state, signals, self._force
+            compute_cable_forces, self._parts, state, self._no_signals, self._force
         )
         self._state = self.DeclareVectorInputPort("state", state.size)
-        self._signals = self.DeclareVectorInputPort("signals", signals.size)
-        inputs = {self._state.ticket(), self._signals.ticket()}
+        self._signals = self.DeclareVectorInputPort("signals", structure.signals)
+        motion = {self._state.ticket()}
+        inputs = motion | {self._signals.ticket()}
         self._drives, drives = None, len(self._forces.drives)
         if drives:
             self._drives = self.DeclareVectorInputPort("drives", drives)
             inputs.add(self._drives.ticket())
-            self.DeclareVectorOutputPort("rates", drives, self._calc_rates, inputs)
+            self.DeclareVectorOutputPort("drive_rates", drives, self._calc_drive_rates, inputs)
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, inputs)
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
-        self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
+        self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, motion)
+        self.DeclareVectorOutputPort("rates", count, self._calc_rates, motion)
         size = self._forces.cable_forces.size
         self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
 
@@ -62,6 +66,12 @@ class CableNetwork(LeafSystem):
         state, signals = self._state.Eval(context), self._signals.Eval(context)
         self._compute_forces(self._parts, state, signals, force)
 
+    def _move(self, context: Context) -> np.ndarray:
+        """The table `cable_forces`; only lengths and rates are valid."""
+        state = self._state.Eval(context)
+        self._compute_forces(self._parts, state, self._no_signals, self._force)
+        return self._forces.cable_forces
+
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._compute(context, output.get_mutable_value())
 
@@ -70,13 +80,15 @@ class CableNetwork(LeafSystem):
         output.SetFromVector(self._forces.cable_forces[:, cable.TENSION])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, self._force)
-        output.SetFromVector(self._forces.cable_forces[:, cable.LENGTH])
+        output.SetFromVector(self._move(context)[:, cable.LENGTH])
+
+    def _calc_rates(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._move(context)[:, cable.RATE])
 
     def _calc_table(self, context: Context, output: BasicVector) -> None:
         self._compute(context, self._force)
         output.SetFromVector(self._forces.cable_forces.ravel())
 
-    def _calc_rates(self, context: Context, output: BasicVector) -> None:
+    def _calc_drive_rates(self, context: Context, output: BasicVector) -> None:
         self._compute(context, self._force)
         output.SetFromVector(self._forces.drives[:, actuator.RATE])

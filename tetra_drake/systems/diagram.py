@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from tetra_drake.errors import InputError
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples
@@ -28,7 +29,11 @@ from tetra_drake.systems import (
 
 
 def MakeTensegrityDiagram(
-    robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None
+    robot: Robot,
+    gait: Gait | None,
+    *,
+    steering: SteeringSignal | None = None,
+    controller: System | None = None,
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is the scenario's start.
 
@@ -52,11 +57,18 @@ def MakeTensegrityDiagram(
     - actuators: only if the kind of actuators has states, as winches have
     - strut_contact: only if struts touch
     - anchors, loads: only if nodes of bodies are held, or loaded
+    - controller: in place of cpg and start_up, a system with the output port `signals`. Its input
+      ports may be `state` and any output port of cables and ground, such as `lengths`, `rates`,
+      `tensions` and `normal_forces`: ports of the same name are connected. See SampledController
+      and robot.command.controlled_robot().
 
     `steering` replaces the gait's turn. Input port: turn (of a live network). Output ports: state
-    (from plant), signals (start_up), drives (actuators), tensions and lengths (cables),
-    normal_forces, friction_forces and modes (ground). For shapes and units, see the systems. There
-    is no SceneGraph: pages and films are made from trajectories.
+    (from plant), signals (start_up or controller), drives (actuators), tensions and lengths
+    (cables), normal_forces, friction_forces and modes (ground). For shapes and units, see the
+    systems. There is no SceneGraph: pages and films are made from trajectories.
+
+    Raises InputError if there is neither a gait nor a controller, or a port of the controller has
+    another name.
     """
     scenario, structure = robot.scenario, robot.structure
     builder = DiagramBuilder()
@@ -67,7 +79,12 @@ def MakeTensegrityDiagram(
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    start_up = _AddSignals(builder, robot, gait, steering)
+    if controller is not None:
+        source = builder.AddNamedSystem("controller", controller)
+    elif gait is not None:
+        source = _AddSignals(builder, robot, gait, steering)
+    else:
+        raise InputError("MakeTensegrityDiagram", "gait", "is needed, or a controller")
     cables = builder.AddNamedSystem("cables", CableNetwork(robot))
     witness = isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness"
     ground = builder.AddNamedSystem("ground", GroundContact(robot, witness=witness))
@@ -80,7 +97,7 @@ def MakeTensegrityDiagram(
         acting.append(builder.AddNamedSystem("loads", Loads(robot)))
     forces = builder.AddNamedSystem("forces", Adder(len(acting), 6 * len(structure.bodies)))
 
-    state, signals = plant.get_state_output_port(), start_up.get_output_port()
+    state, signals = plant.get_state_output_port(), source.get_output_port()
     builder.Connect(signals, cables.GetInputPort("signals"))
     for i, system in enumerate(acting):
         builder.Connect(state, system.GetInputPort("state"))
@@ -88,10 +105,13 @@ def MakeTensegrityDiagram(
     builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
     if len(robot.starting_drives()):
         actuators = builder.AddNamedSystem("actuators", Actuators(robot))
-        builder.Connect(cables.GetOutputPort("rates"), actuators.GetInputPort("rates"))
+        builder.Connect(cables.GetOutputPort("drive_rates"), actuators.GetInputPort("rates"))
         builder.Connect(actuators.get_output_port(), cables.GetInputPort("drives"))
         builder.ExportOutput(actuators.get_output_port(), "drives")
-    if structure.signals and scenario.cpg.feedback:
+    if controller is not None:
+        _ConnectController(builder, controller, state, (cables, ground))
+    elif structure.signals and scenario.cpg.feedback:
+        assert gait is not None
         gains = [gain for _, gain in gait.gains]
         feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))
         builder.Connect(state, feedback.GetInputPort("state"))
@@ -109,6 +129,21 @@ def MakeTensegrityDiagram(
     diagram = builder.Build()
     diagram.set_name("tensegrity_robot")
     return diagram
+
+
+def _ConnectController(
+    builder: DiagramBuilder, controller: System, state: OutputPort, sources: tuple[System, ...]
+) -> None:
+    """Connects the input ports of a controller to the output ports of the same names. Raises
+    InputError if there is none."""
+    for i in range(controller.num_input_ports()):
+        port = controller.get_input_port(i)
+        name = port.get_name()
+        having = [source for source in sources if source.HasOutputPort(name)]
+        if name != "state" and not having:
+            problem = f"found the input port '{name}', expected a port of cables or ground"
+            raise InputError("MakeTensegrityDiagram", "controller", problem)
+        builder.Connect(state if name == "state" else having[0].GetOutputPort(name), port)
 
 
 def _AddSignals(

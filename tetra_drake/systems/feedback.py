@@ -20,7 +20,7 @@ class Feedback(LeafSystem):
     | port          | shape         | unit | meaning                                               |
     |---------------|---------------|------|-------------------------------------------------------|
     | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
-    | cable_forces  | (6 cables,)   | SI   | table of physics.cable, row by row, from the cables   |
+    | cable_forces  | (7 cables,)   | SI   | table of physics.cable, row by row, from the cables   |
     | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
     | feedback      | (2m,)         | 1    | f of Eq. 7 for the neurons of m oscillators           |
     """

@@ -14,8 +14,8 @@ from helpers.widths import WIDTHS
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.prepared import Prepared
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import (
     Diverged,
     InputError,
@@ -103,7 +103,7 @@ def endings(walks: list[Prepared], width: int) -> list[Ending]:
 
 def prepared(scenario: Scenario, seed: int = 0) -> Prepared:
     """A seeded gait to be recorded."""
-    return Prepared.of(Simulation(Robot.of(scenario), seeded_gait(scenario, seed), record=True))
+    return Prepared.of(GaitSimulation(Robot.of(scenario), seeded_gait(scenario, seed), record=True))
 
 
 def same(a: Ending, b: Ending) -> bool:
@@ -124,7 +124,7 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
     robots = [Robot.of(short.with_changes(change)) for change in changes]
     gaits = [seeded_gait(short, i) for i in range(11)]
     walks = [
-        Prepared.of(Simulation(robots[i % len(robots)], gait, record=True))
+        Prepared.of(GaitSimulation(robots[i % len(robots)], gait, record=True))
         for i, gait in enumerate(gaits)
     ]
     alone = [endings([walk], 1)[0] for walk in walks]

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.compiled.lane_stepper import LaneStepper
 from tetra_drake.engines.compiled.prepared import Prepared
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.result import SimulationResult
@@ -27,16 +28,19 @@ class CompiledEngine(Engine):
     lane_pool = LanePool
 
     def prepare(self, scenario: Scenario) -> None:
-        simulation = Simulation(Robot.of(scenario), seeded_gait(scenario))
+        simulation = GaitSimulation(Robot.of(scenario), seeded_gait(scenario))
         LaneEngine(Prepared.of(simulation), width=1)
 
-    def simulate(self, simulation: Simulation) -> SimulationResult:
+    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         prepared = Prepared.of(simulation)
         engine = LaneEngine(prepared, width=1)
         engine.load(0, prepared)
         while not engine.advance(_BODY_STEPS):
             check_time()
         return engine.result(0)
+
+    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> LaneStepper:
+        return LaneStepper(first, count=count, threads=threads)
 
     def simulate_many(
         self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int

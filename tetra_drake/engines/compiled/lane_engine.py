@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.compiled import loop
+from tetra_drake.engines.compiled import control_periods, loop
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE
 from tetra_drake.physics.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.lanes import FieldArray, lane_table
+from tetra_drake.simd.packed import Packed
 
 FIRST = SurfaceGrid._fields.index("first")
 """Column of Ground.grid with the index of the first height. It differs between lanes, because one
 table has the heights of all lanes."""
+
+
+_BODY_STEPS = 100_000
+"""Iterations times bodies per call of the kernel, about 70 ms. Between calls Python handles signals
+of the operating system."""
 
 
 class LaneEngine:
@@ -32,14 +41,14 @@ class LaneEngine:
 
     def __init__(self, first: Prepared, *, width: int) -> None:
         """An engine with `width` lanes for gaits like `first`. Compiles its kernel if necessary."""
-        self._kind, self._bodies = first.kind, len(first.robot.structure.bodies)
+        self._first, self._kind = first, first.kind
+        self._bodies = len(first.robot.structure.bodies)
         self._heights = np.zeros((width, first.robot.ground.heights.size))
         self._constants = _constants_in_lanes(first.constants, self._heights)
         self._lanes = in_lanes(first.start, width)
         self._log = allocate(loop.Log, first.log_sizes | {"lanes": width})
-        log = loop.Log(*(FieldArray(array, any_size=True) for array in self._log))
-        self._arguments = self._constants, self._lanes, log, first.live
-        self._advance = machine_code(loop.advance, *self._arguments, 0)
+        self._parts = Packed((self._constants, self._lanes, self._log, first.live))
+        self._advance = machine_code(loop.advance, self._parts, 0)
         self._in_lane: list[Prepared | None] = [None] * width
         self._wall_times = [0.0] * width
         for lane in range(width):  # idle lanes compute, too, and need valid numbers
@@ -106,24 +115,61 @@ class LaneEngine:
         the lanes with finished gaits; result() empties a lane. Other Python threads run
         meanwhile."""
         started = time.perf_counter()
-        self._advance(*self._arguments, max(1, body_steps // (loop.ROUND * self._bodies)))
+        self._advance(self._parts, max(1, body_steps // (loop.ROUND * self._bodies)))
         busy = [lane for lane, prepared in enumerate(self._in_lane) if prepared is not None]
         share = (time.perf_counter() - started) / max(len(busy), 1)
         for lane in busy:
             self._wall_times[lane] += share
         return [lane for lane in busy if self._lanes.clock.array[loop.STATUS, lane] != loop.RUNNING]
 
+    @functools.cached_property
+    def _hold(self) -> Callable[..., None]:
+        table = np.zeros((1, 1))
+        return machine_code(control_periods.hold, self._parts, table, table)
+
+    @functools.cached_property
+    def _read(self) -> Callable[..., None]:
+        none = Packed(Readings.empty(self._first.robot.structure, 0))
+        return machine_code(control_periods.read, self._parts, none)
+
+    def hold(self, signals: np.ndarray, marks: np.ndarray) -> None:
+        """Appends a sample to the command of each lane, and sets the next marks; see
+        control_periods.hold()."""
+        contiguous = np.ascontiguousarray  # the machine code does not check its arguments
+        self._hold(self._parts, contiguous(signals), contiguous(marks))
+
+    def run(self) -> None:
+        """Simulates until all lanes have reached their last mark or failed."""
+        while (self._lanes.clock.array[loop.STATUS] == loop.RUNNING).any():
+            self.advance(_BODY_STEPS)
+
+    def read(self, readings: Packed[Readings]) -> None:
+        """Writes the readings of the first lanes, a row for each; see control_periods.read()."""
+        self._read(self._parts, readings)
+
+    @property
+    def failed(self) -> np.ndarray:
+        """True for each lane whose simulation has failed."""
+        failed: np.ndarray = self._lanes.clock.array[loop.STATUS] > loop.DONE
+        return failed
+
+    def failure(self, lane: int) -> SimulationFailure | None:
+        """The failure of the simulation in a lane; None if it goes on or is finished."""
+        prepared, clock = self._in_lane[lane], self._lanes.clock.array[:, lane]
+        status = int(clock[loop.STATUS])
+        if prepared is None or status in (loop.RUNNING, loop.DONE):
+            return None
+        return _failure(status, time=float(clock[loop.TIME]), scenario=prepared.robot.scenario)
+
     def result(self, lane: int) -> SimulationResult:
         """The result of the finished simulation in a lane; the lane becomes idle. Raises Diverged
         or StepBudgetExceeded if the simulation failed."""
-        prepared, status = self._in_lane[lane], int(self._lanes.clock.array[loop.STATUS, lane])
+        prepared, failure = self._in_lane[lane], self.failure(lane)
         if prepared is None:
             raise ValueError(f"lane {lane} is idle")
         wall_time = self.stop(lane)
         clock = self._lanes.clock.array[:, lane]
-        if status != loop.DONE:
-            ended, scenario = float(clock[loop.TIME]), prepared.robot.scenario
-            failure = _failure(status, time=ended, scenario=scenario)
+        if failure is not None:
             failure.wall_time = wall_time
             raise failure
         return make_result(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
 from tetra_drake.engines.compiled.prepared import Prepared
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -154,7 +154,7 @@ class _Crew:
         """
         try:
             robot = self._robots(job.scenario)
-            prepared = Prepared.of(Simulation(robot, job.gait, record=job.record))
+            prepared = Prepared.of(GaitSimulation(robot, job.gait, record=job.record))
             engine = self._engine if self.jobs else self._engine_for(prepared, lanes_for(among))
             if engine is None or not engine.accepts(prepared):
                 return False

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from tetra_drake.physics.model import Model
 from tetra_drake.physics.tally import Tally, observe, update_clearance
 from tetra_drake.simd.compiling import compiled, inlined, merged
 from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, by_lane, maximum, minimum, select
+from tetra_drake.simd.packed import Packed, unpacked
 
 Array = np.ndarray
 
@@ -146,17 +147,25 @@ class Log(NamedTuple):
     turn is in `tonic` from the start."""
 
 
+Parts: TypeAlias = Packed[tuple[Constants, LaneState, Log, bool]]
+"""The simulations in lanes, packed for kernels that Python calls often. The last part is True if
+the network is live."""
+
+
 @functools.partial(compiled, nogil=True)
-def advance(constants: Constants, lanes: LaneState, log: Log, live: bool, rounds: int) -> None:
-    """Runs rounds until a simulation has ended, at most `rounds`.
+def advance(parts: Parts, rounds: int) -> None:
+    """Runs rounds until a simulation has ended, at most `rounds`. A simulation has ended at its
+    last mark, or failed. The last round is cut short if no simulation is left.
 
     A simulation starts at the beginning of a round, so its numbers do not depend on its neighbours.
-    `live` is True if the network is integrated together with the robot.
     """
+    constants, lanes, log, live = unpacked(parts)
     for _ in range(rounds):
         ended = False
         for _ in range(ROUND):
             ended |= iterate(constants, lanes, log, live)
+            if ended and not any_lane(lanes.clock[STATUS] == RUNNING):
+                break
         robot, state = constants.robot, lanes.step.state
         move_robot(robot, state, lanes.forces)
         update_clearance(lanes.tally, robot, state, lanes.forces.nodes)
@@ -201,7 +210,8 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
         lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
         keep_samples(constants, lanes, log, live)
     move_on(lanes, is_running, accepted)
-    clock[PLANNED] = next_step(error, step, constants.tolerance[0], constants.max_step[0])
+    planned = next_step(error, step, constants.tolerance[0], constants.max_step[0])
+    clock[PLANNED] = select(is_running, planned, clock[PLANNED])
 
     status = select(is_running, fate(constants, lanes), clock[STATUS])
     ended |= any_lane(status != clock[STATUS])

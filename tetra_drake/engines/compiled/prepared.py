@@ -9,7 +9,7 @@ import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.loop import Constants, LaneState
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation
 from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
@@ -44,12 +44,12 @@ class Prepared:
     """State at t = 0, with scratch memory."""
 
     @classmethod
-    def of(cls, simulation: Simulation) -> Prepared:
+    def of(cls, simulation: GaitSimulation) -> Prepared:
         """Prepares a simulation. Raises InputError if gait or steering do not fit the scenario."""
         robot, gait, record = simulation.robot, simulation.gait, simulation.record
         settings, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
         instants = [0.0, settings.steady_from, settings.duration, start_up]
-        marks = np.unique(np.concatenate([instants, _jumps(robot)]))
+        marks = np.unique(np.concatenate([instants, _jumps(robot)]).round(MARK_DECIMALS))
         turns, solver = robot.turns(gait, simulation.steering), Solver.of(robot.model)
         return cls(
             robot=robot,

@@ -1,0 +1,145 @@
+"""Controllers: functions of time and readings in place of a gait, and systems on the diagram."""
+
+import functools
+
+import numpy as np
+import pytest
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.command import controlled_robot
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.units import INCH
+from tetra_drake.systems import CableNetwork, SampledController
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+
+@pytest.fixture
+def walking() -> Scenario:
+    """A second and a half under a law of friction that all engines have."""
+    times = {"duration": "1.5 s", "steady_from": "0.25 s", "sample_period": "30 ms"}
+    changes = {f"simulation.{key}": time for key, time in times.items()}
+    return load_scenario("coulomb").with_changes(changes | {"friction.stiffness": "0 N/m"})
+
+
+def follow_waves(robot: Robot, time: float, readings: Readings) -> np.ndarray:
+    """Forces that pull the driven cables to lengths that change in a wave."""
+    cables, phases = robot.driven, np.arange(robot.driven.size)
+    wanted = robot.starting_cables().length * (
+        1.0 + 0.2 * np.sin(2.0 * np.pi * 0.7 * time + phases)
+    )
+    return 40.0 * (readings.lengths[cables] - wanted) + 0.2 * readings.rates[cables]
+
+
+@pytest.fixture
+def controller(walking):
+    return functools.partial(follow_waves, controlled_robot(walking))
+
+
+@pytest.mark.parametrize("engine", ["!Drake", "!Mujoco"])
+@pytest.mark.parametrize("duration", ["1.5 s", pytest.param("6 s", marks=pytest.mark.slow)])
+def test_a_controller_walks_alike_on_all_engines(walking, controller, engine, duration):
+    timed = walking.with_changes({"simulation.duration": duration})
+    expected, found = (
+        simulate(timed.with_changes({"engine": each}), controller=controller, record=True)
+        for each in ("!Compiled", engine)
+    )
+    moved = found.trajectory.p_WN - expected.trajectory.p_WN
+    assert abs(moved).max() < 0.01 * INCH
+    between = slice(1, None, 2)  # samples in the middle of control periods
+    ours, theirs = (each.trajectory.signal.to_numpy()[between] for each in (found, expected))
+    assert np.ptp(theirs, axis=0).min() > 0.5, "it acts on every cable"
+    np.testing.assert_allclose(ours, theirs, atol=0.01)
+    assert found.gait is None and found.engine == engine[1:].lower()
+    assert "<iframe" in found.show()._repr_html_()
+
+
+def test_a_controller_excludes_a_gait(walking, controller, refused):
+    with refused("simulate", "controller", "excludes a gait"):
+        simulate(walking, seeded_gait(walking), controller=controller)
+    with refused("simulate", "gait", "or a controller"):
+        simulate(walking)
+
+
+def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
+    """The function is called at the same times, and its forces are held."""
+    accurate = Drake(accuracy=1e-5, max_step=1e-3)
+    scenario = walking.with_sections(engine=accurate)
+    scenario = scenario.with_changes({"simulation.duration": "0.3 s"})
+    times: list[float] = []
+
+    def law(time: float, readings: Readings) -> np.ndarray:
+        times.append(time)
+        return controller(time, readings)
+
+    robot = controlled_robot(scenario)
+    system = SampledController(robot, law, period=0.02)
+    diagram = MakeTensegrityDiagram(robot, None, controller=system)
+    simulator = MakeSimulator(diagram, accurate)
+    simulator.AdvanceTo(0.3)
+    state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+    result = simulate(scenario, controller=controller, record=True)
+    p_WB = result.trajectory.p_WB[-1].to_numpy()
+    np.testing.assert_allclose(state[:35].reshape(5, 7)[:, 4:], p_WB, atol=1e-7)
+    np.testing.assert_allclose(times, 0.02 * np.arange(15), atol=1e-12)
+    signals = diagram.GetOutputPort("signals").Eval(simulator.get_context())
+    np.testing.assert_allclose(signals, result.trajectory.signal[-1], atol=1e-4)
+
+
+class Spring(LeafSystem):
+    """A controller without a state, so its signals depend on its inputs at the same time."""
+
+    def __init__(self, *inputs: str, cables: int, driven: np.ndarray) -> None:
+        super().__init__()
+        self._ports, self._driven = [self.DeclareVectorInputPort(i, cables) for i in inputs], driven
+        self.DeclareVectorOutputPort("signals", driven.size, self._calc)
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(sum(port.Eval(context) for port in self._ports)[self._driven])
+
+
+def test_a_controller_of_lengths_and_rates_makes_no_algebraic_loop(walking):
+    robot = controlled_robot(walking)
+    spring = Spring("lengths", "rates", cables=24, driven=robot.driven)
+    diagram = MakeTensegrityDiagram(robot, None, controller=spring)
+    context = diagram.CreateDefaultContext()
+    found = diagram.GetOutputPort("signals").Eval(context)
+    np.testing.assert_allclose(found, robot.starting_cables().length, rtol=1e-12)
+
+
+def test_a_controller_is_connected_by_the_names_of_its_ports(walking, refused):
+    robot = controlled_robot(walking)
+    spring = Spring("length", cables=24, driven=robot.driven)
+    with refused("MakeTensegrityDiagram", "controller", "'length'"):
+        MakeTensegrityDiagram(robot, None, controller=spring)
+    with refused("MakeTensegrityDiagram", "gait", "or a controller"):
+        MakeTensegrityDiagram(robot, None)
+
+
+def test_the_rates_of_the_cables_are_the_slopes_of_their_lengths(robot):
+    cables, state = CableNetwork(robot), robot.structure.initial_state
+    context = cables.CreateDefaultContext()
+    velocity, step = np.random.default_rng(0).normal(size=(5, 3)), 1e-7
+    state.reshape(-1)[35:].reshape(5, 6)[:, 3:] = velocity
+    lengths = []
+    for sign in (-1.0, 1.0):
+        moved = state.copy()
+        moved[:35].reshape(5, 7)[:, 4:] += sign * step * velocity
+        cables.GetInputPort("state").FixValue(context, moved)
+        lengths.append(cables.GetOutputPort("lengths").Eval(context).copy())
+    cables.GetInputPort("state").FixValue(context, state)
+    slopes = (lengths[1] - lengths[0]) / (2.0 * step)
+    np.testing.assert_allclose(cables.GetOutputPort("rates").Eval(context), slopes, atol=1e-6)
+    inputs = {cables.get_input_port(i).get_name(): i for i in range(cables.num_input_ports())}
+    for name in ("lengths", "rates"):
+        output = cables.GetOutputPort(name).get_index()
+        assert not cables.HasDirectFeedthrough(inputs["signals"], output)
+    assert cables.HasDirectFeedthrough(
+        inputs["signals"], cables.GetOutputPort("tensions").get_index()
+    )

@@ -1,0 +1,185 @@
+"""Robots in control periods: Simulation(count=N), on the compiled engine and on the diagram."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.actuations import FORCE, MOTOR, WINCH
+from helpers.widths import WIDEST
+
+from tetra_drake.engines import interface
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.errors import Diverged, InputError
+from tetra_drake.robot.command import Command
+from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.scenario.scenario import Scenario
+
+PERIOD, PERIODS = 0.02, 15
+SPANS = {"!Force": 2.0, "!Winch": 0.01, "!TensionMotor": 1.0}
+"""Actions differ from those at rest by up to this, in N, m and N."""
+
+
+@pytest.fixture
+def short(scenario: Scenario) -> Scenario:
+    """0.3 s on the compiled engine, with a mark within a control period, in samples of one."""
+    times = {"duration": 0.3, "steady_from": 0.1125, "sample_period": PERIOD}
+    changes = {f"simulation.{key}": f"{time} s" for key, time in times.items()}
+    return scenario.with_changes(changes | {"engine": "!Compiled"})
+
+
+def drawn_actions(simulation: Simulation, *, seed: int = 0) -> np.ndarray:
+    """Random actions (periods, robots, actions) around those at rest."""
+    shape = PERIODS, *simulation.rest.shape
+    drawn = np.random.default_rng(seed).uniform(-1.0, 1.0, shape)
+    return simulation.rest + SPANS[f"!{simulation.scenario.actuation.tag}"] * drawn
+
+
+def go(simulation: Simulation, actions: np.ndarray) -> list:
+    """The readings at the start and after each period."""
+    return [simulation.state, *(simulation.step(each) for each in actions)]
+
+
+@pytest.mark.parametrize("actuation", [FORCE, WINCH, MOTOR])
+@pytest.mark.parametrize("count", [1, WIDEST])
+def test_steps_with_the_samples_of_a_command_give_its_digits(short, actuation, count):
+    scenario = short.with_changes(actuation)
+    simulation = Simulation(scenario, count=count, record=True, workers=1)
+    actions = drawn_actions(simulation)
+    found = go(simulation, actions)
+    for robot in (0, count - 1):
+        command = Command("drawn", PERIOD, actions[:, robot])
+        expected = simulate(scenario, command=command, record=True)
+        result, trajectory = simulation.result(robot), expected.trajectory
+        assert result.trajectory.equals(trajectory)
+        assert result.integrator == expected.integrator
+        assert result.metrics.distance == expected.metrics.distance
+        for name, readings in {
+            "p_WN": "p_WN",
+            "v_WN": "v_WN",
+            "length": "lengths",
+            "normal_force": "normal_forces",
+            "tension": "tensions",
+            "q_WB": "q_WB",
+        }.items():
+            read = np.array([getattr(each, readings)[robot] for each in found[1:]])
+            np.testing.assert_allclose(read, trajectory[name][1:], rtol=0, atol=1e-9)
+    assert found[-1].time.tolist() == [0.3] * count
+
+
+def test_rates_are_those_of_the_lengths(short):
+    simulation = Simulation(short, control_period=short.cpg.listing_step)
+    before, now, after = go(simulation, np.full((60, 1, 8), 3.0))[-3:]
+    slope = (after.lengths - before.lengths) / (after.time - before.time)
+    np.testing.assert_allclose(now.rates, slope, atol=2e-3 * np.abs(slope).max())
+    assert np.abs(slope).max() > 0.01
+
+
+def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
+    alone = Simulation(short, count=WIDEST, workers=1)
+    actions = drawn_actions(alone)
+    expected = go(alone, actions)[-1]
+    simulation = Simulation(short, count=WIDEST, workers=1)
+    bad = actions.copy()
+    bad[3, 2] = 1e9
+    bad[4:, 2] = math.nan
+    found = go(simulation, bad)[-1]
+    assert isinstance(simulation.failures[2], Diverged)
+    assert 0.06 <= simulation.failures[2].time < 0.08
+    with pytest.raises(Diverged):
+        simulation.result(2)
+    others = [robot for robot in range(WIDEST) if robot != 2]
+    assert [simulation.failures[robot] for robot in others] == [None] * (WIDEST - 1)
+    for ours, theirs in zip(found, expected, strict=True):
+        assert np.array_equal(ours[others], theirs[others])
+    simulation.reset(indices=[2])
+    assert simulation.failures[2] is None and not simulation.ended[2]
+
+
+def test_a_robot_that_starts_again_walks_as_before(short):
+    simulation = Simulation(short, count=WIDEST, workers=1)
+    actions = drawn_actions(simulation)
+    for some in actions[:5]:
+        simulation.step(some)
+    again = simulation.reset(indices=[1])
+    assert again.time.tolist() == [0.0 if robot == 1 else 0.1 for robot in range(WIDEST)]
+    for k in range(10):
+        mixed = actions[5 + k].copy()
+        mixed[1] = actions[k][1]
+        again = simulation.step(mixed)
+    whole = Simulation(short, count=WIDEST, workers=1)
+    states = go(whole, actions)
+    for robot, expected in ((0, states[-1]), (1, states[10])):
+        for found, wanted in zip(again, expected, strict=True):
+            assert np.array_equal(found[robot], wanted[robot])
+
+
+def test_seeds_repeat_disturbed_robots_bit_for_bit(short):
+    spreads = {"robot.spacing": 0.02, "robot.cables.outer_stiffness": 0.1}
+    settings = Disturbances(draws=1, spreads=spreads, start=0.01)
+    disturbed = short.with_sections(disturbances=settings)
+    simulation = Simulation(disturbed, count=WIDEST, workers=1)
+    actions = drawn_actions(simulation)
+    plain = simulation.state.p_WN[0]
+    seen = []
+    for seed in (1, 1, 2):
+        start = simulation.reset(seed=seed)
+        ends = go(simulation, actions)[-1].p_WN
+        assert len({end.tobytes() for end in ends}) == WIDEST
+        assert not np.array_equal(start.p_WN[0], plain)
+        seen.append(ends.tobytes())
+    assert seen[0] == seen[1] != seen[2]
+    assert np.array_equal(simulation.reset().p_WN[0], plain)
+
+
+def test_actions_of_oscillators_are_shared_by_their_cables(short):
+    grouped, single = Simulation(short, grouped=True), Simulation(short)
+    actions = drawn_actions(grouped)
+    assert grouped.action_names == ("T1-T2", "T2-T3", "T3-T4", "T4-T5")
+    spread = np.repeat(actions, 2, axis=2)
+    for ours, theirs in zip(go(grouped, actions)[-1], go(single, spread)[-1], strict=True):
+        assert np.array_equal(ours, theirs)
+
+
+def test_the_last_period_ends_with_the_simulation(short):
+    simulation = Simulation(short.with_changes({"simulation.duration": "0.25 s"}))
+    times = [float(readings.time[0]) for readings in go(simulation, np.zeros((13, 1, 8)))]
+    assert times[-2:] == [0.24, 0.25] and simulation.ended.all()
+
+
+def test_wrong_input_is_told_in_a_line(short, refused):
+    two = Simulation(short, count=2, workers=1)
+    with refused("Simulation", "actions", "(2, 7)", "(2, 8)"):
+        two.step(np.zeros((2, 7)))
+    actions = np.zeros((2, 8))
+    actions[1, 4] = math.nan
+    name = two.action_names[4]
+    with refused("Simulation", f"actions[1], {name}", "nan"):
+        two.step(actions)
+    with refused("Simulation", "result", "robot 1 is at 0 s"):
+        two.result(1)
+    for _ in range(PERIODS):
+        two.step(np.zeros((2, 8)))
+    two.reset(indices=[0])
+    with refused("Simulation", "step", "robot 1", "0.3 s"):
+        two.step(np.zeros((2, 8)))
+    for indices in ([2], [-1], [0.5], 1):
+        with refused("Simulation", "indices", "0 to 1"):
+            two.reset(indices=indices)
+    for period in (0.0, 0.00075, math.nan, -0.02, "fast"):
+        with refused("Simulation", "control_period", "0.0005 s"):
+            Simulation(short, control_period=period)
+    for count in (0, 1.5):
+        with refused("Simulation", "count", str(count)):
+            Simulation(short, count=count)
+    disturbed = Simulation(short.with_sections(disturbances=Disturbances(draws=1)))
+    for seed in (-1, 0.5):
+        with refused("Simulation", "seed", str(seed)):
+            disturbed.reset(seed=seed)
+
+
+def test_an_engine_that_cannot_pause_is_named(short, monkeypatch):
+    monkeypatch.setattr("tetra_drake.engines.simulation.engine_of", lambda _: interface.Engine())
+    with pytest.raises(InputError) as caught:
+        Simulation(short)
+    assert caught.value.key == "engine"

@@ -1,0 +1,134 @@
+"""Readings of robots: what their sensors could measure, and the truth about their motion."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.physics import cable, contact, kinematics
+from tetra_drake.physics.forces import Forces, forces_along
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.simd.allocation import allocate
+
+
+class Readings(NamedTuple):
+    """Readings of N robots at an instant, in SI units. Those of a single robot lack the first axis.
+
+    The names of nodes, cables, bodies and contacts are in `Simulation.robot.structure`.
+    """
+
+    time: Annotated[Any, "robots"]
+    """Time (N,)."""
+    lengths: Annotated[Any, "robots", "cables"]
+    """Lengths of the cables (N, cables)."""
+    rates: Annotated[Any, "robots", "cables"]
+    """Rates of the lengths (N, cables)."""
+    tensions: Annotated[Any, "robots", "cables"]
+    """Tensions of the cables (N, cables)."""
+    normal_forces: Annotated[Any, "robots", "contacts"]
+    """Loads of the contact nodes (N, contacts), along the normal of the ground."""
+    q_WB: Annotated[Any, "robots", "bodies", 4]
+    """Orientations of the bodies (N, bodies, 4): quaternions, w first."""
+    w_WB: Annotated[Any, "robots", "bodies", 3]
+    """Angular velocities of the bodies (N, bodies, 3)."""
+    p_WN: Annotated[Any, "robots", "nodes", 3]
+    """Positions of the nodes (N, nodes, 3)."""
+    v_WN: Annotated[Any, "robots", "nodes", 3]
+    """Velocities of the nodes (N, nodes, 3)."""
+
+    @classmethod
+    def empty(cls, structure: Structure, count: int) -> Self:
+        """Memory for the readings of a number of robots."""
+        sizes = {
+            "robots": count,
+            "cables": len(structure.cables),
+            "contacts": len(structure.contacts),
+            "bodies": len(structure.bodies),
+            "nodes": len(structure.node_names),
+        }
+        return allocate(cls, sizes)
+
+    @classmethod
+    def of(
+        cls,
+        structure: Structure,
+        *,
+        time: float,
+        state: np.ndarray,
+        cable_forces: np.ndarray,
+        ground_forces: np.ndarray,
+    ) -> Self:
+        """The readings of a robot at a time (s), from the state (13 n,) of its bodies and the
+        tables `cable_forces` of physics.cable and `ground_forces` of physics.contact."""
+        nodes, bodies = moved_nodes(structure, state), len(structure.bodies)
+        return cls(
+            time=time,
+            lengths=cable_forces[:, cable.LENGTH].copy(),
+            rates=cable_forces[:, cable.RATE].copy(),
+            tensions=cable_forces[:, cable.TENSION].copy(),
+            normal_forces=ground_forces[:, contact.NORMAL].copy(),
+            q_WB=state[: 7 * bodies].reshape(bodies, 7)[:, :4].copy(),
+            w_WB=state[7 * bodies :].reshape(bodies, 6)[:, :3].copy(),
+            p_WN=nodes[:, kinematics.P_WN : kinematics.P_WN + 3],
+            v_WN=nodes[:, kinematics.V_WN : kinematics.V_WN + 3],
+        )
+
+    def rows(self, which: int | slice) -> Self:
+        """The readings of one robot, or of several. The arrays are views."""
+        return type(self)(*(values[which] for values in self))
+
+    def copied(self) -> Self:
+        """A copy of the readings."""
+        return type(self)(*(values.copy() for values in self))
+
+    def put(self, place: int, readings: Readings) -> None:
+        """Writes the readings of a single robot to a row."""
+        for values, given in zip(self, readings, strict=True):
+            values[place] = given
+
+
+def first_readings(robot: Robot) -> Readings:
+    """The readings of a robot at its start, where its actuators follow the first sample of its
+    command."""
+    return readings_at(
+        robot,
+        time=0.0,
+        state=robot.structure.initial_state,
+        modes=robot.starting_modes(),
+        signals=robot.commanded[0],
+        drives=robot.starting_drives(),
+    )
+
+
+def readings_at(
+    robot: Robot,
+    *,
+    time: float,
+    state: np.ndarray,
+    modes: np.ndarray,
+    signals: np.ndarray,
+    drives: np.ndarray,
+    ground_forces: np.ndarray | None = None,
+) -> Readings:
+    """The readings of a robot at a time (s).
+
+    Args:
+        state: state (13 n,) of the bodies.
+        modes: modes of the contact nodes; see physics.contact.
+        signals: signals (m,) in N.
+        drives: states of the actuators (drives,).
+        ground_forces: table `ground_forces` of an engine with its own law of contact.
+    """
+    model, forces, sample = robot.model, Forces.of(robot.model), np.newaxis
+    cables, ground = np.copy(forces.cable_forces[sample]), np.copy(forces.ground_forces[sample])
+    given = state[sample], modes[sample], signals[sample], drives[sample]
+    forces_along(model, *given, forces, cables, ground)
+    return Readings.of(
+        robot.structure,
+        time=time,
+        state=state,
+        cable_forces=cables[0],
+        ground_forces=ground[0] if ground_forces is None else ground_forces,
+    )

@@ -1,0 +1,87 @@
+"""Controllers of a robot with signals that are held, as LeafSystems."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    EventStatus,
+    LeafSystem,
+)
+
+from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS
+from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS
+from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.robot import Robot
+
+Law = Callable[[float, Readings], npt.ArrayLike]
+"""Function from the time (s) and the readings of a robot to its signals (m,) in N."""
+
+
+class HeldSignals(LeafSystem):
+    """Signals of a robot that are held until they are set.
+
+    | port          | shape         | unit | meaning                                               |
+    |---------------|---------------|------|-------------------------------------------------------|
+    | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
+    | cable_forces  | (7 cables,)   | SI   | table of physics.cable, row by row, from the cables   |
+    | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
+    | signals       | (m,)          | N    | signals of the cables                                 |
+
+    The discrete state is the signals, at first those of the robot's command. The output depends on
+    the state alone, so there is no algebraic loop.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__()
+        self._structure = robot.structure
+        signals = robot.structure.signals
+        self._cable_shape = len(robot.structure.cables), CABLE_FORCE_COLUMNS
+        self._ground_shape = len(robot.structure.contacts), GROUND_FORCE_COLUMNS
+        self._state = self.DeclareVectorInputPort("state", 13 * len(robot.structure.bodies))
+        self._cables = self.DeclareVectorInputPort("cable_forces", math.prod(self._cable_shape))
+        self._ground = self.DeclareVectorInputPort("ground_forces", math.prod(self._ground_shape))
+        first = robot.commanded[0] if len(robot.commanded) else np.zeros(signals)
+        self.DeclareDiscreteState(first)
+        self.DeclareVectorOutputPort("signals", signals, self._calc_signals, {self.xd_ticket()})
+
+    def Read(self, context: Context) -> Readings:
+        """The readings of the robot."""
+        return Readings.of(
+            self._structure,
+            time=context.get_time(),
+            state=self._state.Eval(context),
+            cable_forces=self._cables.Eval(context).reshape(self._cable_shape),
+            ground_forces=self._ground.Eval(context).reshape(self._ground_shape),
+        )
+
+    def Hold(self, context: Context, signals: np.ndarray) -> None:
+        """Sets the signals (m,) in N."""
+        context.SetDiscreteState(signals)
+
+    def _calc_signals(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_discrete_state_vector().value())
+
+
+class SampledController(HeldSignals):
+    """Controller of a robot: a function that sets the held signals in each control period.
+
+    The ports are those of HeldSignals. The state is updated at multiples of the period, from t = 0
+    on.
+    """
+
+    def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
+        """`period` is in s."""
+        super().__init__(robot)
+        self._law = law
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
+        values.set_value(np.asarray(self._law(context.get_time(), self.Read(context)), dtype=float))
+        return EventStatus.Succeeded()
