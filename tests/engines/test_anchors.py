@@ -8,10 +8,10 @@ from helpers.anchored import HUNG, SWINGING, floating_prism, scenario_of, suppor
 from helpers.converged import CONVERGED
 from helpers.structures import poses_of, simulated, thrown
 
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.engines.simulation import Simulation
 from tetra_drake.report.run_figures import draw_trajectory
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -76,7 +76,7 @@ def test_a_bar_held_at_one_end_swings_as_a_physical_pendulum(engine):
         q_WB=np.array([[np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0]]),
     )
     robot = dataclasses.replace(robot, structure=turned)
-    simulation = Simulation(robot, seeded_gait(scenario), record=True)
+    simulation = GaitSimulation(robot, seeded_gait(scenario), record=True)
     result = engine_of(scenario).simulate(simulation)
     p_WN, times = result.trajectory.p_WN.values, result.trajectory.time.values
     expected = swings(robot, angle, times)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 from helpers.actuations import LIMITED
-from helpers.bars import RADIUS, STIFFNESS, loose_bars
+from helpers.bars import CROSSED, RADIUS, STIFFNESS, loose_bars
 
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -187,7 +187,9 @@ def test_without_mujoco_its_engine_is_refused(short, monkeypatch, refused):
 def test_a_bar_rests_across_two_others_as_on_the_other_engines():
     beams = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
     across = ((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))
-    robot = loose_bars([*beams, across], dissipation=1.0, gravity=9.80665, duration=0.5)
+    robot = loose_bars(
+        [*beams, across], dissipation=1.0, gravity=9.80665, duration=0.5, anchors=CROSSED
+    )
     resting = robot.scenario.with_changes({"engine": "!Mujoco", "friction.stiffness": 0.0})
     p_WB = trajectory_of(resting)["p_WB"].values
     depth = 2.0 * RADIUS - (p_WB[-1, 2, 2] - p_WB[-1, :2, 2].mean())

@@ -1,6 +1,7 @@
 """Loose bars that may touch each other: structures whose cables are slack."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -12,6 +13,10 @@ RADIUS = 0.004
 STIFFNESS = 10_000.0
 """Stiffness of the contact of two bars in N/m."""
 
+CROSSED = {"a0": "xy", "b0": "y", "a1": "xy", "b1": "y", "a2": "xy", "b2": "x"}
+"""Anchors of two bars along x and one along y that hold them in place, but not in height. Without
+friction the upper one would slide to the ends of the others, which give way more there."""
+
 Ends = tuple[tuple[float, float, float], tuple[float, float, float]]
 ACROSS: tuple[Ends, Ends] = (
     ((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0)),
@@ -21,10 +26,16 @@ ACROSS: tuple[Ends, Ends] = (
 
 
 def loose_bars(
-    ends: Sequence[Ends], *, dissipation: float, gravity: float = 0.0, duration: float = 2.0
+    ends: Sequence[Ends],
+    *,
+    dissipation: float,
+    gravity: float = 0.0,
+    duration: float = 2.0,
+    anchors: Mapping[str, str] = MappingProxyType({}),
 ) -> Robot:
-    """A robot of bars between ends (m). They touch by the law of Hunt and Crossley, with a
-    dissipation in s/m. Without gravity they are a metre above the ground."""
+    """A robot of bars between ends (m): a0 and b0, a1 and b1, and so on. They touch by the law of
+    Hunt and Crossley, with a dissipation in s/m. Without gravity they are a metre above the
+    ground."""
     height = 1.0 if gravity == 0.0 else 0.0
     make = {"diameter": 2.0 * RADIUS, "density": 1200.0, "node_diameter": 0.0}
     nodes = {f"a{i}": list(pair[0]) for i, pair in enumerate(ends)}
@@ -38,6 +49,7 @@ def loose_bars(
             struts=struts,
             cables={"loose": loose},
             gravity=gravity,
+            anchors=dict(anchors),
             offsets=[[0.0, 0.0, height]] * len(ends),
         ),
         strut_contact=HuntCrossley(stiffness=STIFFNESS, dissipation=dissipation),

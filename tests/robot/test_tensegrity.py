@@ -84,7 +84,7 @@ def test_nodes_placed_in_the_ground_are_refused(refused):
 
 
 def test_a_structure_without_rest_is_refused_with_the_body_that_is_left(monkeypatch):
-    monkeypatch.setattr(equilibrium, "MOST_STEPS", 2)
+    monkeypatch.setattr(equilibrium, "MOST_STEPS", 1)
     with pytest.raises(InputError) as caught:
         make_structure(load_scenario("six_bar"))
     assert caught.value.key == "robot"
