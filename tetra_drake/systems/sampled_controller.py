@@ -34,7 +34,7 @@ class HeldSignals(LeafSystem):
     | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
     | signals       | (m,)          | N    | signals of the cables                                 |
 
-    The discrete state is the signals, at first those of the robot's command. The output depends on
+    The discrete state is the signals, at first the first sample of the robot's command. The output depends on
     the state alone, so there is no algebraic loop.
     """
 
@@ -72,8 +72,7 @@ class HeldSignals(LeafSystem):
 class SampledController(HeldSignals):
     """Controller of a robot: a function that sets the held signals in each control period.
 
-    The ports are those of HeldSignals. The state is updated at multiples of the period, from t = 0
-    on.
+    It has the ports of HeldSignals. The state is updated at multiples of the period, from t = 0 on.
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
