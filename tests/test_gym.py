@@ -8,7 +8,7 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 from helpers.widths import WIDEST
 
 from tetra_drake.engines.simulation import Simulation
-from tetra_drake.gym import WALK, TensegrityEnv, TensegrityVectorEnv, register_environments
+from tetra_drake.gym import WALK, TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.robot.robot import AMPLITUDE
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
@@ -38,7 +38,6 @@ def episode(env: gymnasium.Env, *, seed: int) -> tuple[np.ndarray, list[float], 
 
 @pytest.mark.filterwarnings("ignore:.*infinity")
 def test_the_environment_passes_gymnasiums_checks(short):
-    register_environments()
     env = gymnasium.make(WALK, scenario=short)
     check_env(env.unwrapped, skip_render_check=True)
 

@@ -1,10 +1,10 @@
 """Environments for reinforcement learning, with the interface of Gymnasium (extra `gym`).
 
-    >>> import gymnasium
-    >>> environment = gymnasium.make("tetra_drake/Walk-v0", scenario="coulomb")
+    >>> import gymnasium, tetra_drake.gym
+    >>> environment = gymnasium.make("tetra_drake/Walk-v0", grouped=True)
     >>> many = gymnasium.make_vec("tetra_drake/Walk-v0", num_envs=64)
 
-The package registers its environments with Gymnasium when it is installed.
+The import registers the environments with Gymnasium, as Gymnasium expects it of a package.
 
 Observation, a row of numbers:
 
@@ -48,17 +48,6 @@ Info = dict[str, Any]
 
 WALK = "tetra_drake/Walk-v0"
 """Name of the environment of a robot that walks; by default on the scenario `coulomb`."""
-
-
-def register_environments() -> None:
-    """Registers the environments with Gymnasium. It calls this function itself if the package is
-    installed."""
-    if WALK not in gymnasium.registry:
-        gymnasium.register(
-            WALK,
-            entry_point="tetra_drake.gym:TensegrityEnv",
-            vector_entry_point="tetra_drake.gym:TensegrityVectorEnv",
-        )
 
 
 class _Episodes:
@@ -248,3 +237,10 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def _begin(self, places: np.ndarray) -> np.ndarray:
         """Begins episodes. Returns the observations of all robots."""
         return self._episodes.reset(int(self.np_random.integers(2**31)), places)
+
+
+gymnasium.register(
+    WALK,
+    entry_point="tetra_drake.gym:TensegrityEnv",
+    vector_entry_point="tetra_drake.gym:TensegrityVectorEnv",
+)

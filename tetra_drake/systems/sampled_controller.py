@@ -34,8 +34,8 @@ class HeldSignals(LeafSystem):
     | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
     | signals       | (m,)          | N    | signals of the cables                                 |
 
-    The discrete state is the signals, at first the first sample of the robot's command. The output depends on
-    the state alone, so there is no algebraic loop.
+    The discrete state is the signals; at the start, the first sample of the robot's command. The
+    output depends on the state alone, so there is no algebraic loop.
     """
 
     def __init__(self, robot: Robot) -> None:
