@@ -16,7 +16,16 @@ PACKAGE = Path(tetra_drake.__file__).parent
 ORDER = (
     *("errors", "files", "formatting", "interrupts", "machine"),
     *("simd", "physics", "scenario", "options", "robot"),
-    *("systems", "visualization", "results", "engines", "prototype", "optimizers", "evolution"),
+    *(
+        "systems",
+        "visualization",
+        "results",
+        "engines",
+        "gym",
+        "prototype",
+        "optimizers",
+        "evolution",
+    ),
     *("analysis", "figures", "report", "experiment", "cli"),
 )
 """A folder, or a module beside the folders, imports only those before it."""

@@ -83,7 +83,7 @@ class Simulation:
         """The robot without disturbances. Its structure has the names of nodes and cables."""
         workers = available_cores() if workers is None else workers
         _check_positive(count=count, workers=workers)
-        self.action_names, self._shared = _actions(scenario, self.robot, grouped=grouped)
+        self.action_names, self._shared = action_groups(scenario, self.robot, grouped=grouped)
         """Names of the actions: driven cables or oscillators."""
         self._listing_steps = _listing_steps(control_period, scenario.cpg.listing_step)
         self._gait = Gait(name=name, weights=(), tau_a=1.0, tau_b=1.0)
@@ -275,7 +275,7 @@ def simulate_controlled(
     return simulation.result()
 
 
-def _actions(
+def action_groups(
     scenario: Scenario, robot: Robot, *, grouped: bool
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Names of the actions, and the index of the action of each driven cable."""

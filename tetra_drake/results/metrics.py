@@ -11,8 +11,8 @@ from tetra_drake.formatting import fixed
 from tetra_drake.physics.tally import Tally
 from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import followed_nodes
-from tetra_drake.scenario.metrics import METRICS, UNITS, Metrics, Walk, looks_for_distance
+from tetra_drake.robot.structure import Structure, followed_nodes
+from tetra_drake.scenario.metrics import METRICS, UNITS, Metrics, Poses, Walk, looks_for_distance
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH, shown
 
@@ -36,18 +36,32 @@ def compute_metrics(
     structure, scenario = robot.structure, robot.scenario
     steady_from = scenario.simulation.steady_from
     walk = Walk(
-        markers=followed_nodes(nodes, structure),
-        tip=nodes[:, structure.p_WN[:, 0].argmax()],
-        centre=structure.node_shares @ nodes,
+        **vars(poses_of(structure, nodes, float(path.times[-1] - steady_from))),
         path=path.centre[np.searchsorted(path.times, steady_from) :, :2],
         heading=path.heading,
         signals=signals,
-        since_steady_from=float(path.times[-1] - steady_from),
         weight=robot.weight,
         actuators=robot.driven.size,
         tally=totals,
     )
     return Metrics.of(walk, lacking=scenario.lacking)
+
+
+def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) -> Poses:
+    """The poses of a structure, from positions p_WN (3, nodes, 3) in m at three times. The last two
+    are `since_steady_from` (s) apart."""
+    return Poses(
+        markers=followed_nodes(nodes, structure),
+        tip=nodes[:, structure.p_WN[:, 0].argmax()],
+        centre=structure.node_shares @ nodes,
+        since_steady_from=since_steady_from,
+    )
+
+
+def pose_fitness(poses: Poses, objective: Mapping[str, float]) -> float:
+    """The part of the fitness that follows from poses alone."""
+    parts = {name: weight for name, weight in objective.items() if METRICS[name].of_pose}
+    return sum(weight * float(METRICS[name].compute(poses)) for name, weight in parts.items())
 
 
 def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:

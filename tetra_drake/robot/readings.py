@@ -14,9 +14,10 @@ from tetra_drake.simd.allocation import allocate
 
 
 class Readings(NamedTuple):
-    """Readings of N robots at an instant, in SI units. Those of a single robot lack the first axis.
+    """Readings of N robots at an instant, in SI units.
 
-    The names of nodes, cables, bodies and contacts are in `Simulation.robot.structure`.
+    The readings of a single robot lack the first axis. The names of nodes, cables,
+    bodies and contacts are in `Simulation.robot.structure`.
     """
 
     time: Annotated[Any, "robots"]

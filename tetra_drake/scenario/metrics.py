@@ -29,9 +29,9 @@ ROW, LIMITS = "row of tetrahedra", "limited actuators"
 """Properties of robots that some metrics need."""
 
 
-@dataclass(frozen=True)
-class Walk:
-    """Numbers of a simulation for the computation of metrics, in SI units.
+@dataclass(frozen=True, kw_only=True)
+class Poses:
+    """Positions of a robot for the computation of metrics, in SI units.
 
     Positions (3, 3) are in the world frame, with a row for each time: 0, `simulation.steady_from`
     and the end.
@@ -44,19 +44,8 @@ class Walk:
     """Positions (3, 3) of the centre of mass."""
     tip: np.ndarray
     """Positions (3, 3) of the foremost node."""
-    path: np.ndarray
-    """Path (k, 2) of the centre of mass in the plane from `simulation.steady_from` on."""
-    heading: np.ndarray
-    """Heading (k,) of the robot during the whole simulation; see robot.path."""
-    signals: np.ndarray
-    """Signals (k, m) at evenly spaced times from `simulation.steady_from` on."""
     since_steady_from: float
     """Time from `simulation.steady_from` to the end."""
-    weight: float
-    actuators: int
-    """Number of driven cables."""
-    tally: Tally
-    """Tally of the whole simulation, as plain arrays."""
 
     @property
     def followed(self) -> np.ndarray:
@@ -72,6 +61,23 @@ class Walk:
     def steady_centre_way(self) -> np.ndarray:
         """Displacement (3,) of the centre from `simulation.steady_from` to the end."""
         return np.asarray(self.centre[2] - self.centre[1])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walk(Poses):
+    """Numbers of a simulation for the computation of metrics, in SI units."""
+
+    path: np.ndarray
+    """Path (k, 2) of the centre of mass in the plane from `simulation.steady_from` on."""
+    heading: np.ndarray
+    """Heading (k,) of the robot during the whole simulation; see robot.path."""
+    signals: np.ndarray
+    """Signals (k, m) at evenly spaced times from `simulation.steady_from` on."""
+    weight: float
+    actuators: int
+    """Number of driven cables."""
+    tally: Tally
+    """Tally of the whole simulation, as plain arrays."""
 
     @property
     def per_steady_time(self) -> float:
@@ -98,7 +104,8 @@ class Metric:
     """SI unit; "" for none."""
     note: str
     """Short explanation for tables."""
-    compute: Callable[[Walk], float]
+    compute: Callable[[Any], float]
+    """Function of a Walk."""
     least: bool = False
     """True if the least value of several simulations is recorded, not their mean."""
     most: bool = False
@@ -106,6 +113,8 @@ class Metric:
     limit."""
     is_share: bool = False
     """True for a share of time. It is shown in percent."""
+    of_pose: bool = False
+    """True if Poses are enough for it."""
     needs: str = ""
     """Property (ROW or LIMITS) that a robot must have for this metric; "" for no condition."""
 
@@ -137,20 +146,27 @@ class Metrics:
     NaN.
     """
 
-    distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0])
+    distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0], of_pose=True)
     """Displacement of x₁ from the start to the end."""
     steady_distance: float = _metric(
-        "m", "without the start", lambda walk: walk.followed[2, 0] - walk.followed[1, 0]
+        "m",
+        "without the start",
+        lambda walk: walk.followed[2, 0] - walk.followed[1, 0],
+        of_pose=True,
     )
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
     speed: float = _metric(
-        "m/s", "of the centre", lambda walk: walk.steady_centre_way[0] / walk.since_steady_from
+        "m/s",
+        "of the centre",
+        lambda walk: walk.steady_centre_way[0] / walk.since_steady_from,
+        of_pose=True,
     )
     """Mean speed of the centre along x from `simulation.steady_from` on."""
     twist: float = _metric(
         "m",
         "one rear foot ahead of the other",
         lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
+        of_pose=True,
         needs=ROW,
     )
     """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
@@ -158,10 +174,13 @@ class Metrics:
         "m",
         "front tip ahead of rear foot",
         lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
+        of_pose=True,
         needs=ROW,
     )
     """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
-    lateral_drift: float = _metric("m", "sideways", lambda walk: abs(walk.followed_way[1]))
+    lateral_drift: float = _metric(
+        "m", "sideways", lambda walk: abs(walk.followed_way[1]), of_pose=True
+    )
     """Sideways displacement, abs(y₁), at the end."""
     heading_change: float = _metric(
         "rad", "left positive", lambda walk: walk.heading[-1] - walk.heading[0], needs=ROW

@@ -34,8 +34,8 @@ class HeldSignals(LeafSystem):
     | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
     | signals       | (m,)          | N    | signals of the cables                                 |
 
-    The discrete state is the signals, at first those of the robot's command. The output depends on
-    the state alone, so there is no algebraic loop.
+    The discrete state is the signals; at the start, the first sample of the robot's command. The
+    output depends on the state alone, so there is no algebraic loop.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -72,8 +72,7 @@ class HeldSignals(LeafSystem):
 class SampledController(HeldSignals):
     """Controller of a robot: a function that sets the held signals in each control period.
 
-    The ports are those of HeldSignals. The state is updated at multiples of the period, from t = 0
-    on.
+    It has the ports of HeldSignals. The state is updated at multiples of the period, from t = 0 on.
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:

@@ -21,8 +21,8 @@ from tetra_drake.simd.packed import Packed, unpacked
 def hold(parts: loop.Parts, signals: Table, marks: Table) -> None:
     """Appends a sample to the command of each of the first lanes, and sets the next marks.
 
-    A lane without marks stays as it is. The signals change in a step of the listing that begins
-    now, as those of a whole command do.
+    A lane without marks stays as it is. The signals change within a step of the listing, which
+    begins now; the signals of a whole command change in the same way.
 
     Args:
         parts: the simulations, each at a multiple of the listing's step.

@@ -1,0 +1,246 @@
+"""Environments for reinforcement learning, with the interface of Gymnasium (extra `gym`).
+
+    >>> import gymnasium, tetra_drake.gym
+    >>> environment = gymnasium.make("tetra_drake/Walk-v0", grouped=True)
+    >>> many = gymnasium.make_vec("tetra_drake/Walk-v0", num_envs=64)
+
+The import registers the environments with Gymnasium, as Gymnasium expects it of a package.
+
+Observation, a row of numbers:
+
+- lengths of the cables, as shares of the lengths at the start, minus 1; rates of these shares in
+  1/s
+- tensions of the cables, and loads of the contact nodes, as shares of the robot's weight
+- orientations (quaternions, w first) of the bodies, and angular velocities in rad/s
+
+Action: the signal of each driven cable, or of each oscillator with `grouped`, as a share of the
+typical amplitude of the network's signals. Positive signals shorten the cable. An actuator gets the
+setpoint of this signal, see Simulation: 0 is its setpoint at the start.
+
+Reward: the increase of the fitness, which the scenario's `objective` defines. Within an episode it
+is the part of the metrics that follow from positions. The last reward adds the other metrics, so
+the sum of an episode's rewards is the fitness of the walk. If the robot fails, the last reward
+makes the sum 0.
+
+An episode ends (terminated) if the robot fails, and (truncated) at `simulation.duration`. With
+`disturbances` in the scenario, each episode has a draw of its own.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from tetra_drake.engines.simulation import CONTROL_PERIOD, Simulation, action_groups
+from tetra_drake.errors import SimulationFailure
+from tetra_drake.results.metrics import pose_fitness, poses_of
+from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.robot import AMPLITUDE, Robot
+from tetra_drake.scenario.load import GivenScenario, load_scenario
+from tetra_drake.scenario.scenario import Scenario
+
+Info = dict[str, Any]
+
+WALK = "tetra_drake/Walk-v0"
+"""Name of the environment of a robot that walks; by default on the scenario `coulomb`."""
+
+
+class _Episodes:
+    """Episodes of robots side by side: observations, actions and rewards of all environments."""
+
+    def __init__(
+        self,
+        scenario: GivenScenario | None,
+        *,
+        count: int,
+        control_period: float,
+        grouped: bool,
+        workers: int | None,
+    ) -> None:
+        if scenario is None:
+            scenario = load_scenario("coulomb").with_changes({"engine": "!Compiled"})
+        self.simulation = Simulation(
+            scenario, count=count, control_period=control_period, workers=workers
+        )
+        self._scenario: Scenario = self.simulation.scenario
+        robot = self.simulation.robot
+        names, self._groups = action_groups(self._scenario, robot, grouped=grouped)
+        self._cables, self._weight = Robot.of(self._scenario).starting_cables(), robot.weight
+        start = self.simulation.state
+        self._start_lengths = start.lengths[:1]
+        size = self._observe(start).shape[1]
+        self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
+        self.action_space = spaces.Box(-1.0, 1.0, (len(names),), np.float32)
+        # Positions p_WN (N, nodes, 3) at the start and at `simulation.steady_from`.
+        self._start, self._steady = start.p_WN, start.p_WN.copy()
+        self._offsets, self._rewarded = np.zeros(count), np.zeros(count)
+
+    def reset(self, seed: int, places: np.ndarray) -> np.ndarray:
+        """Begins episodes. Returns the observations of all robots."""
+        readings = self.simulation.reset(seed=seed, indices=places)
+        for place in places.tolist():
+            self._start[place] = self._steady[place] = readings.p_WN[place]
+            self._offsets[place] = self._pose_fitness(readings, place)
+            self._rewarded[place] = 0.0
+        return self._observe(readings)
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Simulates a control period. Returns observations, rewards, and whether episodes are
+        terminated and truncated."""
+        simulation = self.simulation
+        readings = simulation.step(self._setpoints(actions))
+        early = readings.time <= self._scenario.simulation.steady_from
+        self._steady[early] = readings.p_WN[early]
+        terminated = np.array([failure is not None for failure in simulation.failures])
+        truncated = simulation.ended & ~terminated
+        places = range(simulation.count)
+        fitness = np.array([self._pose_fitness(readings, place) for place in places], dtype=float)
+        fitness -= self._offsets
+        for place in np.flatnonzero(truncated).tolist():
+            try:
+                fitness[place] = simulation.result(place).fitness
+            except SimulationFailure:  # known only at the end
+                terminated[place], truncated[place] = True, False
+        fitness[terminated] = 0.0
+        rewards = fitness - self._rewarded
+        self._rewarded = fitness
+        return self._observe(readings), rewards, terminated, truncated
+
+    def _pose_fitness(self, readings: Readings, place: int) -> float:
+        """The part of the fitness up to now that follows from positions."""
+        scenario, structure = self._scenario, self.simulation.robot.structure
+        nodes = np.stack([self._start[place], self._steady[place], readings.p_WN[place]])
+        steady_time = scenario.simulation.duration - scenario.simulation.steady_from
+        return pose_fitness(poses_of(structure, nodes, steady_time), scenario.objective)
+
+    def _setpoints(self, actions: np.ndarray) -> np.ndarray:
+        """Setpoints (N, driven cables) of the actuators for actions of the environment."""
+        cpg = self._scenario.cpg
+        amplitude = abs(cpg.gain) * AMPLITUDE * abs(cpg.external_input)
+        signals = amplitude * np.asarray(actions, dtype=float)[:, self._groups]
+        setpoints: np.ndarray = self._scenario.actuation.commands(
+            self._cables._replace(signal=signals)
+        )
+        return setpoints
+
+    def _observe(self, readings: Readings) -> np.ndarray:
+        """Observations (N, size)."""
+        per_length, per_weight = 1.0 / self._start_lengths, 1.0 / self._weight
+        parts = (
+            readings.lengths * per_length - 1.0,
+            readings.rates * per_length,
+            readings.tensions * per_weight,
+            readings.normal_forces * per_weight,
+            readings.q_WB,
+            readings.w_WB,
+        )
+        count = self.simulation.count
+        # The state of a robot that has failed may not be finite.
+        return np.hstack([np.nan_to_num(part.reshape(count, -1)) for part in parts])
+
+
+class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """Environment of one robot; see tetra_drake.gym for observation, action and reward."""
+
+    def __init__(
+        self,
+        scenario: GivenScenario | None = None,
+        *,
+        control_period: float = CONTROL_PERIOD,
+        grouped: bool = False,
+    ) -> None:
+        """Args:
+            scenario: a scenario, its name or file, or a run; `coulomb` on the compiled engine by
+                default.
+            control_period: time (s) between actions.
+            grouped: an action for each oscillator, otherwise for each driven cable.
+
+        Raises:
+            InputError: if an argument does not fit the scenario.
+        """
+        self._episodes = _Episodes(
+            scenario, count=1, control_period=control_period, grouped=grouped, workers=1
+        )
+        self.observation_space = self._episodes.observation_space
+        self.action_space = self._episodes.action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: Info | None = None
+    ) -> tuple[np.ndarray, Info]:
+        super().reset(seed=seed)
+        draw = int(self.np_random.integers(2**31))
+        return self._episodes.reset(draw, np.array([0]))[0], {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
+        given = np.asarray(action)[np.newaxis]
+        observations, rewards, terminated, truncated = self._episodes.step(given)
+        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), {}
+
+
+class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+    """Environments of robots side by side, in the lanes and threads of the compiled engine; see
+    tetra_drake.gym.
+
+    A robot whose episode ends begins the next one in the same step; its last observation is in
+    `final_obs` of the info.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scenario: GivenScenario | None = None,
+        *,
+        control_period: float = CONTROL_PERIOD,
+        grouped: bool = False,
+        workers: int | None = None,
+    ) -> None:
+        """See TensegrityEnv. `workers` is the number of threads; one per core by
+        default."""
+        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+        self.num_envs = num_envs
+        self._episodes = _Episodes(
+            scenario,
+            count=num_envs,
+            control_period=control_period,
+            grouped=grouped,
+            workers=workers,
+        )
+        self.single_observation_space = self._episodes.observation_space
+        self.single_action_space = self._episodes.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def reset(
+        self, *, seed: int | None = None, options: Info | None = None
+    ) -> tuple[np.ndarray, Info]:
+        super().reset(seed=seed)
+        return self._begin(np.arange(self.num_envs)), {}
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
+        observations, rewards, terminated, truncated = self._episodes.step(actions)
+        ended = terminated | truncated
+        if not ended.any():
+            return observations, rewards, terminated, truncated, {}
+        last = np.full(self.num_envs, None, dtype=object)
+        for place in np.flatnonzero(ended).tolist():
+            last[place] = observations[place]
+        info = {"final_obs": last, "_final_obs": ended}
+        return self._begin(np.flatnonzero(ended)), rewards, terminated, truncated, info
+
+    def _begin(self, places: np.ndarray) -> np.ndarray:
+        """Begins episodes. Returns the observations of all robots."""
+        return self._episodes.reset(int(self.np_random.integers(2**31)), places)
+
+
+gymnasium.register(
+    WALK,
+    entry_point="tetra_drake.gym:TensegrityEnv",
+    vector_entry_point="tetra_drake.gym:TensegrityVectorEnv",
+)
