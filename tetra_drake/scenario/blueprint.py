@@ -133,7 +133,7 @@ class Blueprint:
         last = [bodies[list(cables)].max() for cables in self.groups]
         return np.array(last, dtype=np.int64)
 
-    @property
+    @functools.cached_property
     def sides(self) -> np.ndarray:
         """Side of each oscillator's cables (m,): 1.0 left, -1.0 right, 0.0 neither."""
         y, least = self._ends.mean(axis=1)[:, 1], self._least_distance

@@ -14,6 +14,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 import numpy as np
@@ -33,26 +34,50 @@ def allocate(kind: type[Record], sizes: Mapping[str, int], **given: object) -> R
         given: values of fields that are not allocated.
     """
     fields: dict[str, Any] = {}
-    for name, hint in _hints(kind).items():
+    for name, table in _fields(kind).items():
         if name in given:
             fields[name] = given[name]
-        elif get_origin(hint) is Annotated:
-            marks = hint.__metadata__
-            shape = [_length(mark, sizes) for mark in marks if isinstance(mark, (int, str))]
-            start = next((mark for mark in marks if isinstance(mark, float)), 0.0)
-            fields[name] = np.full(shape, start, dtype=np.int64 if int in marks else np.float64)
+        elif isinstance(table, _Table):
+            shape = [
+                math.prod(sizes[factor] if isinstance(factor, str) else factor for factor in length)
+                for length in table.shape
+            ]
+            fields[name] = np.full(shape, table.start, dtype=table.kind)
         else:
-            fields[name] = allocate(hint, sizes)
+            fields[name] = allocate(table, sizes)
     return kind(**fields)
 
 
+@dataclass(frozen=True)
+class _Table:
+    """Table that an annotation defines."""
+
+    shape: tuple[tuple[int | str, ...], ...]
+    """Factors of each length: numbers, and names of sizes."""
+    start: float
+    """Value of all numbers."""
+    kind: type
+    """Type of the numbers."""
+
+
 @functools.cache
-def _hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind, include_extras=True)
+def _fields(kind: type) -> dict[str, Any]:
+    """The fields of a NamedTuple by name: tables, and classes of further NamedTuples."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {name: _table(hint) for name, hint in hints.items()}
 
 
-def _length(length: int | str, sizes: Mapping[str, int]) -> int:
+def _table(hint: Any) -> Any:
+    if get_origin(hint) is not Annotated:
+        return hint
+    marks = hint.__metadata__
+    lengths = tuple(_factors(mark) for mark in marks if isinstance(mark, (int, str)))
+    start = next((mark for mark in marks if isinstance(mark, float)), 0.0)
+    return _Table(lengths, start, np.int64 if int in marks else np.float64)
+
+
+def _factors(length: int | str) -> tuple[int | str, ...]:
     if isinstance(length, int):
-        return length
+        return (length,)
     factors = (factor.strip() for factor in length.split("*"))
-    return math.prod(int(factor) if factor.isdigit() else sizes[factor] for factor in factors)
+    return tuple(int(factor) if factor.isdigit() else factor for factor in factors)
