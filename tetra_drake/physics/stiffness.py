@@ -21,8 +21,8 @@ WORLD = -1
 
 
 class Springs(NamedTuple):
-    """Springs between points of two bodies, or of a body and the world. The displacements (k,) of a
-    spring are those of both bodies, times their motions."""
+    """Springs between points of two bodies, or of a body and the world. The motions of both bodies
+    add up to the displacements (k,) of a spring."""
 
     body_a: np.ndarray
     """Indices of the first bodies (springs,)."""
@@ -87,8 +87,8 @@ def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
 
 
 def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """Contacts of struts as springs. Their displacements (12,) are those of the ends of the first
-    strut, then of the second."""
+    """Contacts of struts as springs. A displacement (12,) is one of both ends of the first strut,
+    then of both ends of the second."""
     near, struts, nodes = forces.near_struts, robot.struts, forces.nodes
     law = contact.NormalForce(*robot.strut_contact.normal)
     ends, stiffness = [], []

@@ -169,16 +169,19 @@ class _Descent:
             return
         self._stiffness = stiffness_at_rest(self._robot)
         self._held = _free_motions(self._robot, state)
-        cables = self._robot.model.cables.law.stiffness  # also of those that are slack here
+        cables = self._robot.model.cables.law.stiffness  # of slack ones, too
         hardest = max(self._stiffness.diagonal().max(), cables.max(initial=0.0))
         farthest = np.abs(self._robot.forces.nodes[:, P_WN : P_WN + 3]).max()
         self._rounding = ROUNDING * hardest * farthest
-        if self._robot.model.strut_contact.acts:
-            # The place where nearly parallel struts touch is rounded 1 / PARALLEL² times as much.
-            pushes = np.abs(self._robot.forces.nodes[:, FORCE : FORCE + 3]).max()
-            self._rounding += ROUNDING / PARALLEL**2 * pushes
         steepest = np.abs(force).max() / self._radius
         self._least = LEAST_STIFFNESS * max(hardest, steepest, np.finfo(float).eps)
+        self._doubt = self._least
+        if self._robot.forces.near_struts.count.any():
+            # The place where nearly parallel struts touch is rounded 1 / PARALLEL² times as much.
+            # It is not quite the nearest one, so that a push has a little stiffness sideways.
+            pushes = np.abs(self._robot.forces.nodes[:, FORCE : FORCE + 3]).max()
+            self._rounding += ROUNDING / PARALLEL**2 * pushes
+            self._doubt += 10.0 * PARALLEL**2 * pushes / self._robot.model.struts.radius.min()
 
     def is_balanced(self) -> bool:
         """True if no force is left, except for rounding errors."""
@@ -186,7 +189,7 @@ class _Descent:
 
     def is_at_rest(self) -> bool:
         """True if no force is left and the energy is at a minimum."""
-        return self.is_balanced() and self._factor(self._stiffness, self._least) is not None
+        return self.is_balanced() and self._factor(self._stiffness, self._doubt) is not None
 
     def step(self) -> bool:
         """Goes a step downhill. Returns False if there is none."""
