@@ -30,7 +30,7 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.engines.interface import Engine, Outcome
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.simulation import Driver, Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
@@ -38,7 +38,6 @@ from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NormalForce
 from tetra_drake.physics.inertia import XX
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
@@ -124,7 +123,7 @@ class MujocoEngine(Engine):
         )
 
     def simulate_many(
-        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
     ) -> list[Outcome]:
         with ThreadPoolExecutor(threads) as pool:
             return list(pool.map(lambda each: self.outcome(*each, record=record), simulations))

@@ -8,11 +8,11 @@ from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.interface import Engine, Outcome
-from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.simulation import Driver, Simulation
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
@@ -39,7 +39,7 @@ class CompiledEngine(Engine):
         return engine.result(0)
 
     def simulate_many(
-        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
     ) -> list[Outcome]:
         outcomes: list[Outcome] = []
         with LanePool(threads) as pool:
