@@ -117,6 +117,7 @@ IMPOSSIBLE = {"long": 300 * "b", "null": "b\0"}
         "robustness good.json --draws 1 --out",
         "robustness",
         "compare",
+        "fit",
         "cpg --out",
         "structure",
         "structure prism --out",
@@ -156,6 +157,7 @@ COMMANDS = [
     "figures",
     "robustness",
     "compare",
+    "fit",
     "cpg",
     "structure",
 ]

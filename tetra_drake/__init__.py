@@ -21,6 +21,8 @@ Functions, and the main attributes of their results:
     load_result         the result in a folder of the command `tetra-drake simulate`
     evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (pandas tables)
     Simulation          robots in control periods: reset(), step(actions), state
+    fit                 values of scenario keys that meet measurements: parameters, scenario
+    MotionCapture, Rest measurements for fit(): motion over time; shape, tensions, frequencies
     load_command        commands for actuators from a file, for simulate(scenario, command=...)
 
 Figures are functions in tetra_drake.figures: gait_diagram(result) from
@@ -40,12 +42,15 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tetra_drake.analysis.measurements import MotionCapture as MotionCapture
+    from tetra_drake.analysis.measurements import Rest as Rest
     from tetra_drake.analysis.sweep import sweep as sweep
     from tetra_drake.engines.simulate import simulate as simulate
     from tetra_drake.engines.simulate import simulate_many as simulate_many
     from tetra_drake.engines.simulation import Simulation as Simulation
     from tetra_drake.evolution.run import load_run as load_run
     from tetra_drake.experiment import evolve as evolve
+    from tetra_drake.experiment import fit as fit
     from tetra_drake.prototype.command_file import load_command as load_command
     from tetra_drake.report.result_folder import load_result as load_result
     from tetra_drake.robot.gait import load_gait as load_gait
@@ -56,7 +61,10 @@ __version__ = "0.3.0"
 
 _HOMES = {
     "Simulation": "tetra_drake.engines.simulation",
+    "MotionCapture": "tetra_drake.analysis.measurements",
+    "Rest": "tetra_drake.analysis.measurements",
     "evolve": "tetra_drake.experiment",
+    "fit": "tetra_drake.experiment",
     "load_command": "tetra_drake.prototype.command_file",
     "load_gait": "tetra_drake.robot.gait",
     "load_result": "tetra_drake.report.result_folder",

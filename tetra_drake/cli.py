@@ -66,7 +66,18 @@ def make_parser() -> Command:
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     parser.add_commands(
-        [_simulate, _evolve, _export, _replay, _figures, _robustness, _compare, _cpg, _structure]
+        [
+            _simulate,
+            _evolve,
+            _export,
+            _replay,
+            _figures,
+            _robustness,
+            _compare,
+            _fit,
+            _cpg,
+            _structure,
+        ]
     )
     return parser
 
@@ -92,6 +103,7 @@ _STRUCTURE = f"a structure file, or one of {', '.join(shipped_structures())}"
 _COMMAND = "a file of actuator commands (CSV) instead, as `export` writes"
 _ENGINE = "the Drake diagram, the same laws compiled, or MuJoCo (default: the scenario's)"
 
+FitPath = Annotated[Path, Option(metavar="FIT", type=Path)]
 ScenarioName = Annotated[str, Option(_SCENARIO, metavar="NAME|FILE")]
 GaitFile = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
 GaitSeed = Annotated[Seed, Option(_SEED, group="gait")]
@@ -381,6 +393,44 @@ def _compare(runs: list[Run], *, reach: Length | None = None, out: Folder | None
         from tetra_drake.figures.comparison import save_comparison
 
         print(f"wrote {', '.join(save_comparison(compared, out))} to {out}/")
+
+
+def _fit(
+    source: FitPath, *, scenario: ScenarioName | None = None, out: Folder = Path("fit")
+) -> None:
+    """Fit values of a scenario to measurements.
+
+    Reads a YAML file with `parameters`, scenario keys with bounds, and `measurements`: a
+    !MotionCapture has a log of positions over time, a !Rest has positions, tensions and frequencies
+    at rest. Finds the values for which the simulation meets the measurements, with 95 percent
+    intervals. Writes the fitted scenario.yaml, tables, the figure of the residuals and README.md.
+    After Ctrl-C the same command goes on.
+
+    Args:
+        source: the file of the fit
+        scenario: (default: scenario.yaml beside the file, or thesis)
+        out: the folder to write to (default: %(default)s)
+
+    Example: tetra-drake fit lab/fit.yaml --scenario prism --out fit
+    """
+    from tetra_drake.analysis.measurements import load_fit_file
+    from tetra_drake.experiment import fit
+    from tetra_drake.prototype.command_file import scenario_beside
+    from tetra_drake.scenario.load import load_scenario
+
+    given = load_fit_file(source)
+    chosen = load_scenario(scenario or scenario_beside(source) or "thesis")
+    try:
+        found = fit(
+            chosen,
+            given.measurements,
+            given.parameters,
+            out=out,
+            say=lambda text: print(text, flush=True),
+        )
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None
+    print(f"{found}\nwrote scenario.yaml, tables, figure and README.md to {out}/")
 
 
 def _cpg(

@@ -1,14 +1,16 @@
-"""Evolution of gaits as a whole: `evolve` makes a run, from its record to its report."""
+"""Experiments as a whole, from their records to their reports: `evolve`, and `fit`."""
 
 from __future__ import annotations
 
 import contextlib
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
+from tetra_drake.analysis.fit import EVALUATIONS, Bounds, Fit, Say, fit_values
+from tetra_drake.analysis.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import reevaluation
@@ -19,11 +21,11 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
-from tetra_drake.files import given_path
+from tetra_drake.files import check_folder, given_path
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import given_scenario
+from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -119,6 +121,52 @@ def evolve(
         if report:
             _report(out, progress)
     return load_run(out)
+
+
+def fit(
+    scenario: GivenScenario,
+    measurements: Sequence[Measurement],
+    parameters: Mapping[str, Bounds],
+    *,
+    out: str | Path | None = None,
+    say: Say | None = None,
+) -> Fit:
+    """Fits values of a scenario to measurements of a robot, by bounded least squares.
+
+        >>> scenario = td.load_scenario("prism")
+        >>> heights = td.Rest(positions={"n3 z": "0.172 m", "n4 z": "0.172 m"})
+        >>> bounds = {"robot.cables.side.stiffness": ("50 N/m", "200 N/m")}
+        >>> fit = td.fit(scenario, [heights], bounds)
+        >>> stiffer = fit.scenario
+
+    Residuals are weighted by the uncertainties of the measurements. Their derivatives by the
+    parameters are finite differences of scenarios that are simulated side by side. The 95 %
+    intervals of the values follow from the derivatives.
+
+    Args:
+        scenario: a scenario, its name or file, or a run. Its values are the start.
+        measurements: values of the kinds td.MotionCapture and td.Rest.
+        parameters: the bounds, least and most, by scenario key. Texts have units; numbers are SI.
+        out: a folder for the fitted scenario, tables, figure and page. It also keeps each
+            evaluation, so that an interrupted fit goes on where it was.
+        say: is told of each iteration.
+
+    Raises:
+        InputError: names what cannot be used.
+    """
+    folder = None if out is None else given_path(out, "fit", "out")
+    if folder is not None:
+        check_folder(folder)
+        if (folder / SCENARIO).exists() and not (folder / EVALUATIONS).exists():
+            raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
+    found = fit_values(
+        given_scenario(scenario), list(measurements), parameters, folder=folder, say=say
+    )
+    if folder is not None:
+        from tetra_drake.report.fit_page import save_fit
+
+        save_fit(found, folder)
+    return found
 
 
 def _check_counts(**given: tuple[int | None, int]) -> None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, Self
 
+from tetra_drake.robot.command import Command, commanded_robot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import xarray
 
+Driver = Gait | Command
+"""What drives the actuators."""
 
 MARK_DECIMALS = 9
 """Decimals of the times (s) at which a step must end. A step between two times that differ in
@@ -39,3 +43,10 @@ class GaitSimulation:
     """Only for an engine with `can_be_watched`."""
     steering: SteeringSignal | None = None
     """The turn, in place of the gait's."""
+
+    @classmethod
+    def of(cls, scenario: Scenario, driver: Driver, *, record: bool = False) -> Self:
+        """The simulation of a gait or a command. Raises InputError if it does not fit."""
+        if isinstance(driver, Command):
+            return cls(commanded_robot(scenario, driver), driver.gait, record=record)
+        return cls(Robot.of(scenario), driver, record=record)

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from tetra_drake.engines import ENGINES
-from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
@@ -62,15 +62,16 @@ class Engine:
         raise InputError(f"scenario {scenario.name}", "engine", problem)
 
     def simulate_many(
-        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
     ) -> list[Outcome]:
-        """Simulates many gaits, each on its scenario. This default simulates one after another."""
+        """Simulates many gaits or commands, each on its scenario. This default simulates one after
+        another."""
         return [self.outcome(*simulation, record=record) for simulation in simulations]
 
-    def outcome(self, scenario: Scenario, gait: Gait, *, record: bool) -> Outcome:
-        """Simulates one gait. Returns its result or its failure."""
+    def outcome(self, scenario: Scenario, driver: Driver, *, record: bool) -> Outcome:
+        """Simulates one gait or command. Returns its result or its failure."""
         try:
-            return self.simulate(GaitSimulation(Robot.of(scenario), gait, record=record))
+            return self.simulate(GaitSimulation.of(scenario, driver, record=record))
         except SimulationFailure as failure:
             return failure
 

@@ -28,7 +28,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
-from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
@@ -39,7 +39,6 @@ from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NormalForce
 from tetra_drake.physics.inertia import XX
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
@@ -106,7 +105,7 @@ class MujocoEngine(Engine):
         return SerialStepper(_MujocoWalk, first.robot.structure, count=count)
 
     def simulate_many(
-        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
     ) -> list[Outcome]:
         with ThreadPoolExecutor(threads) as pool:
             return list(pool.map(lambda each: self.outcome(*each, record=record), simulations))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from tetra_drake.engines.gait_simulation import GaitSimulation, Viewer
+from tetra_drake.engines.gait_simulation import Driver, GaitSimulation, Viewer
 from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
 from tetra_drake.engines.simulation import CONTROL_PERIOD, Controller, simulate_controlled
 from tetra_drake.errors import InputError, SimulationFailure
@@ -82,12 +82,12 @@ def simulate(
 
 def simulate_many(
     scenario: GivenScenario | Sequence[GivenScenario],
-    gaits: Sequence[GivenGait],
+    gaits: Sequence[GivenGait | Command],
     *,
     record: bool = False,
     workers: int | None = None,
 ) -> list[Outcome]:
-    """Simulates many gaits, on one scenario or each gait on its own scenario.
+    """Simulates many gaits or commands, on one scenario or each on its own scenario.
 
         >>> scenario = td.load_scenario("quick")
         >>> outcomes = td.simulate_many(scenario, [td.seeded_gait(scenario, i) for i in range(3)])
@@ -104,7 +104,7 @@ def simulate_many(
 
     Args:
         scenario: a scenario for all gaits, or a scenario for each gait.
-        gaits: gaits, files or runs.
+        gaits: gaits, files or runs; or commands for actuators.
         record: records the trajectories.
         workers: number of threads; one per core by default.
 
@@ -121,16 +121,26 @@ def simulate_many(
     threads = available_cores() if workers is None else workers
     if threads < 1:
         raise InputError("simulate_many", "workers", f"found {workers}, expected at least 1")
-    pairs = [(each, given_gait(gait, each)) for each, gait in zip(scenarios, gaits, strict=True)]
+    pairs = [(each, _driver(gait, each)) for each, gait in zip(scenarios, gaits, strict=True)]
     engines = {engine_of(scenario) for scenario in scenarios}
     if len(engines) == 1:
         outcomes = engines.pop().simulate_many(pairs, record=record, threads=threads)
     else:
         outcomes = [engine_of(pair[0]).outcome(*pair, record=record) for pair in pairs]
-    for (simulated, gait), outcome in zip(pairs, outcomes, strict=True):
-        if isinstance(outcome, SimulationFailure):
-            outcome.scenario, outcome.gait, outcome.name = simulated, gait, gait.name
-    return outcomes
+    return [_told(outcome, *pair) for outcome, pair in zip(outcomes, pairs, strict=True)]
+
+
+def _driver(given: GivenGait | Command, scenario: Scenario) -> Driver:
+    return given if isinstance(given, Command) else given_gait(given, scenario)
+
+
+def _told(outcome: Outcome, scenario: Scenario, driver: Driver) -> Outcome:
+    """An outcome that tells what was simulated."""
+    if isinstance(outcome, SimulationFailure):
+        outcome.scenario, outcome.name = scenario, driver.name
+        outcome.gait = None if isinstance(driver, Command) else driver
+        return outcome
+    return dataclasses.replace(outcome, scenario=scenario)  # a command's has no network
 
 
 def check_scenario(scenario: Scenario) -> None:

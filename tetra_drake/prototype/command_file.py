@@ -68,37 +68,51 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
     path = given_path(path, "load_command", "path")
     robot, text = Robot.of(scenario), read_text(path, "command file")
     wanted = [TIME, *command_columns(robot)]
-    cells = _cells(text, wanted, path)
-    for name in wanted:
-        numbers = pandas.to_numeric(cells[name], errors="coerce")
-        for row in np.flatnonzero(~np.isfinite(numbers)):
-            problem = f"found '{cells[name][row]}', expected a number"
-            raise InputError(path, f"line {row + 2}, {name}", problem)
-        cells[name] = numbers
-    table = cells[wanted].to_numpy(dtype=float)
+    cells = table_cells(text, path)
+    _check_columns(cells, wanted, path)
+    table = np.column_stack([column_numbers(cells[name], path) for name in wanted])
     period = _period(table[:, 0], scenario.cpg.listing_step, path)
     return Command(path.name, period, scenario.actuation.command_unit * table[:, 1:])
 
 
-def _cells(text: str, wanted: Sequence[str], path: str | Path) -> pandas.DataFrame:
-    """Cells of a table as texts, so that messages can show them. InputError unless the columns are
-    the wanted ones."""
+def table_cells(text: str, path: str | Path) -> pandas.DataFrame:
+    """Cells of a CSV table as texts, so that messages can show them. Raises InputError if it is no
+    table, or a column is given twice."""
     try:
         heading, *rows = csv.reader(io.StringIO(text.rstrip()), strict=True)
     except (csv.Error, ValueError) as error:  # an empty file, too
         raise InputError(path, "", "is no table with commas between cells") from error
+    for line, row in enumerate(rows, start=2):
+        if len(row) != len(heading):
+            problem = f"found {len(row)} cells, expected {len(heading)}"
+            raise InputError(path, f"line {line}", problem)
+    for name in heading:
+        if heading.count(name) > 1:
+            raise InputError(path, name, "is given twice")
+    return pandas.DataFrame(rows, columns=heading, dtype=str)
+
+
+def column_numbers(cells: pandas.Series, path: str | Path, *, gaps: bool = False) -> np.ndarray:
+    """Numbers (rows,) of a column of texts; NaN for an empty cell if there may be `gaps`. Raises
+    InputError that names the line of another cell."""
+    numbers = pandas.to_numeric(cells, errors="coerce").to_numpy(dtype=float)
+    is_gap = gaps & (cells.str.strip() == "").to_numpy()
+    for row in np.flatnonzero(~np.isfinite(numbers) & ~is_gap):
+        problem = f"found '{cells[row]}', expected a number"
+        raise InputError(path, f"line {row + 2}, {cells.name}", problem)
+    return numbers
+
+
+def _check_columns(cells: pandas.DataFrame, wanted: Sequence[str], path: str | Path) -> None:
+    """Raises InputError unless a table has the wanted columns and no others."""
+    heading = list(cells)
     if set(heading).isdisjoint(wanted):  # the file may be any, so nothing of it is shown
         raise InputError(path, "", f"has no column of a command; {hint('', wanted)}")
     for name in [*heading, *wanted]:
         if name not in wanted:
             raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")
-        if (count := heading.count(name)) != 1:
-            raise InputError(path, name, "is missing" if count == 0 else "is given twice")
-    for line, row in enumerate(rows, start=2):
-        if len(row) != len(heading):
-            problem = f"found {len(row)} cells, expected {len(heading)}"
-            raise InputError(path, f"line {line}", problem)
-    return pandas.DataFrame(rows, columns=heading, dtype=str)
+        if name not in heading:
+            raise InputError(path, name, "is missing")
 
 
 def _period(times: np.ndarray, least: float, source: str | Path) -> float:

@@ -8,12 +8,12 @@ from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.lane_stepper import LaneStepper
 from tetra_drake.engines.compiled.prepared import Prepared
-from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
@@ -43,7 +43,7 @@ class CompiledEngine(Engine):
         return LaneStepper(first, count=count, threads=threads)
 
     def simulate_many(
-        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
     ) -> list[Outcome]:
         outcomes: list[Outcome] = []
         with LanePool(threads) as pool:

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
 from tetra_drake.engines.compiled.prepared import Prepared
-from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
@@ -31,7 +31,7 @@ _ROBOTS = 32
 @dataclass(eq=False)
 class _Job:
     scenario: Scenario
-    gait: Gait
+    driver: Driver
     record: bool
     time_budget: float
     future: Future[SimulationResult] = field(default_factory=Future)
@@ -68,17 +68,17 @@ class LanePool:
 
     def submit(
         self,
-        gaits: Sequence[tuple[Scenario, Gait]],
+        drivers: Sequence[tuple[Scenario, Driver]],
         *,
         record: bool = False,
         time_budget: float = math.inf,
     ) -> list[Future[SimulationResult]]:
-        """Queues gaits with their scenarios. Returns futures of the results.
+        """Queues gaits or commands with their scenarios. Returns futures of the results.
 
         A future raises the same errors as simulate(), and TimeBudgetExceeded if the gait takes
         longer than `time_budget` (s). Callbacks of futures run in the threads of the pool.
         """
-        jobs = [_Job(scenario, gait, record, time_budget) for scenario, gait in gaits]
+        jobs = [_Job(scenario, driver, record, time_budget) for scenario, driver in drivers]
         with self._changed:
             self._waiting.extend(jobs)
             self._changed.notify_all()
@@ -153,8 +153,7 @@ class _Crew:
         If all lanes are idle, an engine is chosen that fits `among` jobs.
         """
         try:
-            robot = self._robots(job.scenario)
-            prepared = Prepared.of(GaitSimulation(robot, job.gait, record=job.record))
+            prepared = Prepared.of(self._simulation(job))
             engine = self._engine if self.jobs else self._engine_for(prepared, lanes_for(among))
             if engine is None or not engine.accepts(prepared):
                 return False
@@ -166,6 +165,11 @@ class _Crew:
         job.deadline = time.perf_counter() + job.time_budget
         self.jobs[lane] = job
         return True
+
+    def _simulation(self, job: _Job) -> GaitSimulation:
+        if isinstance(job.driver, Command):  # its robot has the command's signals
+            return GaitSimulation.of(job.scenario, job.driver, record=job.record)
+        return GaitSimulation(self._robots(job.scenario), job.driver, record=job.record)
 
     def advance(self) -> None:
         """Simulates for a short time and removes finished jobs."""

@@ -1,0 +1,457 @@
+"""Fit of a scenario's values to measurements: bounded least squares."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from tetra_drake import __version__
+from tetra_drake.analysis.measurements import Measured, Measurement, Prediction
+from tetra_drake.errors import InputError
+from tetra_drake.files import read_bytes, write_whole
+from tetra_drake.formatting import Table, fixed, listed, rounded
+from tetra_drake.scenario.quantities import Quantity
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import value_at
+from tetra_drake.scenario.units import quantity_to_si, shown
+
+if TYPE_CHECKING:
+    import pandas
+
+STEP = 1e-3
+"""Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and
+the tolerance of the simulation show; with more, the curvature."""
+TOLERANCE = 1e-6
+"""Relative change of parameters at which the search ends."""
+NEGLIGIBLE = 0.01
+"""Change of the sum of squares at which the search ends; 1 is a standard deviation."""
+NORMAL = 1.96
+"""Half width of a 95 % interval in standard deviations."""
+SAME_DIRECTION = 1e-10
+"""Singular value, as a share of the greatest, below which the data say nothing of a direction."""
+STRONG = 0.95
+"""Correlation above which two parameters are named."""
+EVALUATIONS = "evaluations"
+"""Folder of the evaluations of a fit."""
+
+Bounds = Sequence[str | float]
+Say = Callable[[str], None]
+
+
+class Parameter(NamedTuple):
+    """A number of a scenario that is fitted, in SI."""
+
+    key: str
+    unit: str
+    start: float
+    least: float
+    most: float
+
+    @property
+    def scale(self) -> float:
+        """Unit of the relative parameter: the start, or the width of the bounds if it is 0."""
+        return abs(self.start) or self.most - self.least
+
+    def text(self, number: float) -> str:
+        """The number for a scenario."""
+        return f"{number!r} {self.unit}".strip()
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result of fit()."""
+
+    scenario: Scenario = field(repr=False)
+    """The scenario with the fitted values."""
+    parameters: pandas.DataFrame
+    """A row per key in SI: value, its 95 % interval low and high, start, bounds least and most,
+    unit, and whether the data determine it."""
+    correlations: pandas.DataFrame = field(repr=False)
+    """Correlations of the parameters, by keys."""
+    residuals: pandas.DataFrame = field(repr=False)
+    """A row per measured number in SI: measurement, label, along (time in s, or number), measured,
+    uncertainty, start and fitted: what the scenario predicts with the start and the fitted values.
+    """
+    clock_offsets: dict[str, float]
+    """Time (s) by which the clock of each measurement is ahead."""
+    misfit: float
+    """Sum of squares of the weighted residuals per degree of freedom; 1 if the model is right and
+    the uncertainties are."""
+    start_misfit: float
+    """The same with the start values."""
+    warnings: list[str]
+    evaluations: int
+    """Number of scenarios that were simulated for all measurements."""
+    wall_time: float
+    """Wall time in s."""
+
+    def __str__(self) -> str:
+        lines = [
+            f"fit of {len(self.parameters)} values to {len(self.residuals)} numbers in "
+            f"{self.evaluations} evaluations, {self.wall_time:.1f} s; misfit "
+            f"{rounded(self.start_misfit)} at the start, {rounded(self.misfit)} fitted",
+            self.table.text(),
+        ]
+        lines += [
+            f"clock of {name}: {1e3 * offset:+.2f} ms"
+            for name, offset in self.clock_offsets.items()
+            if offset
+        ]
+        return "\n".join([*lines, *(f"note: {warning}" for warning in self.warnings)])
+
+    @property
+    def table(self) -> Table:
+        """Values and intervals."""
+        rows = [
+            [
+                str(key),
+                _with_uncertainty(row["value"], row["high"] - row["value"]),
+                rounded(row["start"]),
+                row["unit"] or "1",
+            ]
+            for key, row in self.parameters.iterrows()
+        ]
+        return Table(["key", "value, 95 % interval", "start", "unit"], rows, text_columns=(0, 3))
+
+
+def _with_uncertainty(value: float, half: float) -> str:
+    """A number and the half width of its interval, with two digits of the latter; "?" if the width
+    is unknown."""
+    if not half > 0.0:
+        return f"{rounded(value)} ± ?"
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    return f"{fixed(value, digits)} ± {fixed(half, digits)}"
+
+
+def fit_values(
+    scenario: Scenario,
+    measurements: Sequence[Measurement],
+    parameters: Mapping[str, Bounds],
+    *,
+    folder: Path | None = None,
+    say: Say | None = None,
+) -> Fit:
+    """Values of a scenario's keys within bounds for which it meets measurements best.
+
+    Args:
+        scenario: the scenario whose values are the start.
+        measurements: the measurements.
+        parameters: the bounds, least and most, by key.
+        folder: keeps each evaluation; another fit to the same data takes them from there.
+        say: is told of each iteration.
+
+    Raises:
+        InputError: if an argument cannot be used, or the start cannot be simulated.
+    """
+    from scipy.optimize import least_squares
+
+    began = time.perf_counter()
+    fitted = [_parameter(scenario, key, bounds) for key, bounds in parameters.items()]
+    measured = [
+        each.read(scenario, f"measurement {number}")
+        for number, each in enumerate(measurements, start=1)
+    ]
+    numbers = sum(len(each.values) for each in measured)
+    if not fitted or numbers < len(fitted):
+        found = f"found {len(fitted)} for {numbers} measured numbers"
+        raise InputError("fit", "parameters", f"{found}, expected one at least, and no more")
+    digest = _digest(scenario, measurements)
+    problem = _Problem(scenario, fitted, measured, digest, folder, say)
+    start = np.array([parameter.start / parameter.scale for parameter in fitted])
+    first = problem.residuals(start)
+    if not np.isfinite(first).all():
+        what = "is not simulated, or lacks equilibrium or frequencies, with the start values"
+        raise InputError(scenario.name, "", what)
+    solution = least_squares(
+        problem.residuals,
+        start,
+        jac=problem.jacobian,
+        bounds=problem.bounds,
+        x_scale="jac",
+        ftol=2.0 * NEGLIGIBLE / numbers,
+        xtol=TOLERANCE,
+        gtol=TOLERANCE,
+    )
+    return _result(problem, start, solution.x, time.perf_counter() - began)
+
+
+def _parameter(scenario: Scenario, key: str, bounds: Bounds) -> Parameter:
+    """The parameter of a key. Raises InputError if key or bounds cannot be used."""
+    source = f"scenario {scenario.name}"
+    start = value_at(scenario.model_dump(), key)
+    if isinstance(start, bool) or not isinstance(start, float):
+        what = "no value" if start is None else f"{start!r:.40}"
+        raise InputError(source, key, f"found {what}, expected the key of a number to fit")
+    unit = start.unit if isinstance(start, Quantity) else ""
+    if isinstance(bounds, str) or not isinstance(bounds, Sequence) or len(bounds) != 2:
+        raise InputError(source, key, f"found {bounds!r:.40}, expected bounds: least and most")
+    least, most = (_bound(bound, unit, source, key) for bound in bounds)
+    if not least < most:
+        raise InputError(source, key, f"found bounds {least:g} to {most:g}, expected least first")
+    if not least <= start <= most:
+        problem = f"found bounds {least:g} to {most:g} {unit}".rstrip()
+        raise InputError(source, key, f"{problem}, expected them around the start, {start:g}")
+    for bound in (least, most):  # a scenario may have limits of its own
+        scenario.with_changes({key: f"{bound!r} {unit}" if unit else bound})
+    return Parameter(key, unit, float(start), least, most)
+
+
+def _bound(bound: str | float, unit: str, source: str, key: str) -> float:
+    if isinstance(bound, str):
+        try:
+            return quantity_to_si(bound, unit)
+        except ValueError as error:
+            raise InputError(source, key, str(error)) from error
+    if isinstance(bound, bool) or not isinstance(bound, int | float) or not math.isfinite(bound):
+        raise InputError(source, key, f"found the bound {bound!r:.40}, expected a number")
+    return float(bound)
+
+
+def _digest(scenario: Scenario, measurements: Sequence[Measurement]) -> str:
+    """Digest of all that predictions depend on, except the fitted values."""
+    digest = hashlib.sha256(f"{__version__} {scenario.values()}".encode())
+    for measurement in measurements:
+        settings = measurement.model_dump(exclude=set(measurement.files))
+        digest.update(f"{type(measurement).tag} {settings}".encode())
+        for key, path in measurement.files.items():
+            digest.update(key.encode() + read_bytes(path, key))
+    return digest.hexdigest()
+
+
+class _Problem:
+    """Weighted residuals and their derivatives by relative parameters. All scenarios of an
+    iteration are simulated side by side."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        parameters: Sequence[Parameter],
+        measured: Sequence[Measured],
+        digest: str,
+        folder: Path | None,
+        say: Say | None,
+    ) -> None:
+        self.scenario, self.parameters, self.measured = scenario, parameters, measured
+        self.scale = np.array([parameter.scale for parameter in parameters])
+        self.bounds = (
+            np.array([parameter.least for parameter in parameters]) / self.scale,
+            np.array([parameter.most for parameter in parameters]) / self.scale,
+        )
+        self.values = np.concatenate([each.values for each in measured])
+        self.uncertainty = np.concatenate([each.uncertainty for each in measured])
+        self._digest, self._folder, self._say = digest, folder, say
+        self._known: dict[str, list[Prediction]] = {}
+
+    @property
+    def evaluations(self) -> int:
+        """Number of scenarios that were predicted so far."""
+        return len(self._known)
+
+    def scenario_at(self, x: np.ndarray) -> Scenario:
+        """The scenario with relative parameters (n,)."""
+        numbers = (x * self.scale).tolist()
+        pairs = zip(self.parameters, numbers, strict=True)
+        return self.scenario.with_changes(
+            {one.key: one.text(number) if one.unit else number for one, number in pairs}
+        )
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        """Weighted residuals (numbers,); the neighbours of the point are simulated with it."""
+        before = self.evaluations
+        self._evaluate([x, *self._neighbours(x)])
+        residuals = self._residuals_at(x)
+        if self._say and self.evaluations > before:
+            misfit = self.misfit(residuals)
+            self._say(f"{self.evaluations} evaluations, misfit {rounded(misfit)}")
+        return residuals
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives (numbers, n) of the residuals by central differences; one-sided where a
+        neighbour cannot be simulated. Raises InputError where none can."""
+        self._evaluate([x, *self._neighbours(x)])
+        here, columns = self._residuals_at(x), []
+        for place, parameter in enumerate(self.parameters):
+            points = [x, *self._neighbours(x)[2 * place : 2 * place + 2]]
+            sides = [(point[place], self._residuals_at(point)) for point in points[1:]]
+            sides = [side for side in sides if np.isfinite(side[1]).all()]
+            if len(sides) == 1:
+                sides.append((x[place], here))
+            if not sides:
+                problem = "neighbouring values cannot be simulated, expected other bounds"
+                raise InputError(f"scenario {self.scenario.name}", parameter.key, problem)
+            (one, low), (other, high) = sides
+            columns.append((high - low) / (other - one))
+        return np.column_stack(columns)
+
+    def misfit(self, residuals: np.ndarray) -> float:
+        """Sum of squares per degree of freedom."""
+        return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
+
+    def predictions(self, x: np.ndarray) -> list[Prediction]:
+        """Predictions for each measurement at a point that was evaluated."""
+        return self._known[self._name(x)]
+
+    def _neighbours(self, x: np.ndarray) -> list[np.ndarray]:
+        """Two neighbours of a point for each parameter, within the bounds."""
+        neighbours = []
+        for place in range(x.size):
+            for sign in (-1.0, 1.0):
+                moved = x.copy()
+                moved[place] += sign * STEP
+                neighbours.append(np.clip(moved, *self.bounds))
+        return neighbours
+
+    def _residuals_at(self, x: np.ndarray) -> np.ndarray:
+        predicted = np.concatenate([each.values for each in self.predictions(x)])
+        residuals: np.ndarray = (predicted - self.values) / self.uncertainty
+        return residuals
+
+    def _evaluate(self, points: Sequence[np.ndarray]) -> None:
+        """Predicts all measurements at points that are not known."""
+        unknown = {}
+        for point in points:
+            name = self._name(point)
+            if name not in self._known and not self._restore(name):
+                unknown[name] = point
+        if not unknown:
+            return
+        scenarios = [self.scenario_at(point) for point in unknown.values()]
+        by_measurement = [each.predict(scenarios) for each in self.measured]
+        for name, predictions in zip(unknown, zip(*by_measurement, strict=True), strict=True):
+            self._known[name] = list(predictions)
+            self._save(name)
+
+    def _name(self, x: np.ndarray) -> str:
+        """Name of an evaluation: a digest of the data, keys and values."""
+        keys = [parameter.key for parameter in self.parameters]
+        text = f"{self._digest} {keys} {(x * self.scale).tolist()}"
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+    def _save(self, name: str) -> None:
+        if self._folder is None:
+            return
+        content = io.BytesIO()
+        arrays = [np.append(each.values, each.clock_offset) for each in self._known[name]]
+        np.savez(content, *arrays)
+        write_whole(self._folder / EVALUATIONS / f"{name}.npz", content.getvalue())
+
+    def _restore(self, name: str) -> bool:
+        """Takes an evaluation from the folder. Returns False if it is not there."""
+        file = self._folder and self._folder / EVALUATIONS / f"{name}.npz"
+        if not file or not file.exists():
+            return False
+        with np.load(io.BytesIO(read_bytes(file, "evaluation"))) as kept:
+            arrays = [kept[key] for key in kept]
+        self._known[name] = [Prediction(each[:-1], float(each[-1])) for each in arrays]
+        return True
+
+
+def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: float) -> Fit:
+    """The result of a fit that started at relative parameters and ended at `x` (n,)."""
+    import pandas
+
+    first, last = problem.residuals(start), problem.residuals(x)
+    misfit = problem.misfit(last)
+    half, correlation = _uncertainty(problem, x, misfit)
+    parameters = problem.parameters
+    keys = [parameter.key for parameter in parameters]
+    values, determined = x * problem.scale, np.isfinite(half)
+    table = pandas.DataFrame(
+        {
+            "value": values,
+            "low": np.where(determined, values - half, np.nan),
+            "high": np.where(determined, values + half, np.nan),
+            "start": [parameter.start for parameter in parameters],
+            "least": [parameter.least for parameter in parameters],
+            "most": [parameter.most for parameter in parameters],
+            "unit": [parameter.unit for parameter in parameters],
+            "determined": determined,
+        },
+        index=pandas.Index(keys, name="key"),
+    )
+    sizes = [len(each.values) for each in problem.measured]
+    residuals = pandas.DataFrame(
+        {
+            "measurement": np.repeat([each.name for each in problem.measured], sizes),
+            "label": [label for each in problem.measured for label in each.labels],
+            "along": np.concatenate([each.along for each in problem.measured]),
+            "measured": problem.values,
+            "uncertainty": problem.uncertainty,
+            "start": problem.values + problem.uncertainty * first,
+            "fitted": problem.values + problem.uncertainty * last,
+        }
+    )
+    correlations = pandas.DataFrame(correlation, index=keys, columns=keys)
+    return Fit(
+        scenario=problem.scenario_at(x),
+        parameters=table,
+        correlations=correlations,
+        residuals=residuals,
+        clock_offsets={
+            each.name: prediction.clock_offset
+            for each, prediction in zip(problem.measured, problem.predictions(x), strict=True)
+        },
+        misfit=misfit,
+        start_misfit=problem.misfit(first),
+        warnings=_warnings(table, correlations),
+        evaluations=problem.evaluations,
+        wall_time=wall_time,
+    )
+
+
+def _uncertainty(problem: _Problem, x: np.ndarray, misfit: float) -> tuple[np.ndarray, np.ndarray]:
+    """Half widths (n,) of the 95 % intervals in SI, infinite if the bounds are nearer; and
+    correlations (n, n).
+
+    Uncertainties are as given; where the residuals are larger, they are scaled to them.
+    """
+    width = problem.bounds[1] - problem.bounds[0]
+    _, singular, rows = np.linalg.svd(problem.jacobian(x) * width, full_matrices=False)
+    told = singular > SAME_DIRECTION * singular.max(initial=np.finfo(float).tiny)
+    weak = (rows[~told] ** 2).sum(axis=0) > SAME_DIRECTION
+    directions = rows[told] / singular[told, np.newaxis]
+    covariance = directions.T @ directions
+    deviation = np.sqrt(covariance.diagonal())
+    share = NORMAL * math.sqrt(max(1.0, misfit)) * deviation
+    half = np.where(weak | (share > 0.5), math.inf, share * width * problem.scale)
+    spread = np.where(deviation > 0.0, deviation, 1.0)
+    return half, covariance / np.outer(spread, spread)
+
+
+def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[str]:
+    """What a reader of a fit has to know."""
+    warnings = []
+    for key, row in table.iterrows():
+        value, width = row["value"], row["most"] - row["least"]
+        if not row["determined"]:
+            warnings.append(f"the data do not determine {key}: the bounds are all that is known")
+        elif min(value - row["least"], row["most"] - value) < STEP * width:
+            warnings.append(f"{key} is at a bound, {shown(value, row['unit'])}")
+    determined = table.index[table["determined"]]
+    for place, one in enumerate(determined):
+        others = [
+            other for other in determined[place + 1 :] if abs(correlations.loc[one, other]) > STRONG
+        ]
+        if others:
+            warnings.append(f"the data hardly tell {one} from {listed(others)}")
+    return warnings
+
+
+def summary_of(fit: Fit) -> dict[str, Any]:
+    """Numbers of a fit for JSON."""
+    return {
+        "misfit": fit.misfit,
+        "start_misfit": fit.start_misfit,
+        "clock_offsets_s": fit.clock_offsets,
+        "warnings": fit.warnings,
+        "evaluations": fit.evaluations,
+        "wall_time_s": fit.wall_time,
+    }

@@ -1,0 +1,325 @@
+"""Measurements of a robot, for fit(): its motion, or its shape, tensions and frequencies at rest.
+
+Each kind of measurement has its settings, reads its numbers, and predicts them for other scenarios.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import numpy as np
+import pandas
+from pydantic import Field
+
+from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.engines.gait_simulation import Driver
+from tetra_drake.engines.interface import Outcome
+from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.files import MOST_BYTES, read_text
+from tetra_drake.physics.cable import TENSION
+from tetra_drake.prototype.command_file import TIME, column_numbers, load_command, table_cells
+from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.quantities import Force, Length, Time, Unit
+from tetra_drake.scenario.refusals import hint
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import Kinds, Section, keys_of
+from tetra_drake.scenario.units import quantity_to_si
+from tetra_drake.scenario.yaml_text import read_mapping
+
+if TYPE_CHECKING:
+    import xarray
+
+SAMPLE_PERIOD = 5e-3
+"""Time (s) between samples of simulated motion. Cubic curves join the samples."""
+OFFSETS = 41
+"""Offsets of a clock that are tried before the best one is refined."""
+CLOCK_DIGITS = 1e-7
+"""Tolerance (s) of the offset of a clock."""
+ROUNDING = 1e-6
+"""Time (s) by which times in a log may be rounded."""
+
+Frequency = Annotated[float, Unit("Hz")]
+
+
+class Prediction(NamedTuple):
+    """Predicted numbers of a measurement."""
+
+    values: np.ndarray
+    """Numbers (numbers,) in SI; NaN if there is none."""
+    clock_offset: float = 0.0
+    """Time (s) by which the clock of the measurement is ahead."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured numbers, and their prediction."""
+
+    name: str
+    labels: Sequence[str]
+    """What was measured (numbers,), such as "n3 z"."""
+    along: np.ndarray
+    """Times (s) of the numbers (numbers,), or their places in a list."""
+    values: np.ndarray
+    """Measured numbers (numbers,) in SI."""
+    uncertainty: np.ndarray
+    """Standard deviations (numbers,) in SI."""
+
+    def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
+        """What the scenarios predict; NaN if a scenario cannot be simulated."""
+        raise NotImplementedError
+
+
+class MotionCapture(Section):
+    """Positions of nodes over time, as a motion capture records them in the world frame."""
+
+    log: str
+    """CSV file: a column time_s and columns such as "n3 x_mm". An empty cell is a gap."""
+    command: str | None = None
+    """File of the commands that the robot followed."""
+    gait: str | None = None
+    """File of the gait that the robot walked with, in place of a command."""
+    uncertainty: Length = Field(gt=0)
+    """Standard deviation of a coordinate."""
+    clock: Time = Field(default=0.0, ge=0)
+    """Largest offset of the log's clock from the command's, which is found; 0 for none."""
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Paths of the files by key."""
+        paths = {"log": self.log, "command": self.command, "gait": self.gait}
+        return {key: path for key, path in paths.items() if path is not None}
+
+    def read(self, scenario: Scenario, name: str) -> Measured:
+        """Reads the log. Raises InputError, naming file and line or column, if it is wrong."""
+        if (self.command is None) == (self.gait is None):
+            problem = f"found {'neither' if self.gait is None else 'both'}, expected one of them"
+            raise InputError(name, "command", f"{problem}, a command or a gait")
+        if self.command is not None:
+            driver: Driver = load_command(self.command, scenario)
+        else:
+            driver = load_gait(str(self.gait), scenario)
+        nodes = Robot.of(scenario).structure.node_names
+        table = _log(self.log, nodes)
+        times = table.index.to_numpy()
+        duration = scenario.simulation.duration
+        if times[-1] - times[0] > duration + ROUNDING:
+            found = f"found {times[-1] - times[0]:g} s, expected at most the duration, {duration:g}"
+            raise InputError(self.log, TIME, f"{found} s; give simulation.duration more")
+        row, column = np.nonzero(np.isfinite(table.to_numpy()))
+        values = table.to_numpy()[row, column]
+        return _MeasuredMotion(
+            name=Path(self.log).name,
+            labels=[" ".join(table.columns[place]) for place in column],
+            along=times[row],
+            values=values,
+            uncertainty=np.full(len(values), self.uncertainty),
+            driver=driver,
+            nodes=np.array([nodes.index(table.columns[place][0]) for place in column]),
+            axes=np.array(["xyz".index(table.columns[place][1]) for place in column]),
+            clock=self.clock,
+        )
+
+
+class Rest(Section):
+    """Shape, tensions and frequencies of the robot in equilibrium."""
+
+    changes: dict[str, Any] = Field(default={})
+    """Values of scenario keys in this case, such as loads."""
+    positions: dict[str, Length] = Field(default={})
+    """Coordinates by node and axis, such as "n3 z"."""
+    tensions: dict[str, Force] = Field(default={})
+    """Tensions by the names of the cables."""
+    frequencies: list[Frequency] = Field(default=[])
+    """Natural frequencies, the lowest one first."""
+    position_uncertainty: Length = Field(default=1e-3, gt=0)
+    """Standard deviation of a coordinate."""
+    tension_uncertainty: Force = Field(default=1.0, gt=0)
+    """Standard deviation of a tension."""
+    frequency_uncertainty: Frequency = Field(default=0.05, gt=0)
+    """Standard deviation of a frequency."""
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Paths of the files by key: none."""
+        return {}
+
+    def read(self, scenario: Scenario, name: str) -> Measured:
+        """Checks the names. Raises InputError for a node or cable that there is not."""
+        structure = Robot.of(scenario.with_changes(self.changes)).structure
+        places = [f"{node} {axis}" for node in structure.node_names for axis in "xyz"]
+        for key, given, known in (
+            ("positions", self.positions, places),
+            ("tensions", self.tensions, structure.cable_names),
+        ):
+            for label in given:
+                if label not in known:
+                    raise InputError(name, f"{key}.{label}", f"is unknown; {hint(label, known)}")
+        numbers = [len(self.positions), len(self.tensions), len(self.frequencies)]
+        spread = self.position_uncertainty, self.tension_uncertainty, self.frequency_uncertainty
+        values = [*self.positions.values(), *self.tensions.values(), *self.frequencies]
+        modes = [f"frequency {mode + 1}" for mode in range(len(self.frequencies))]
+        return _MeasuredRest(
+            name=name,
+            labels=[*self.positions, *self.tensions, *modes],
+            along=np.arange(float(len(values))),
+            values=np.array(values, dtype=float),
+            uncertainty=np.repeat(spread, numbers),
+            changes=self.changes,
+            places=np.array([places.index(label) for label in self.positions], dtype=int),
+            cables=np.array([structure.cable_names.index(c) for c in self.tensions], dtype=int),
+            modes=len(self.frequencies),
+        )
+
+
+Measurement = Annotated[MotionCapture | Rest, Kinds()]
+
+
+class FitFile(Section):
+    """What a fit needs beside the scenario."""
+
+    parameters: dict[str, Annotated[list[str | float], Field(min_length=2, max_length=2)]]
+    """Bounds, least and most, by scenario key."""
+    measurements: list[Measurement] = Field(min_length=1)
+
+
+def load_fit_file(path: str | Path) -> FitFile:
+    """Reads the file of a fit. Paths in it are relative to it. Raises InputError, naming file and
+    key, if it is wrong."""
+    path = Path(path)
+    tree = read_mapping(path, "file of a fit", keys=[*keys_of(FitFile)], most=MOST_BYTES)
+    given = FitFile.from_tree(tree, path)
+    placed = []
+    for measurement in given.measurements:
+        paths = {key: str(path.parent / file) for key, file in measurement.files.items()}
+        placed.append(measurement.model_copy(update=paths))
+    return given.model_copy(update={"measurements": placed})
+
+
+@dataclass(frozen=True)
+class _MeasuredMotion(Measured):
+    driver: Driver
+    nodes: np.ndarray
+    """Index of the node of each number."""
+    axes: np.ndarray
+    """Index of the axis of each number."""
+    clock: float
+
+    def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
+        finely = [
+            each.with_sections(
+                simulation=each.simulation.model_copy(update={"sample_period": SAMPLE_PERIOD})
+            )
+            for each in scenarios
+        ]
+        outcomes = simulate_many(finely, [self.driver] * len(finely), record=True)
+        return [self._prediction(outcome) for outcome in outcomes]
+
+    def _prediction(self, outcome: Outcome) -> Prediction:
+        if isinstance(outcome, SimulationFailure):
+            return Prediction(np.full(self.values.shape, np.nan))
+        trajectory = outcome.trajectory
+
+        def at(offset: float) -> np.ndarray:
+            return self._coordinates(trajectory, self.along - offset)
+
+        offset = self._best_offset(at) if self.clock else 0.0
+        return Prediction(at(offset), offset)
+
+    def _best_offset(self, at: Callable[[float], np.ndarray]) -> float:
+        """Offset (s) of the clock with the least squares of differences to the coordinates at()."""
+        from scipy.optimize import minimize_scalar
+
+        def misfit(offset: float) -> float:
+            return float(((at(offset) - self.values) ** 2).sum())
+
+        tried = np.linspace(-self.clock, self.clock, OFFSETS)
+        nearest = tried[np.argmin([misfit(each) for each in tried])]
+        step = tried[1] - tried[0]
+        bounds = max(nearest - step, -self.clock), min(nearest + step, self.clock)
+        return float(minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS}).x)
+
+    def _coordinates(self, trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
+        """Coordinates (numbers,) of a trajectory at times (numbers,), by cubic curves between its
+        samples. It stands still before and after them."""
+        samples = trajectory.time.values
+        times = np.clip(times, samples[0], samples[-1])
+        before = np.clip(np.searchsorted(samples, times) - 1, 0, len(samples) - 2)
+        step = samples[before + 1] - samples[before]
+        share = (times - samples[before]) / step
+        p, v = trajectory.p_WN.values, trajectory.v_WN.values
+        start, end = p[before, self.nodes, self.axes], p[before + 1, self.nodes, self.axes]
+        leaving = step * v[before, self.nodes, self.axes]
+        arriving = step * v[before + 1, self.nodes, self.axes]
+        bend = (1.0 - share) * (leaving - (end - start)) - share * (arriving - (end - start))
+        coordinates: np.ndarray = start + share * (end - start) + share * (1.0 - share) * bend
+        return coordinates
+
+
+@dataclass(frozen=True)
+class _MeasuredRest(Measured):
+    changes: dict[str, Any]
+    places: np.ndarray
+    """Indices of the measured coordinates among all coordinates of the nodes."""
+    cables: np.ndarray
+    """Indices of the cables whose tension was measured."""
+    modes: int
+    """Number of measured frequencies."""
+
+    def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
+        return [self._prediction(scenario) for scenario in scenarios]
+
+    def _prediction(self, scenario: Scenario) -> Prediction:
+        try:
+            robot = Robot.of(scenario.with_changes(self.changes))
+            rest = robot.equilibrium
+        except InputError:  # there may be no equilibrium with such values
+            return Prediction(np.full(self.values.shape, np.nan))
+        p_WN = node_positions(robot.structure, rest.state).ravel()[self.places]
+        forces, frequencies = np.zeros(0), np.zeros(0)
+        if self.cables.size:
+            unactuated = Unactuated.of(robot.model)
+            force_at_rest(unactuated, rest.state)
+            forces = unactuated.forces.cable_forces[self.cables, TENSION]
+        if self.modes:
+            frequencies = study_equilibrium(robot).frequencies[: self.modes]
+            missing = self.modes - len(frequencies)
+            frequencies = np.append(frequencies, np.full(missing, np.nan))
+        return Prediction(np.concatenate([p_WN, forces, frequencies]))
+
+
+def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
+    """Coordinates in m of a log by time in s, NaN in gaps. The columns are pairs of node and axis.
+    Raises InputError, naming line or column, if the log is wrong."""
+    cells = table_cells(read_text(path, "log"), path)
+    if TIME not in cells:
+        raise InputError(path, TIME, "is missing, expected a column with the time in s")
+    times = column_numbers(cells.pop(TIME), path)
+    for row in np.flatnonzero(np.diff(times) <= 0.0):
+        found = f"found {times[row + 1]:g} after {times[row]:g}"
+        raise InputError(path, f"line {row + 3}, {TIME}", f"{found}, expected ascending times")
+    columns = {}
+    for name in cells:
+        match = re.fullmatch(r"(.+) ([xyz])_(\w+)", name)
+        if match is None:
+            expected = f"expected node, axis and unit, such as '{nodes[0]} x_mm'"
+            raise InputError(path, name, f"is no column of a log; {expected}")
+        node, axis, unit = match.groups()
+        if node not in nodes:
+            raise InputError(path, name, f"found unknown node '{node}'; {hint(node, nodes)}")
+        try:
+            scale = quantity_to_si(f"1 {unit}", "m")
+        except ValueError as error:
+            raise InputError(path, name, str(error)) from error
+        columns[node, axis] = scale * column_numbers(cells[name], path, gaps=True)
+    table = pandas.DataFrame(columns, index=times)
+    if not np.isfinite(table.to_numpy(dtype=float)).any():
+        raise InputError(path, "", "has no positions, expected one at least")
+    return table

@@ -1,0 +1,60 @@
+"""Folder of a fit: the page README.md, tables, figure, and the scenario with the fitted values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tetra_drake.analysis.fit import Fit, summary_of
+from tetra_drake.figures.residuals import residuals
+from tetra_drake.figures.style import save_findings
+from tetra_drake.files import write_whole
+from tetra_drake.formatting import Table, fixed, rounded
+from tetra_drake.scenario.load import SCENARIO, save_scenario
+
+PAGE = "README.md"
+
+
+def save_fit(fit: Fit, folder: Path) -> list[str]:
+    """Writes the scenario with the fitted values, tables, the figure of the residuals and a page to
+    a folder. Returns the names of the files. Raises InputError if one cannot be written."""
+    save_scenario(folder, fit.scenario)
+    tables = {
+        "parameters": fit.parameters.reset_index(),
+        "correlations": fit.correlations.reset_index(names="key"),
+        "residuals": fit.residuals,
+    }
+    figure, summary = residuals(fit), summary_of(fit)
+    written = save_findings(figure, folder, "residuals.figure", tables=tables, summary=summary)
+    write_whole(folder / PAGE, _page(fit))
+    return [PAGE, SCENARIO, *written]
+
+
+def _page(fit: Fit) -> str:
+    notes = [f"- {warning}" for warning in fit.warnings]
+    notes += [
+        f"- the clock of {name} is ahead by {1e3 * offset:.2f} ms"
+        for name, offset in fit.clock_offsets.items()
+        if offset
+    ]
+    keys = [str(key) for key in fit.correlations]
+    cells = fit.correlations.to_numpy().tolist()
+    correlations = Table(
+        ["correlation", *keys],
+        [[key, *(fixed(each) for each in row)] for key, row in zip(keys, cells, strict=True)],
+    )
+    return "\n\n".join(
+        [
+            f"# Fit of {fit.scenario.name}",
+            f"{len(fit.residuals)} measured numbers, {fit.evaluations} evaluations, "
+            f"{fit.wall_time:.0f} s. Sum of squared residuals per degree of freedom, in units of "
+            f"the stated uncertainty: {rounded(fit.start_misfit)} with the start values, "
+            f"{rounded(fit.misfit)} fitted; 1 is a model that is right. Intervals are of 95 %, "
+            "from the derivatives at the fitted values. Where the misfit exceeds 1, they are wider "
+            "by its root.",
+            fit.table.markdown(),
+            *(["\n".join(notes)] if notes else []),
+            "![residuals](residuals.figure.svg)",
+            correlations.markdown(),
+            f"[{SCENARIO}]({SCENARIO}) has the fitted values.\n",
+        ]
+    )
