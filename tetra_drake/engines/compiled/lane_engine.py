@@ -50,7 +50,8 @@ class LaneEngine:
         self._parts = Packed((self._constants, self._lanes, self._log, first.live))
         self._advance = machine_code(loop.advance, self._parts, 0)
         self._in_lane: list[Prepared | None] = [None] * width
-        self._wall_times = [0.0] * width
+        self._wall_times = np.zeros(width)
+        self._status = self._lanes.clock.array[loop.STATUS]
         for lane in range(width):  # idle lanes compute, too, and need valid numbers
             self.load(lane, first)
             self.stop(lane)
@@ -99,7 +100,7 @@ class LaneEngine:
         log.drives[lane, 0] = start.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
-        clock[loop.STATUS, lane] = loop.RUNNING
+        self._status[lane] = loop.RUNNING
         clock[loop.PLANNED, lane] = min(engine.look_ahead, engine.max_step)
         clock[loop.MARK, lane], clock[loop.DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
@@ -107,20 +108,16 @@ class LaneEngine:
     def stop(self, lane: int) -> float:
         """Removes the gait from a lane, finished or not. Returns its wall time in s."""
         self._in_lane[lane] = None
-        self._lanes.clock.array[loop.STATUS, lane] = loop.IDLE
-        return self._wall_times[lane]
+        self._status[lane] = loop.IDLE
+        return float(self._wall_times[lane])
 
     def advance(self, body_steps: int) -> list[int]:
         """Simulates until a gait ends, or for about `body_steps` iterations times bodies. Returns
         the lanes with finished gaits; result() empties a lane. Other Python threads run
         meanwhile."""
-        started = time.perf_counter()
-        self._advance(self._parts, max(1, body_steps // (loop.ROUND * self._bodies)))
+        self._simulate(body_steps)
         busy = [lane for lane, prepared in enumerate(self._in_lane) if prepared is not None]
-        share = (time.perf_counter() - started) / max(len(busy), 1)
-        for lane in busy:
-            self._wall_times[lane] += share
-        return [lane for lane in busy if self._lanes.clock.array[loop.STATUS, lane] != loop.RUNNING]
+        return [lane for lane in busy if self._status[lane] != loop.RUNNING]
 
     @functools.cached_property
     def _hold(self) -> Callable[..., None]:
@@ -140,8 +137,15 @@ class LaneEngine:
 
     def run(self) -> None:
         """Simulates until all lanes have reached their last mark or failed."""
-        while (self._lanes.clock.array[loop.STATUS] == loop.RUNNING).any():
-            self.advance(_BODY_STEPS)
+        while (self._status == loop.RUNNING).any():
+            self._simulate(_BODY_STEPS)
+
+    def _simulate(self, body_steps: int) -> None:
+        """Simulates until a gait ends, or for about `body_steps` iterations times bodies."""
+        started = time.perf_counter()
+        self._advance(self._parts, max(1, body_steps // (loop.ROUND * self._bodies)))
+        busy = len(self._in_lane) - self._in_lane.count(None)
+        self._wall_times += (time.perf_counter() - started) / max(busy, 1)
 
     def read(self, readings: Packed[Readings]) -> None:
         """Writes the readings of the first lanes, a row for each; see control_periods.read()."""
@@ -150,16 +154,16 @@ class LaneEngine:
     @property
     def failed(self) -> np.ndarray:
         """True for each lane whose simulation has failed."""
-        failed: np.ndarray = self._lanes.clock.array[loop.STATUS] > loop.DONE
+        failed: np.ndarray = self._status > loop.DONE
         return failed
 
     def failure(self, lane: int) -> SimulationFailure | None:
         """The failure of the simulation in a lane; None if it goes on or is finished."""
-        prepared, clock = self._in_lane[lane], self._lanes.clock.array[:, lane]
-        status = int(clock[loop.STATUS])
+        prepared, status = self._in_lane[lane], int(self._status[lane])
         if prepared is None or status in (loop.RUNNING, loop.DONE):
             return None
-        return _failure(status, time=float(clock[loop.TIME]), scenario=prepared.robot.scenario)
+        ended = float(self._lanes.clock.array[loop.TIME, lane])
+        return _failure(status, time=ended, scenario=prepared.robot.scenario)
 
     def result(self, lane: int) -> SimulationResult:
         """The result of the finished simulation in a lane; the lane becomes idle. Raises Diverged
