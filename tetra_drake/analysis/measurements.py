@@ -78,7 +78,12 @@ class Measured:
 
 
 class MotionCapture(Section):
-    """Positions of nodes over time, as a motion capture records them in the world frame."""
+    """Positions of nodes over time, as a motion capture records them in the world frame.
+
+        >>> td.MotionCapture(log="lab/log.csv", command="lab/command.csv", uncertainty=2e-4)
+
+    Numbers are SI.
+    """
 
     log: str
     """CSV file: a column time_s and columns such as "n3 x_mm". An empty cell is a gap."""
@@ -129,7 +134,13 @@ class MotionCapture(Section):
 
 
 class Rest(Section):
-    """Shape, tensions and frequencies of the robot in equilibrium."""
+    """Shape, tensions and frequencies of the robot in equilibrium.
+
+        >>> pulled = {"robot.loads.n3": ["0 N", "0 N", "-0.5 N"]}
+        >>> td.Rest(changes=pulled, positions={"n3 z": 0.17}, position_uncertainty=5e-4)
+
+    Numbers are SI; changes are as in Scenario.with_changes().
+    """
 
     changes: dict[str, Any] = Field(default={})
     """Values of scenario keys in this case, such as loads."""

@@ -68,20 +68,23 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
     path = given_path(path, "load_command", "path")
     robot, text = Robot.of(scenario), read_text(path, "command file")
     wanted = [TIME, *command_columns(robot)]
-    cells = table_cells(text, path)
-    _check_columns(cells, wanted, path)
+    cells = table_cells(text, path, wanted=wanted)
     table = np.column_stack([column_numbers(cells[name], path) for name in wanted])
     period = _period(table[:, 0], scenario.cpg.listing_step, path)
     return Command(path.name, period, scenario.actuation.command_unit * table[:, 1:])
 
 
-def table_cells(text: str, path: str | Path) -> pandas.DataFrame:
+def table_cells(
+    text: str, path: str | Path, *, wanted: Sequence[str] | None = None
+) -> pandas.DataFrame:
     """Cells of a CSV table as texts, so that messages can show them. Raises InputError if it is no
-    table, or a column is given twice."""
+    table, a column is given twice, or the columns are not the `wanted` ones."""
     try:
         heading, *rows = csv.reader(io.StringIO(text.rstrip()), strict=True)
     except (csv.Error, ValueError) as error:  # an empty file, too
         raise InputError(path, "", "is no table with commas between cells") from error
+    if wanted is not None:
+        _check_columns(heading, wanted, path)
     for line, row in enumerate(rows, start=2):
         if len(row) != len(heading):
             problem = f"found {len(row)} cells, expected {len(heading)}"
@@ -103,9 +106,8 @@ def column_numbers(cells: pandas.Series, path: str | Path, *, gaps: bool = False
     return numbers
 
 
-def _check_columns(cells: pandas.DataFrame, wanted: Sequence[str], path: str | Path) -> None:
+def _check_columns(heading: Sequence[str], wanted: Sequence[str], path: str | Path) -> None:
     """Raises InputError unless a table has the wanted columns and no others."""
-    heading = list(cells)
     if set(heading).isdisjoint(wanted):  # the file may be any, so nothing of it is shown
         raise InputError(path, "", f"has no column of a command; {hint('', wanted)}")
     for name in [*heading, *wanted]:
