@@ -113,8 +113,8 @@ def _check_columns(heading: Sequence[str], wanted: Sequence[str], path: str | Pa
     for name in [*heading, *wanted]:
         if name not in wanted:
             raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")
-        if name not in heading:
-            raise InputError(path, name, "is missing")
+        if (count := heading.count(name)) != 1:
+            raise InputError(path, name, "is missing" if count == 0 else "is given twice")
 
 
 def _period(times: np.ndarray, least: float, source: str | Path) -> float:
