@@ -41,7 +41,7 @@ from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.metrics import pose_fitness, poses_of
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import AMPLITUDE, Robot
-from tetra_drake.scenario.load import GivenScenario, load_scenario
+from tetra_drake.scenario.load import GivenScenario
 from tetra_drake.scenario.scenario import Scenario
 
 Info = dict[str, Any]
@@ -55,15 +55,13 @@ class _Episodes:
 
     def __init__(
         self,
-        scenario: GivenScenario | None,
+        scenario: GivenScenario,
         *,
         count: int,
         control_period: float,
         grouped: bool,
         workers: int | None,
     ) -> None:
-        if scenario is None:
-            scenario = load_scenario("coulomb").with_changes({"engine": "!Compiled"})
         self.simulation = Simulation(
             scenario, count=count, control_period=control_period, workers=workers
         )
@@ -149,14 +147,13 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def __init__(
         self,
-        scenario: GivenScenario | None = None,
+        scenario: GivenScenario = "coulomb",
         *,
         control_period: float = CONTROL_PERIOD,
         grouped: bool = False,
     ) -> None:
         """Args:
-            scenario: a scenario, its name or file, or a run; `coulomb` on the compiled engine by
-                default.
+            scenario: a scenario, its name or file, or a run.
             control_period: time (s) between actions.
             grouped: an action for each oscillator, otherwise for each driven cable.
 
@@ -193,7 +190,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def __init__(
         self,
         num_envs: int = 1,
-        scenario: GivenScenario | None = None,
+        scenario: GivenScenario = "coulomb",
         *,
         control_period: float = CONTROL_PERIOD,
         grouped: bool = False,

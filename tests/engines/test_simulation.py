@@ -151,6 +151,8 @@ def test_wrong_input_is_told_in_a_line(short, refused):
     two = Simulation(short, count=2, workers=1)
     with refused("Simulation", "actions", "(2, 7)", "(2, 8)"):
         two.step(np.zeros((2, 7)))
+    with refused("Simulation", "actions", "'fast'"):
+        two.step("fast")
     actions = np.zeros((2, 8))
     actions[1, 4] = math.nan
     name = two.action_names[4]

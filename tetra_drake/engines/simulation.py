@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, Viewer
-from tetra_drake.engines.interface import engine_of
+from tetra_drake.engines.interface import check_can_be_watched, engine_of
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
@@ -82,7 +82,10 @@ class Simulation:
         self.robot: Robot = controlled_robot(scenario)
         """The robot without disturbances. Its structure has the names of nodes and cables."""
         workers = available_cores() if workers is None else workers
-        _check_positive(count=count, workers=workers)
+        _check_whole("count", count, least=1)
+        _check_whole("workers", workers, least=1)
+        if viewer is not None:
+            check_can_be_watched(scenario)
         self.action_names, self._shared = action_groups(scenario, self.robot, grouped=grouped)
         """Names of the actions: driven cables or oscillators."""
         self._listing_steps = _listing_steps(control_period, scenario.cpg.listing_step)
@@ -135,10 +138,10 @@ class Simulation:
         for place in self._places(indices):
             scenario = self.scenario
             if seed is not None and scenario.disturbances is not None:
-                _check_seed(seed)
+                _check_whole("seed", seed, least=0)
                 scenario = disturbed(scenario, draw_disturbances(scenario, (seed, place)))
-            undisturbed = scenario is self.scenario
-            self._put(place, self.robot if undisturbed else controlled_robot(scenario))
+            same = scenario is self.scenario
+            self._put(place, self.robot if same else controlled_robot(scenario))
         return self.state
 
     def step(self, actions: npt.ArrayLike) -> Readings:
@@ -205,7 +208,11 @@ class Simulation:
 
     def _to_signals(self, actions: npt.ArrayLike, goes: np.ndarray) -> np.ndarray:
         """Signals (N, m) in N of actions. Actions of robots that do not go may be anything."""
-        given = np.asarray(actions, dtype=float)
+        try:
+            given = np.asarray(actions, dtype=float)
+        except (TypeError, ValueError) as error:
+            problem = f"found {actions!r:.60}, expected numbers of shape {self.rest.shape}"
+            raise InputError("Simulation", "actions", problem) from error
         if self.count == 1 and given.ndim == 1:
             given = given[np.newaxis]
         if given.shape != self.rest.shape:
@@ -297,15 +304,8 @@ def _listing_steps(period: float, step: float) -> int:
     return steps
 
 
-def _check_seed(seed: object) -> None:
-    """Raises InputError unless a seed is a whole number, 0 or more."""
-    if not isinstance(seed, numbers.Integral) or int(seed) < 0:
-        problem = f"found {seed!r}, expected an integer, 0 or more"
-        raise InputError("Simulation", "seed", problem)
-
-
-def _check_positive(**counts: object) -> None:
-    """Raises InputError unless counts are whole numbers, 1 or more."""
-    for key, count in counts.items():
-        if not isinstance(count, numbers.Integral) or int(count) < 1:
-            raise InputError("Simulation", key, f"found {count!r}, expected 1 or more")
+def _check_whole(key: str, number: object, *, least: int) -> None:
+    """Raises InputError unless a number is whole, `least` or more."""
+    if not isinstance(number, numbers.Integral) or int(number) < least:
+        problem = f"found {number!r}, expected an integer, {least} or more"
+        raise InputError("Simulation", key, problem)
