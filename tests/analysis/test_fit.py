@@ -106,6 +106,21 @@ def test_a_tension_and_a_frequency_give_mass_and_stiffness():
     assert found.parameters["value"].to_list() == pytest.approx([0.3, stiffness], rel=1e-4)
 
 
+def test_predictions_that_are_not_smooth_have_no_intervals(monkeypatch):
+    cases, predict = pulled_down(210.0, 0.39, np.zeros(4)), measurements._MeasuredRest.predict
+    assert fit_values(hung(), cases, BOUNDS).parameters["low"].notna().all()
+
+    def rough(self, scenarios):
+        waves = [math.sin(1e3 * each.robot.cables["line"].stiffness) for each in scenarios]
+        pairs = zip(predict(self, scenarios), waves, strict=True)
+        return [each._replace(values=each.values + 2e-4 * wave) for each, wave in pairs]
+
+    monkeypatch.setattr(measurements._MeasuredRest, "predict", rough)
+    found = fit_values(hung(), cases, BOUNDS)
+    assert found.parameters["determined"].all() and found.parameters["low"].isna().all()
+    assert any(STIFFNESS in warning for warning in found.warnings)
+
+
 class Stopped(Exception):
     pass
 

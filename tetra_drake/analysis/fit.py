@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 STEP = 1e-3
 """Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and
 the tolerance of the simulation show; with more, the curvature."""
+LONGER, ROUGH = 10.0, 0.2
+"""Factor of a longer step; and difference of the derivatives with both steps, as a share of the
+derivative, from which a prediction is rough. Contacts that come and go make it so in long motion:
+the search may end in any of many minima, and intervals from derivatives mean nothing."""
 TOLERANCE = 1e-6
 """Relative change of parameters at which the search ends."""
 NEGLIGIBLE = 0.01
@@ -72,8 +76,8 @@ class Fit:
     scenario: Scenario = field(repr=False)
     """The scenario with the fitted values."""
     parameters: pandas.DataFrame
-    """A row per key in SI: value, its 95 % interval low and high, start, bounds least and most,
-    unit, and whether the data determine it."""
+    """A row per key in SI: value, its 95 % interval low and high (NaN if unknown), start, bounds
+    least and most, unit, and whether the data determine it."""
     correlations: pandas.DataFrame = field(repr=False)
     """Correlations of the parameters, by keys."""
     residuals: pandas.DataFrame = field(repr=False)
@@ -273,14 +277,14 @@ class _Problem:
             self._say(f"{self.evaluations} evaluations, misfit {rounded(misfit)}")
         return residuals
 
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
+    def jacobian(self, x: np.ndarray, step: float = STEP) -> np.ndarray:
         """Derivatives (numbers, n) of the residuals by central differences; one-sided where a
         neighbour cannot be simulated. Raises InputError where none can."""
-        self._evaluate([x, *self._neighbours(x)])
+        self._evaluate([x, *self._neighbours(x, step)])
         here, columns = self._residuals_at(x), []
         for place, parameter in enumerate(self.parameters):
-            points = [x, *self._neighbours(x)[2 * place : 2 * place + 2]]
-            sides = [(point[place], self._residuals_at(point)) for point in points[1:]]
+            points = self._neighbours(x, step)[2 * place : 2 * place + 2]
+            sides = [(point[place], self._residuals_at(point)) for point in points]
             sides = [side for side in sides if np.isfinite(side[1]).all()]
             if len(sides) == 1:
                 sides.append((x[place], here))
@@ -291,6 +295,13 @@ class _Problem:
             columns.append((high - low) / (other - one))
         return np.column_stack(columns)
 
+    def roughness(self, x: np.ndarray) -> np.ndarray:
+        """Differences (n,) of the derivatives with a longer step, as shares of the derivatives."""
+        derivatives = self.jacobian(x)
+        difference = np.linalg.norm(self.jacobian(x, LONGER * STEP) - derivatives, axis=0)
+        size = np.linalg.norm(derivatives, axis=0)
+        return difference / np.where(size > 0.0, size, 1.0)
+
     def misfit(self, residuals: np.ndarray) -> float:
         """Sum of squares per degree of freedom."""
         return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
@@ -299,13 +310,13 @@ class _Problem:
         """Predictions for each measurement at a point that was evaluated."""
         return self._known[self._name(x)]
 
-    def _neighbours(self, x: np.ndarray) -> list[np.ndarray]:
+    def _neighbours(self, x: np.ndarray, step: float = STEP) -> list[np.ndarray]:
         """Two neighbours of a point for each parameter, within the bounds."""
         neighbours = []
         for place in range(x.size):
             for sign in (-1.0, 1.0):
                 moved = x.copy()
-                moved[place] += sign * STEP
+                moved[place] += sign * step
                 neighbours.append(np.clip(moved, *self.bounds))
         return neighbours
 
@@ -364,11 +375,13 @@ def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: floa
     parameters = problem.parameters
     keys = [parameter.key for parameter in parameters]
     values, determined = x * problem.scale, np.isfinite(half)
+    is_rough = determined & (problem.roughness(x) > ROUGH)
+    known = determined & ~is_rough.any()
     table = pandas.DataFrame(
         {
             "value": values,
-            "low": np.where(determined, values - half, np.nan),
-            "high": np.where(determined, values + half, np.nan),
+            "low": np.where(known, values - half, np.nan),
+            "high": np.where(known, values + half, np.nan),
             "start": [parameter.start for parameter in parameters],
             "least": [parameter.least for parameter in parameters],
             "most": [parameter.most for parameter in parameters],
@@ -401,7 +414,7 @@ def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: floa
         },
         misfit=misfit,
         start_misfit=problem.misfit(first),
-        warnings=_warnings(table, correlations),
+        warnings=_warnings(table, correlations) + _warnings_of_roughness(table[is_rough]),
         evaluations=problem.evaluations,
         wall_time=wall_time,
     )
@@ -443,6 +456,14 @@ def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[s
         if others:
             warnings.append(f"the data hardly tell {one} from {listed(others)}")
     return warnings
+
+
+def _warnings_of_roughness(table: pandas.DataFrame) -> list[str]:
+    if not len(table):
+        return []
+    problem = f"the predictions are not smooth in {listed(list(table.index))}"
+    advice = "a shorter motion, or a larger uncertainty, may help"
+    return [f"{problem}: the values may be far off, and have no intervals; {advice}"]
 
 
 def summary_of(fit: Fit) -> dict[str, Any]:
