@@ -101,7 +101,7 @@ class Fit:
         lines = [
             f"fit of {len(self.parameters)} values to {len(self.residuals)} numbers in "
             f"{self.evaluations} evaluations, {self.wall_time:.1f} s; misfit "
-            f"{rounded(self.start_misfit)} at the start, {rounded(self.misfit)} fitted",
+            f"{self.start_misfit:.3g} at the start, {self.misfit:.3g} fitted",
             self.table.text(),
         ]
         lines += [
@@ -274,7 +274,7 @@ class _Problem:
         residuals = self._residuals_at(x)
         if self._say and self.evaluations > before:
             misfit = self.misfit(residuals)
-            self._say(f"{self.evaluations} evaluations, misfit {rounded(misfit)}")
+            self._say(f"{self.evaluations} evaluations, misfit {misfit:.3g}")
         return residuals
 
     def jacobian(self, x: np.ndarray, step: float = STEP) -> np.ndarray:

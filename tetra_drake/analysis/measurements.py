@@ -180,7 +180,7 @@ class Rest(Section):
         return _MeasuredRest(
             name=name,
             labels=[*self.positions, *self.tensions, *modes],
-            along=np.arange(float(len(values))),
+            along=1.0 + np.arange(len(values)),
             values=np.array(values, dtype=float),
             uncertainty=np.repeat(spread, numbers),
             changes=self.changes,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from matplotlib.ticker import MaxNLocator, StrMethodFormatter
+
 from tetra_drake.figures.style import (
     Drawn,
     Page,
@@ -17,6 +19,9 @@ from tetra_drake.figures.style import (
 
 if TYPE_CHECKING:
     from tetra_drake.analysis.fit import Fit
+
+MANY = 100
+"""Numbers of a measurement from which their points are small."""
 
 
 @figure_function
@@ -32,16 +37,20 @@ def residuals(fit: Fit, *, figure: Page | None = None) -> Drawn:
     styles = {}
     for panel, (name, rows) in zip(panels, groups, strict=True):
         panel.axhspan(-1.96, 1.96, color="0.9", linewidth=0.0)
-        for series, (column, label) in enumerate((("start", "start"), ("fitted", "fitted"))):
+        size = 3.0 if len(rows) > MANY else 9.0
+        for series, column in enumerate(("start", "fitted")):
             color = line_style(1 - series)["color"]
-            style = {"color": color, "marker": ".", "linestyle": "none", "markersize": 3.0}
+            style = {"color": color, "marker": ".", "linestyle": "none", "markersize": size}
             difference = (rows[column] - rows["measured"]) / rows["uncertainty"]
             panel.plot(rows["along"], difference, **style)
-            styles[label] = style
+            styles[column] = style
         name_panel(panel, str(name))
         panel.set(ylabel="residual / std. dev.", yscale="symlog")
+        panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         is_motion = (rows["along"] % 1.0).any()
         panel.set_xlabel("time of the log (s)" if is_motion else "number")
+        if not is_motion:
+            panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     legend_below(page, styles)
     set_title(page, "Predictions minus measurements")
     return page

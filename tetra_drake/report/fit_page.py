@@ -8,7 +8,7 @@ from tetra_drake.analysis.fit import Fit, summary_of
 from tetra_drake.figures.residuals import residuals
 from tetra_drake.figures.style import save_findings
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import Table, fixed, rounded
+from tetra_drake.formatting import Table, fixed
 from tetra_drake.scenario.load import SCENARIO, save_scenario
 
 PAGE = "README.md"
@@ -47,8 +47,8 @@ def _page(fit: Fit) -> str:
             f"# Fit of {fit.scenario.name}",
             f"{len(fit.residuals)} measured numbers, {fit.evaluations} evaluations, "
             f"{fit.wall_time:.0f} s. Sum of squared residuals per degree of freedom, in units of "
-            f"the stated uncertainty: {rounded(fit.start_misfit)} with the start values, "
-            f"{rounded(fit.misfit)} fitted; 1 is a model that is right. Intervals are of 95 %, "
+            f"the stated uncertainty: {fit.start_misfit:.3g} with the start values, "
+            f"{fit.misfit:.3g} fitted; 1 is a model that is right. Intervals are of 95 %, "
             "from the derivatives at the fitted values. Where the misfit exceeds 1, they are wider "
             "by its root.",
             fit.table.markdown(),
