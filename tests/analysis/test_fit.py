@@ -59,6 +59,7 @@ def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_str
     assert (fitted.stiffness, fitted.free_length) == tuple(found.parameters["value"])
 
 
+@pytest.mark.slow
 def test_hidden_constants_are_within_their_intervals_in_nine_of_ten_noise_draws():
     """Of 100 intervals of 95 % each, fewer than 90 hold with a probability of 1 %; the draws are
     fixed."""
