@@ -79,7 +79,7 @@ class Structure(Blueprint):
             cables[name] = [law[name] for law in self.cable_laws]
         return cables
 
-    @property
+    @functools.cached_property
     def strut_table(self) -> Struts:
         """The struts in the form of the kernels."""
         node_a, node_b = self.struts.T
