@@ -11,5 +11,10 @@ def rigid_motions(p: np.ndarray) -> np.ndarray:
     The six motions are rotations about x, y and z through the origin with 1 rad/s, then
     translations along x, y and z with 1 m/s.
     """
-    turns = np.cross(np.eye(3), p[:, np.newaxis]).transpose(0, 2, 1)
-    return np.concatenate([turns, np.broadcast_to(np.eye(3), turns.shape)], axis=2)
+    motions = np.zeros((len(p), 3, 6))
+    x, y, z = p.T
+    motions[:, 1, 0], motions[:, 2, 0] = -z, y
+    motions[:, 0, 1], motions[:, 2, 1] = z, -x
+    motions[:, 0, 2], motions[:, 1, 2] = -y, x
+    motions[:, :, 3:] = np.eye(3)
+    return motions

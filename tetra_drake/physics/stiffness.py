@@ -137,11 +137,12 @@ def _stiffness_of_touch(
 
 def _add_springs(springs: Springs, blocks: np.ndarray) -> None:
     """Adds the stiffness of springs to the blocks (bodies + 1, bodies + 1, 6, 6)."""
-    ends = (springs.body_a, springs.motion_a), (springs.body_b, springs.motion_b)
-    for body, motion in ends:
-        for other, other_motion in ends:
-            added = np.einsum("sia,sij,sjb->sab", motion, springs.stiffness, other_motion)
-            np.add.at(blocks, (body, other), added)
+    motion = np.concatenate([springs.motion_a, springs.motion_b], axis=2)
+    added = motion.transpose(0, 2, 1) @ springs.stiffness @ motion
+    ends = np.stack([springs.body_a, springs.body_b], axis=1)
+    for i, j in np.ndindex(2, 2):
+        block = added[:, 6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
+        np.add.at(blocks, (ends[:, i], ends[:, j]), block)
 
 
 def _add_turning(nodes: np.ndarray, carriers: np.ndarray, blocks: np.ndarray) -> None:
