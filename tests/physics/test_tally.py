@@ -1,4 +1,4 @@
-"""The tally of a walk: work, signals, lifted bodies and tension of hand-made motions."""
+"""The tally of a walk: work, signals, lifted bodies, tension and rolling of hand-made motions."""
 
 from types import SimpleNamespace
 
@@ -7,6 +7,7 @@ import pytest
 
 from tetra_drake.physics.actuator import DIRECT, DRIVE, DRIVE_COLUMNS, LIMITED, TENSION_MOTOR, WINCH
 from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
 from tetra_drake.physics.tally import Tally, observe
 from tetra_drake.simd.allocation import allocate
 
@@ -18,17 +19,32 @@ NO_DRIVES, NO_STATE = np.zeros((0, DRIVE_COLUMNS)), np.zeros(0)
 CARRIERS = np.array([0, 0, 1])
 """Two contacts of the first body and one of the second."""
 
+NODES = np.zeros((3, NODE_COLUMNS))
+"""Two nodes at rest, and a fixed node."""
+NODES[:, P_WN] = [-1.0, 1.0, 9.0]
+
 
 def tallied(
-    times, *, lengths, signals, tensions=None, loads=None, begins=0.0, kind=DIRECT, drives=None
+    times,
+    *,
+    lengths,
+    signals,
+    tensions=None,
+    loads=None,
+    begins=0.0,
+    kind=DIRECT,
+    drives=None,
+    nodes=None,
 ) -> Tally:
     """The tally of the motion of both cables' length (k,), their tension and the contacts' loads
-    (k, 3) at times (k,); `drives` (k, drives, DRIVE_COLUMNS) are those of actuators of a kind."""
+    (k, 3) at times (k,); `drives` (k, drives, DRIVE_COLUMNS) are those of actuators of a kind. The
+    last of the `nodes` (k, nodes, NODE_COLUMNS) is fixed."""
     tally = allocate(Tally, {"signals": 1, "cables": 2, "bodies": 2})
     tally.begins[0] = begins
     cable_forces, ground_forces = np.zeros((2, CABLE_FORCE_COLUMNS)), np.zeros((3, 3))
     ground, actuator = SimpleNamespace(carriers=CARRIERS), SimpleNamespace(kind=kind)
-    robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator)
+    first_node = np.array([0, (NODES if nodes is None else nodes[0]).shape[0] - 1])
+    robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator, first_node=first_node)
     for k, time in enumerate(times):
         cable_forces[:, LENGTH] = lengths[k]
         cable_forces[:, TENSION] = 1.0 if tensions is None else tensions[k]
@@ -38,7 +54,10 @@ def tallied(
             signal = np.array([signals[k]])
             driven = NO_DRIVES if drives is None else drives[k]
             forces = SimpleNamespace(
-                drives=driven, cable_forces=cable_forces, ground_forces=ground_forces
+                nodes=NODES if nodes is None else nodes[k],
+                drives=driven,
+                cable_forces=cable_forces,
+                ground_forces=ground_forces,
             )
             observe(tally, robot, time, NO_STATE, signal, forces)
     return tally
@@ -118,3 +137,77 @@ def test_a_peak_of_speed_counts_in_either_direction():
     assert effort_of(tally)["peaks"] == pytest.approx([9.0, 0.2, 0.4])
     paid_out = tallied(lengths=np.array([0.0, 0.1, 0.2, 0.9]), **EFFORT)
     assert effort_of(paid_out)["peaks"] == pytest.approx([9.0, 0.7, 0.0])
+
+
+TIMES = np.linspace(0.0, 2.0, 401)
+
+SHAPE = np.array([[0.3, 0.1, 0.0], [-0.2, 0.4, 0.1], [0.0, -0.5, 0.2], [0.1, 0.2, -0.6]])
+"""Four nodes without symmetry."""
+
+
+def turned(points, angle):
+    """Points (..., 3) turned about y by angles (...)."""
+    (x, y, z), c, s = np.moveaxis(points, -1, 0), np.cos(angle), np.sin(angle)
+    return np.stack([c * x + s * z, y + 0.0 * c, c * z - s * x], axis=-1)
+
+
+def rolled(position, *, begins=0.0) -> float:
+    """Angle by which nodes at the positions (nodes, 3) of a time have rolled after 2 s, beside a
+    fixed node."""
+    nodes, step = np.zeros((TIMES.size, len(position(0.0)) + 1, NODE_COLUMNS)), 1e-5
+    nodes[:, -1, P_WN] = 9.0
+    for k, time in enumerate(TIMES):
+        rates = (position(time + step) - position(time - step)) / (2.0 * step)
+        nodes[k, :-1, P_WN : P_WN + 3], nodes[k, :-1, V_WN : V_WN + 3] = position(time), rates
+    still = {"lengths": np.ones(TIMES.size), "signals": np.ones(TIMES.size)}
+    return tallied(TIMES, nodes=nodes, begins=begins, **still).rolled.angle[0]
+
+
+def test_a_rigid_body_that_rolls_on_has_rolled_by_its_angle():
+    # Like a wheel of radius 0.4 m: whole turns count, and those before the steady stretch.
+    for rate in (1.5, 9.0, -9.0):
+
+        def wheel(time, rate=rate):
+            return turned(SHAPE, rate * time) + np.array([5.0 + 0.4 * rate * time, -7.0, 0.4])
+
+        assert rolled(wheel, begins=1.0) == pytest.approx(2.0 * rate, rel=1e-7)
+    # At a rate that changes: 3 t² rad, by the trapezoidal rule.
+    assert rolled(lambda time: turned(SHAPE, 3.0 * time**2)) == pytest.approx(12.0, rel=1e-7)
+
+
+def test_what_turns_about_another_axis_has_not_rolled():
+    def spun(time):
+        return turned(SHAPE[:, [1, 2, 0]], 4.0 * time)[:, [2, 0, 1]]  # z is where y was
+
+    assert np.abs(spun(1.0)[:, 2] - SHAPE[:, 2]).max() < 1e-12 < np.ptp(spun(1.0) - SHAPE)
+    assert rolled(spun) == pytest.approx(0.0, abs=1e-7)
+    line = np.outer([-1.0, 0.0, 2.0], [0.0, 0.3, 0.0])
+    assert rolled(lambda time: line + np.array([time, 0.0, 0.0])) == 0.0
+
+
+def test_a_line_of_nodes_rolls_across_its_direction():
+    line = np.outer([-1.0, 0.0, 2.0], [0.3, 0.0, 0.1])
+    assert rolled(lambda time: turned(line, 2.5 * time)) == pytest.approx(5.0, rel=1e-6)
+
+
+def test_a_change_of_shape_is_no_rotation():
+    # The nodes stretch and shear without rotation: v = A r with a symmetric A.
+    stretch = np.array([[0.3, 0.2, -0.4], [0.2, -0.1, 0.1], [-0.4, 0.1, 0.2]])
+    cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+
+    def shears(time):
+        return cube @ (np.eye(3) + 0.1 * time * stretch)
+
+    assert rolled(shears) == pytest.approx(0.0, abs=1e-9)
+    # Two bars that turn against each other, as struts of a robot that folds.
+    bar = np.outer([-1.0, 1.0], [1.0, 0.0, 0.0])
+
+    def folds(time):
+        apart = np.array([0.0, 0.5, 0.0])
+        return np.vstack([turned(bar, 0.5 * time) - apart, turned(bar, -0.5 * time) + apart])
+
+    assert rolled(folds) == pytest.approx(0.0, abs=1e-9)
+    # Bars that turn by different angles roll by their mean.
+    assert rolled(lambda time: np.vstack([turned(bar, time), turned(bar, 3.0 * time)])) == (
+        pytest.approx(4.0, rel=1e-6)
+    )

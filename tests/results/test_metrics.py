@@ -99,6 +99,7 @@ def test_totals_become_metrics(robot: Robot) -> None:
     assert metrics.lifted_shares == pytest.approx(np.arange(5) / 12.0)
     assert metrics.lifted == pytest.approx(2.0 / 12.0)
     assert (metrics.clearance, metrics.tension) == (0.01, 1.0)
+    assert metrics.rolled == 7.0
     assert metrics.travelling_index == 0.0
     # Eight driven cables in 12 s: the integrals are over 96 s of actuators.
     assert metrics.peak_actuator_force == 4.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.physics.vectors import Vector, cross, put_vector, vector_at
+from tetra_drake.physics.vectors import Vector, cross, difference, put_vector, vector_at
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, inverse_sqrt
 
@@ -53,6 +53,50 @@ def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> No
         put_vector(place, node, P_WN, nodes)
         put_vector((0.0, 0.0, 0.0), node, V_WN, nodes)
         put_vector((0.0, 0.0, 0.0), node, FORCE, nodes)
+
+
+_LEAST_INERTIA = 1e-9
+"""Moment of inertia, as a share of the sum of all three, that is added about each axis. So nodes on
+a line have no angular velocity about it."""
+
+
+@inlined
+def pitch_rate(nodes: Table, moving: int) -> Real:
+    """Angular velocity (rad/s) about the world's y axis of the structure as a whole.
+
+    It is the angular velocity of the rigid motion that fits the velocities of the first `moving`
+    nodes best (least squares): their angular momentum about their centre, divided by their inertia,
+    with a unit mass at each node. A change of shape alone does not count.
+    """
+    share = 1.0 / moving
+    c_x = c_y = c_z = 0.0
+    for node in range(moving):
+        p_x, p_y, p_z = vector_at(nodes, node, P_WN)
+        c_x += share * p_x
+        c_y += share * p_y
+        c_z += share * p_z
+    s_xx = s_yy = s_zz = s_xy = s_xz = s_yz = l_x = l_y = l_z = 0.0
+    for node in range(moving):
+        r = difference(vector_at(nodes, node, P_WN), (c_x, c_y, c_z))
+        r_x, r_y, r_z = r
+        s_xx += r_x * r_x
+        s_yy += r_y * r_y
+        s_zz += r_z * r_z
+        s_xy += r_x * r_y
+        s_xz += r_x * r_z
+        s_yz += r_y * r_z
+        spin = cross(r, vector_at(nodes, node, V_WN))
+        l_x += spin[0]
+        l_y += spin[1]
+        l_z += spin[2]
+    least = _LEAST_INERTIA * (s_xx + s_yy + s_zz)
+    i_xx, i_yy, i_zz = s_yy + s_zz + least, s_xx + s_zz + least, s_xx + s_yy + least
+    # Cofactors of the inertia's second row.
+    c_yx = s_xz * s_yz + s_xy * i_zz
+    c_yy = i_xx * i_zz - s_xz * s_xz
+    c_yz = s_xy * s_xz + i_xx * s_yz
+    determinant = i_yy * c_yy - s_xy * c_yx - s_yz * c_yz
+    return (c_yx * l_x + c_yy * l_y + c_yz * l_z) / determinant
 
 
 @inlined

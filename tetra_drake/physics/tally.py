@@ -13,6 +13,7 @@ from tetra_drake.physics import actuator, cable
 from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.physics.forces import Forces, sizes_of
+from tetra_drake.physics.kinematics import pitch_rate
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import inlined
@@ -154,6 +155,23 @@ class LeastTension(NamedTuple):
         self.of_all[0] = least
 
 
+class Rolled(NamedTuple):
+    """Rotation of the structure about the world's y axis, over all steps."""
+
+    rate: Annotated[Table, 1]
+    """Angular velocity (rad/s) at the latest step; see kinematics.pitch_rate()."""
+    angle: Annotated[Table, 1]
+    """Integral of the rate, in rad."""
+
+    @inlined
+    def add(self, step: Step) -> None:
+        """Adds a step."""
+        first_node = step.robot.first_node
+        rate = pitch_rate(step.forces.nodes, first_node[first_node.size - 1])
+        self.angle[0] += select(step.takes_time, 0.5 * step.duration * (self.rate[0] + rate), 0.0)
+        self.rate[0] = rate
+
+
 class Tally(NamedTuple):
     """Tally of a simulation: its time, and the parts that metrics need."""
 
@@ -169,6 +187,7 @@ class Tally(NamedTuple):
     roughness: Roughness
     lifted: Lifted
     tension: LeastTension
+    rolled: Rolled
 
     @classmethod
     def of(cls, robot: Model, *, signals: int, begins: float) -> Self:

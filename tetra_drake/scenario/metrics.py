@@ -187,6 +187,10 @@ class Metrics:
     )
     """Angle by which the robot has turned to the left at the end. Whole turns count. See
     robot.path."""
+    rolled: float = _metric("rad", "forward positive", lambda walk: walk.tally.rolled.angle[0])
+    """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
+    turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
+    velocities best, so a change of shape alone does not count."""
     path_curvature: float = _metric(
         "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path)
     )
