@@ -102,7 +102,7 @@ def shot(page: Page) -> Image.Image:
 def shots(page: Page, times: Iterable[float]) -> list[Image.Image]:
     """Pictures of the robot at times (s) of the motion."""
     do(page, "dress", False)
-    page.evaluate("viewer.set_property(['floor', 'inch'], 'visible', false)")  # they flicker
+    page.evaluate("viewer.set_property(['floor', 'squares'], 'visible', false)")  # they flicker
     images = []
     for time in times:
         do(page, "show", time)

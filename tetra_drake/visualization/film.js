@@ -11,7 +11,7 @@ window.addEventListener("load", () => {
   const {Color, CylinderGeometry, ConeGeometry, BufferGeometry, Fog, Group, Line} = MeshCat.THREE;
   const {LineBasicMaterial, Mesh, MeshPhongMaterial, Quaternion, Raycaster, Vector3} = MeshCat.THREE;
   const {bodies, cables, colours, contacts, nodes, progress, strut, times} = recording;
-  const INCH = 0.0254, UP = new Vector3(0, 0, 1);
+  const UP = new Vector3(0, 0, 1);
   const WIDTH_FILLED = 0.7, HEIGHT_FILLED = 0.58;  // shares of the picture
   const AFAR = 30;  // robots
   const SMOOTHING = 0.6;  // s before and after a time over which the camera's target is averaged
@@ -211,7 +211,8 @@ window.addEventListener("load", () => {
       }, "name");
     });
   }
-  const gap = 6 * Math.ceil(size / (15 * INCH));
+  const {length, dark} = recording;
+  const gap = dark * Math.ceil(size / (2.5 * dark));  // between two marks of the ruler, in m
   const heights = new Map();
   function height(x, y) {
     const key = `${x} ${y}`;
@@ -223,14 +224,14 @@ window.addEventListener("load", () => {
     return heights.get(key);
   }
   for (let mark = -2; mark <= 2; mark += 1) {
-    const inches = () => gap * (Math.round(middle().x / INCH / gap) + mark);
+    const along = () => gap * (Math.round(middle().x / gap) + mark);
     const point = () => {
-      const y = 6 * INCH * Math.floor((middle().y - 0.5 * size) / INCH / 6);
-      const x = inches() * INCH;
+      const y = dark * Math.floor((middle().y - 0.5 * size) / dark);
+      const x = along();
       return new Vector3(x, y, height(x, y));
     };
     label("", point, "ruler");
-    labels.at(-1).text = () => `${inches()} in`;
+    labels.at(-1).text = () => `${Number((along() / length.size).toPrecision(6))} ${length.name}`;
   }
   function show_labels() {
     const {offsetWidth, offsetHeight} = viewer.dom_element;
