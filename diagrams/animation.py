@@ -29,7 +29,7 @@ from tetra_drake.visualization.scene import COLOURS
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-LIMITS = {".gif": 750_000, ".png": 90_000}
+LIMITS = {".gif": 400_000, ".png": 90_000}
 """Largest sizes of files in bytes. Pictures become narrower to meet them."""
 
 GROUND_COLOURS = {".gif": 8, ".png": 100}

@@ -252,6 +252,7 @@ window.addEventListener("load", () => {
     light(middle());
     if (element("follow").checked) aim(middle());
     element("time").value = time;
+    element("time").setAttribute("aria-valuetext", `${time.toFixed(1)} s`);
     element("clock").value = `${time.toFixed(1)} / ${duration.toFixed(1)} s`;
     element("reached").value = `${progress.what} ${shown(now(progress.values))}`;
     viewer.set_dirty();
@@ -260,6 +261,7 @@ window.addEventListener("load", () => {
   function set_playing(on) {
     playing = on;
     element("play").textContent = on ? "❚❚" : "▶";
+    element("play").setAttribute("aria-pressed", on);
   }
   function show(seconds) {
     set_playing(false);
@@ -281,10 +283,14 @@ window.addEventListener("load", () => {
   element("follow").addEventListener("change", (event) => follow(event.target.checked));
   element("forces").addEventListener("change", () => { place(time); viewer.set_dirty(); });
   element("legend").open = window.innerWidth > 900;
+  const ARROWS = {ArrowLeft: -0.1, ArrowRight: 0.1};  // s
   window.addEventListener("keydown", (event) => {
+    if (event.target.matches("input[type=range], select")) return;  // they have keys of their own
     if (event.code == "Space" && event.target == document.body) set_playing(!playing);
+    if (event.code in ARROWS) show(time + ARROWS[event.code] * (event.shiftKey ? 10 : 1));
   });
-  window.addEventListener("resize", frame_picture);
+  element("legend").addEventListener("toggle", arrange);
+  window.addEventListener("resize", arrange);
 
   let before = performance.now();
   function tick(instant) {
@@ -365,13 +371,24 @@ window.addEventListener("load", () => {
   function dress(on) {
     for (const id of ["heading", "legend", "bar", "labels"]) element(id).hidden = !on;
     document.documentElement.style.setProperty("--bar", on ? null : "0px");
+    arrange();
+  }
+  // On a narrow screen, heading and legend have room of their own, so that they hide nothing.
+  function arrange() {
+    const narrow = window.matchMedia("(max-width: 700px)").matches;
+    for (const id of ["heading", "legend"]) {
+      const height = narrow ? element(id).offsetHeight : 0;
+      document.documentElement.style.setProperty(`--${id}`, `${height}px`);
+    }
     viewer.set_3d_pane_size();
     frame_picture();
   }
 
+  viewer.renderer.domElement.setAttribute("role", "img");
+  viewer.renderer.domElement.setAttribute("aria-label", document.title);
   viewer.set_3d_pane_size();
   aim(middle());
-  frame_picture();
+  arrange();
   set_playing(true);
   requestAnimationFrame(tick);
   const play = () => set_playing(true), pause = () => set_playing(false);

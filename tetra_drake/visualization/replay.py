@@ -57,6 +57,8 @@ LONG_ARROW = 0.8
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
 """Pattern of the asynchronous commands in Meshcat's page that add parts of the scene. The film runs
 them at once, because it needs the whole scene."""
+_TO_SCALE = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+"""Without this line, phones show a page small."""
 _USUAL = 99.0
 """Percentile of tensions and forces that is drawn at full size. Impacts are far larger."""
 
@@ -241,7 +243,8 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
     )
     page = _COMMAND.sub(r"handle(\1);", page)
     # The replacements are functions, because backslashes in a text would be interpreted.
-    named = f"<title>{html.escape(title)}</title>"
+    named = f"<title>{html.escape(title)}</title>{_TO_SCALE}"
+    page = page.replace("<html>", '<html lang="en">', 1)
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
 
