@@ -29,7 +29,7 @@ from tetra_drake.visualization.scene import COLOURS
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-LIMITS = {".gif": 750_000, ".png": 90_000}
+LIMITS = {".gif": 400_000, ".png": 90_000}
 """Largest sizes of files in bytes. Pictures become narrower to meet them."""
 
 GROUND_COLOURS = {".gif": 8, ".png": 100}
@@ -102,7 +102,7 @@ def shot(page: Page) -> Image.Image:
 def shots(page: Page, times: Iterable[float]) -> list[Image.Image]:
     """Pictures of the robot at times (s) of the motion."""
     do(page, "dress", False)
-    page.evaluate("viewer.set_property(['floor', 'inch'], 'visible', false)")  # they flicker
+    page.evaluate("viewer.set_property(['floor', 'squares'], 'visible', false)")  # they flicker
     images = []
     for time in times:
         do(page, "show", time)

@@ -33,7 +33,6 @@ from tetra_drake.results.trajectory import make_dataset, sample_times
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.units import INCH
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 from tetra_drake.visualization.replay import save_replay
 
@@ -57,8 +56,8 @@ def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = DIA
     simulator.AdvanceTo(duration)
 
     trajectory = make_dataset(robot, sampler.motion())
-    inches = float(distance_walked(trajectory, robot.structure)[-1]) / INCH
-    title = f"{gait.name}: {inches:.2f} inches in {duration:g} s"
+    walked = scenario.units.shown(distance_walked(trajectory, robot.structure)[-1], "m")
+    title = f"{gait.name}: {walked} in {duration:g} s"
     save_replay(out / "robot.html", robot=robot, trajectory=trajectory, title=title)
     print(title)
     print(f"open {out / 'robot.html'} in a browser to see it walk")

@@ -145,13 +145,17 @@ EXPERIMENTS = {
     "map": Experiment(
         "gaits that differ, the fittest of each kind", "thesis", _by(QualityDiversity(), 1, 30000)
     ),
-    "prism": Experiment("a prism of three struts", "prism", _STRUCTURE),
-    "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE),
-    "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE),
+    "prism": Experiment("a prism of three struts", "prism", _STRUCTURE, film=True),
+    "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE, film=True),
+    "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE, film=True),
     "pair": Experiment("two nested tetrahedra", "pair", _STRUCTURE),
     "winch": Experiment("stiff cables on winches", "winch", _by(CmaEs(), 3, 1500), exported=True),
     "motors": Experiment(
-        "the thesis's robot carries motors", "motors", _by(CmaEs(), 3, 1500), exported=True
+        "the thesis's robot carries motors",
+        "motors",
+        _by(CmaEs(), 3, 1500),
+        film=True,
+        exported=True,
     ),
 }
 """Experiments by name of the folder, in the order of the gallery."""

@@ -85,7 +85,7 @@ def test_what_is_printed_fits_a_screen_and_is_rounded() -> None:
         assert len(lines) <= 20 and max(map(len, lines)) <= 100
         assert not re.search(r"\d\.\d{9}", str(subject))
     assert "runs/demo" in str(run) and "scenario quick" in str(run) and "6 evaluations" in str(run)
-    assert f"{result.metrics.distance:.4g} m" in str(result.metrics)
+    assert f"{result.metrics.distance_in:.4g} in" in str(result.metrics)
     assert f"{result.metrics.distance_in:.4g} in" in str(result)
     assert "actuator_limited" not in str(result.metrics), "it has no motors"
     assert len(repr([run, result, run.scenario, *run.gaits()])) < 400

@@ -17,6 +17,7 @@ from tetra_drake.files import check_folder, write_whole
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.options import BAD_INPUT, Command, Option, integer, quantity
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
+from tetra_drake.scenario.units import SYSTEMS, shown_in
 
 if TYPE_CHECKING:
     from tetra_drake.robot.gait import Gait
@@ -27,9 +28,9 @@ FAILED, INTERRUPTED = 1, 130  # exit statuses beside BAD_INPUT
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
-    call = make_parser().call_of(argv)
+    call, [units] = make_parser().call_of(argv, common=["units"])
     try:
-        with heeding_interrupts():
+        with heeding_interrupts(), shown_in(units):
             call()
             sys.stdout.flush()
     except (InputError, SimulationFailure) as error:
@@ -65,6 +66,13 @@ def make_parser() -> Command:
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    common = Command(add_help=False)
+    common.add_argument(
+        "--units",
+        choices=[*SYSTEMS],
+        help="units of lengths and forces in texts, pages and figures (default: the units in which "
+        "the robot's lengths are round)",
+    )
     parser.add_commands(
         [
             _simulate,
@@ -77,7 +85,8 @@ def make_parser() -> Command:
             _fit,
             _cpg,
             _structure,
-        ]
+        ],
+        common=common,
     )
     return parser
 
@@ -89,7 +98,6 @@ Seed = Annotated[int, Option(metavar="N", type=integer(0))]
 Rate = Annotated[float, Option(metavar="RATE", type=quantity("Hz"))]
 Length = Annotated[float, Option(metavar="LENGTH", type=quantity("m"))]
 Unit = Annotated[str, Option(metavar="UNIT")]
-ForceUnit = Annotated[str, Option(choices=("lbf", "N"))]
 Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
 Run = Annotated[Folder, Option(metavar="RUN")]
 GaitOrRun = Annotated[Path, Option(metavar="GAIT|RUN", type=Path)]
@@ -438,7 +446,6 @@ def _cpg(
     scenario: ScenarioName | None = None,
     gait: GaitFile | None = None,
     seed: GaitSeed | None = None,
-    unit: ForceUnit = "lbf",
     rate: Rate | None = None,
     out: File,
 ) -> None:
@@ -451,17 +458,16 @@ def _cpg(
 
     Args:
         scenario: (default: the scenario of the gait's run; thesis for a gait in no run)
-        unit: (default: %(default)s)
         rate: samples per second (default: 2000 Hz, by the scenario's cpg.listing_step)
         out: the CSV file to write
 
-    Example: tetra-drake cpg --seed 3 --unit N --out signals.csv
+    Example: tetra-drake cpg --seed 3 --units SI --out signals.csv
     """
     from tetra_drake.robot.robot import Robot
     from tetra_drake.robot.signals import save_signals
 
     chosen, chosen_gait = _chosen_gait(scenario, gait, seed)
-    save_signals(out, Robot.of(chosen), chosen_gait, unit=unit, rate=rate)
+    save_signals(out, Robot.of(chosen), chosen_gait, rate=rate)
 
 
 def _structure(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -76,6 +77,20 @@ class Table:
             align = str.ljust if column in self.text_columns else str.rjust
             columns.append([align(cell, width) for cell in cells])
         return "\n".join("  ".join(cells).rstrip() for cells in zip(*columns, strict=True))
+
+    def html(self) -> str:
+        """The table as HTML, as notebooks show it."""
+        aligned = ["left" if i in self.text_columns else "right" for i in range(len(self.headings))]
+
+        def row(tag: str, cells: Sequence[str]) -> str:
+            pairs = zip(aligned, cells, strict=True)
+            return "".join(
+                f'<{tag} style="text-align: {side}">{html.escape(cell)}</{tag}>'
+                for side, cell in pairs
+            )
+
+        rows = "".join(f"<tr>{row('td', cells)}</tr>" for cells in self.rows)
+        return f"<table><tr>{row('th', self.headings)}</tr>{rows}</table>"
 
     def markdown(self) -> str:
         """The table in Markdown, without a line feed at the end."""

@@ -37,8 +37,9 @@ class Command(argparse.ArgumentParser):
         """Prints an error in one line and ends the process."""
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
-    def add_commands(self, functions: Sequence[Callable[..., None]]) -> None:
-        """Adds a command for each function, by its name without an underscore in front.
+    def add_commands(self, functions: Sequence[Callable[..., None]], *, common: Command) -> None:
+        """Adds a command for each function, by its name without an underscore in front. All have
+        the options of `common`.
 
         Its docstring has four paragraphs: a line for the list of commands, a description, `Args:`,
         and an example.
@@ -48,7 +49,11 @@ class Command(argparse.ArgumentParser):
             name = function.__name__.removeprefix("_")
             what, description, about, example = (inspect.getdoc(function) or "").split("\n\n")
             command = commands.add_parser(
-                name, help=what.rstrip("."), description=description, epilog=example
+                name,
+                help=what.rstrip("."),
+                description=description,
+                epilog=example,
+                parents=[common],
             )
             command.set_defaults(function=function, parser=command)
             texts = dict(re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", about, re.M))
@@ -60,8 +65,11 @@ class Command(argparse.ArgumentParser):
                     groups[group] = command.add_mutually_exclusive_group()
                 groups[group].add_argument(name, **more)
 
-    def call_of(self, argv: Sequence[str] | None) -> Callable[[], None]:
-        """The call of a command's function for given arguments."""
+    def call_of(
+        self, argv: Sequence[str] | None, *, common: Sequence[str]
+    ) -> tuple[Callable[[], None], list[Any]]:
+        """The call of a command's function for given arguments, and the values of the options
+        `common` to all commands."""
         options, unknown = self.parse_known_args(argv)
         values = vars(options)
         function, parser = values.pop("function"), values.pop("parser")
@@ -70,7 +78,8 @@ class Command(argparse.ArgumentParser):
 
             names = re.findall(r"--[\w-]+", parser.format_usage())
             parser.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
-        return functools.partial(function, **values)
+        shared = [values.pop(name) for name in common]
+        return functools.partial(function, **values), shared
 
 
 def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[str, Any]]:

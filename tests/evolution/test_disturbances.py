@@ -195,8 +195,8 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
     assert all("draws" not in entry for entry in entries if entry["failure"])
     table = load_run(directory).evaluations.dropna(subset="fitness")
     assert table["draws_fitness"].tolist() == [entry["draws"]["fitness"] for entry in walked]
-    worst = [min(entry["draws"]["distance"]) / 0.0254 for entry in walked]
-    assert table["worst_distance_in"].tolist() == worst
+    worst = [min(entry["draws"]["distance"]) for entry in walked]
+    assert table["worst_distance"].tolist() == worst
 
 
 def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn, monkeypatch):

@@ -13,7 +13,7 @@ STATUS = TrialStatus(
     evaluations=40,
     failures=1,
     best_fitness=4.25,
-    best_distance_in=5.0,
+    best_distance=0.127,
 )
 ENDED = dataclasses.replace(
     STATUS, number=1, evaluations=100, best_fitness=6.0, stop="levelled off"

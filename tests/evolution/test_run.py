@@ -34,7 +34,7 @@ def test_a_run_loads_as_tables(run_small):
     assert means.shape == (16, 2)
     last = run.iterations.iloc[-1]
     best = run.evaluations.set_index(["trial", "index"]).loc[(1, last["best_evaluation"])]
-    assert last["best_distance_in"] == best["distance_in"]
+    assert last["best_distance"] == best["distance"]
 
 
 def test_a_run_in_progress_loads_and_is_left_alone(run_small):
@@ -130,6 +130,6 @@ def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):
     run = load_run(write_run(tmp_path / "run", trials, unfinished=(0, 1, 2)))
     first, second, third = run.statuses
     assert (first.iteration, first.evaluations, first.failures, first.stop) == (1, 3, 1, None)
-    assert (first.best_fitness, first.best_distance_in) == pytest.approx((4.0, 2.0))
+    assert (first.best_fitness, first.best_distance / INCH) == pytest.approx((4.0, 2.0))
     assert (second.failures, second.best_fitness) == (1, -math.inf)
     assert (third.iteration, third.evaluations) == (-1, 0)

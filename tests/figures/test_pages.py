@@ -28,7 +28,7 @@ from tetra_drake.figures.motion import (
     time_lapse,
 )
 from tetra_drake.figures.robustness import robustness
-from tetra_drake.figures.style import WIDTH_IN, common_style
+from tetra_drake.figures.style import Look, common_style
 
 OF_A_GAIT = (
     *(gait_diagram, relative_distances, time_lapse, path_of_the_centre, one_step),
@@ -76,7 +76,7 @@ def check(drawn_texts, request):
     def check(draw, *data):
         if request.param is None:
             figure = draw(*data)
-            assert figure.get_figwidth() == WIDTH_IN and figure.get_figheight() <= 10.0
+            assert figure.get_figwidth() == Look.width_in and figure.get_figheight() <= 10.0
         else:
             figure = Figure(figsize=request.param)
             assert draw(*data, figure=figure) is None
@@ -100,7 +100,7 @@ def test_figures_of_a_gait(draw, robot, check):
 def test_time_and_units_are_known_or_refused(draw, refused):
     with refused("figure", "time", "20 to 30 s"):
         draw(gait_of("five"), time=(20.0, 30.0))
-    with refused("figure", "units", "furlong"):
+    with refused("units", "", "furlong"):
         draw(gait_of("five"), units="furlong")
 
 

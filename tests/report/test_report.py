@@ -195,9 +195,9 @@ def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study)
     disturbed = {"disturbances": {"draws": 3, "start": 0.1}}
     scenario = tiny_scenario().with_changes(disturbed)
     shown = simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
-    assert shown.best.distance_in == study.best.distance_in
+    assert shown.best.distance == study.best.distance
     (note,) = (text for text in render(shown).texts["p"] if "3 draws" in text)
-    assert f"{rounded(shown.best.distance_in)} in" in note
+    assert f"{rounded(shown.best.distance / INCH)} in" in note
 
 
 def test_the_commands_to_reproduce_it_are_commands(page):

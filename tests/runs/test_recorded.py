@@ -3,6 +3,7 @@
 import itertools
 import json
 import lzma
+import re
 import subprocess
 
 import numpy as np
@@ -110,6 +111,15 @@ def test_the_pages_show_the_recorded_runs():
     assert set(runs) == set(FOLDERS)
     for page in tables.pages(runs):
         assert tables.made_again(page, runs) == page.read_text(encoding="utf-8"), page
+
+
+def test_the_gallery_is_current_and_opens_every_replay_in_its_folder():
+    text = (tables.HERE / tables.GALLERY).read_text(encoding="utf-8")
+    assert tables.gallery_page(tables.load_all()) == text
+    links = re.findall(r'(?:href|src)="([^"]+)"', text)
+    assert {f"{name}/{REPLAY}" for name in FOLDERS} <= set(links)
+    for link in links:
+        assert (tables.HERE / link).is_file() and ".." not in link
 
 
 @pytest.mark.parametrize("name", FOLDERS)

@@ -2,7 +2,16 @@
 
 import pytest
 
-from tetra_drake.scenario.units import INCH, POUND_FORCE, customary, plainest, quantity_to_si, shown
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.scenario.units import (
+    INCH,
+    POUND_FORCE,
+    SYSTEMS,
+    plainest,
+    quantity_to_si,
+    shown_in,
+)
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
 # standard gravity (9.80665 m/s^2), whose product is the pound-force.
@@ -30,21 +39,59 @@ def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
 
 
 @pytest.mark.parametrize(
-    ("unit", "read"),
+    ("system", "unit", "read"),
     [
-        ("m", "in"),
-        ("N", "lbf"),
-        ("N*s/m", "lbf*s/in"),
-        ("N*s/m^2", "lbf*s/in^2"),
-        ("1/rad", "/deg"),
-        ("J", "J"),
+        ("in", "m", "in"),
+        ("in", "N", "lbf"),
+        ("in", "N*s/m", "lbf*s/in"),
+        ("in", "N*s/m^2", "lbf*s/in^2"),
+        ("in", "1/rad", "/deg"),
+        ("in", "J", "J"),
+        ("cm", "m/s", "cm/s"),
+        ("mm", "1/m", "/mm"),
+        ("cm", "N/m", "N/m"),
+        ("SI", "m", "m"),
+        ("SI", "rad", "deg"),
     ],
 )
-def test_people_read_inches_pounds_force_and_degrees_of_the_same_size(unit, read):
-    size, name = customary(unit)
+def test_people_read_numbers_of_the_same_size(system, unit, read):
+    units = SYSTEMS[system]
+    size, name = units.of(unit)
     assert name == read
     assert size == pytest.approx(quantity_to_si(f"1 {name}", unit), rel=1e-14)
-    assert shown(2.5 * size, unit) == f"2.5 {read}"
+    assert units.shown(2.5 * size, unit) == f"2.5 {read}"
+
+
+@pytest.mark.parametrize(
+    ("base", "changes", "expected"),
+    [
+        ("thesis", {}, "in"),
+        ("thesis", {"robot.strut_length": "15 cm", "robot.strut_diameter": "3 mm"}, "cm"),
+        ("pair", {}, "in"),
+        ("prism", {}, "cm"),  # a radius of 0.1 m, a height of 0.16 m
+        ("winch", {}, "cm"),
+    ],
+)
+def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, tmp_path):
+    scenario = load_scenario(base).with_changes(changes)
+    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))  # in SI
+    recorded = load_scenario(tmp_path / "record.yaml")
+    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
+    for shown in (scenario, recorded, disturbed):
+        assert shown.units == SYSTEMS[expected]
+    with shown_in("SI"):
+        assert scenario.units == SYSTEMS["SI"]
+    assert scenario.units == SYSTEMS[expected]
+
+
+def test_a_structure_given_in_metres_is_shown_in_metres(tmp_path):
+    text = """
+    nodes: {a: [0 m, 0 m, 0 m], b: [3 m, 0 m, 1 m]}
+    struts: {tube: {pairs: [[a, b]], diameter: 60 mm, density: 2.7 g/cm^3, node_diameter: 60 mm}}
+    """
+    (tmp_path / "big.yaml").write_text(text)
+    robot = read_structure(tmp_path / "big.yaml")
+    assert load_scenario("prism").with_sections(robot=robot).units == SYSTEMS["SI"]
 
 
 @pytest.mark.parametrize(

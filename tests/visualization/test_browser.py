@@ -205,6 +205,40 @@ def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
     page.locator("#play").click()
 
 
+def test_keys_play_stop_and_move_in_time(page):
+    animation.do(page, "show", 2.0)
+    page.evaluate("document.activeElement.blur()")
+    for key, time in (("ArrowRight", "2.1"), ("Shift+ArrowRight", "3.1"), ("ArrowLeft", "3.0")):
+        page.keyboard.press(key)
+        assert text(page, "clock") == f"{time} / 5.0 s"
+    for pressed in ("true", "false"):
+        page.keyboard.press("Space")
+        assert page.locator("#play").get_attribute("aria-pressed") == pressed
+
+
+def test_every_control_has_a_name(page):
+    controls = page.locator("button, input, select, output, canvas").filter(visible=True)
+    assert controls.count() >= 7
+    for control in controls.all():
+        label = control.get_attribute("aria-label")
+        assert label or control.evaluate("element => element.labels?.length > 0")
+
+
+def test_on_a_phone_nothing_lies_over_the_robot(browser, replay):
+    box = "id => document.getElementById(id).getBoundingClientRect().toJSON()"
+    with opened(browser, replay.as_uri(), size=(400, 700)) as page:
+        animation.wait_until_loaded(page)
+        for legend_is_open in (False, True):
+            page.evaluate(f"document.getElementById('legend').open = {str(legend_is_open).lower()}")
+            page.wait_for_timeout(200)
+            pane = page.evaluate(box, "meshcat-pane")
+            assert pane["height"] > 250
+            assert page.evaluate(box, "heading")["bottom"] <= pane["top"] + 1
+            for below in ("bar", "legend"):
+                assert page.evaluate(box, below)["top"] >= pane["bottom"] - 1
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
 @pytest.mark.parametrize(
     ("speed", "shown"), [(0.0, ["0 s", "5 s"]), (0.1, ["0 s", "2.5 s", "5 s"])]
 )

@@ -17,7 +17,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Incline
-from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.scenario.units import INCH, INCHES, POUND_FORCE
 from tetra_drake.visualization.replay import (
     RESOLUTION,
     frame_samples,
@@ -127,7 +127,7 @@ def test_arrows_are_the_forces_of_the_ground(scenario, frames, film):
     ("pounds", "rounded"), [(0.0301, 0.05), (0.05, 0.05), (0.9, 1.0), (17.0, 20.0)]
 )
 def test_an_inch_of_an_arrow_is_a_round_force(pounds, rounded):
-    assert round_force(pounds * POUND_FORCE) == pytest.approx(rounded * POUND_FORCE)
+    assert round_force(pounds * POUND_FORCE, INCHES) == pytest.approx(rounded * POUND_FORCE)
 
 
 def test_forces_on_a_slope_are_turned_with_it():

@@ -12,7 +12,7 @@ from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, INCHES
 from tetra_drake.visualization import scene
 from tetra_drake.visualization.replay import quiet_meshcat
 
@@ -40,7 +40,7 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
     vertices = {
         path: np.reshape(thing["geometries"][0]["data"]["attributes"]["position"]["array"], (-1, 3))
         for path, thing in objects.items()
-        if path in ("/floor/relief", "/floor/inch", "/floor/six_inches")
+        if path in ("/floor/relief", "/floor/squares", "/floor/dark")
     }
     assert len(vertices) == 3
     for path, p_WV in vertices.items():
@@ -56,7 +56,7 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
 def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
     ground = robot_on(terrain).ground
     corners = np.array([[-6, -9], [60, 9]])
-    floor = scene.floor_points(ground, corners)
+    floor = scene.floor_points(ground, corners, INCHES)
     assert floor.shape[0] * floor.shape[1] <= scene.MOST_POINTS
     inches = floor[:, 0, 0] / INCH
     assert set(range(-6, 61)) <= set(inches.round(9))  # the grid's lines lie on its edges
@@ -70,7 +70,7 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
 @pytest.mark.parametrize("inches", [60, 1200])
 def test_a_large_flat_floor_has_lines_every_six_inches(inches, robot):
     corners = np.array([[-6, -600], [inches, 600]])
-    floor = scene.floor_points(robot.ground, corners)
+    floor = scene.floor_points(robot.ground, corners, INCHES)
     spacing = 1 if inches == 60 else 6
     assert np.diff(floor[:, 0, 0]) == pytest.approx(spacing * INCH)
     assert floor[0, 0].tolist() == pytest.approx([-6 * INCH, -600 * INCH, 0.0])

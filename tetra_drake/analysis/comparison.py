@@ -18,6 +18,7 @@ from tetra_drake.analysis.statistics import interquartile_mean, interval, json_r
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import FITNESS
 from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import pandas
@@ -35,6 +36,8 @@ _TRIAL_COLUMNS = ["run", "trial", "ended", "cost", "at_common", "fitness", "dist
 class Compared:
     """Result of compare(): tables of trials, curves and runs."""
 
+    scenario: Scenario
+    """Scenario of the first run."""
     common: int
     """Cost at which the shortest curve ends; all runs have fitnesses there."""
     reach: float | None
@@ -101,6 +104,7 @@ def compare(directories: Sequence[str | Path], *, reach: float | None = None) ->
         if failed := int(np.isneginf(rows["fitness"]).sum()):
             notes.append(f"{label}: {failed} of {len(rows)} trials have no fitness")
     return Compared(
+        scenario=next(iter(runs.values())).scenario,
         common=common,
         reach=reach,
         trials=pandas.concat(trials, ignore_index=True)[_TRIAL_COLUMNS],

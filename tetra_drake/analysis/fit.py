@@ -21,7 +21,7 @@ from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import value_at
-from tetra_drake.scenario.units import quantity_to_si, shown
+from tetra_drake.scenario.units import plainest, quantity_to_si
 
 if TYPE_CHECKING:
     import pandas
@@ -447,7 +447,7 @@ def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[s
         if not row["determined"]:
             warnings.append(f"the data do not determine {key}: the bounds are all that is known")
         elif min(value - row["least"], row["most"] - value) < STEP * width:
-            warnings.append(f"{key} is at a bound, {shown(value, row['unit'])}")
+            warnings.append(f"{key} is at a bound, {plainest(value, row['unit'])}")
     determined = table.index[table["determined"]]
     for place, one in enumerate(determined):
         others = [

@@ -118,8 +118,9 @@ def overview(statuses: Sequence[TrialStatus]) -> str:
     failures = sum(status.failures for status in statuses)
     parts = []
     if fittest.iteration >= 0:
-        distance, fitness = rounded(fittest.best_distance_in), rounded(fittest.best_fitness)
-        parts.append(f"best gait {distance} in (fitness {fitness})")
+        units, fitness = fittest.units, rounded(fittest.best_fitness)
+        distance = rounded(fittest.best_distance / units.length)
+        parts.append(f"best gait {distance} {units.length_name} (fitness {fitness})")
     if len(statuses) > 1:
         parts.append(f"{ended} of {len(statuses)} trials finished")
     if failures:

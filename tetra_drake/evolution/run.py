@@ -61,12 +61,12 @@ class Run:
     - the parameters: weight_1 ... (order of the thesis's listing), gain_length ..., tau_a_s,
       tau_b_s; NaN in a thinned run
     - with disturbances: draws_fitness and draws_distance (m), lists with one number per draw, and
-      worst_distance_in. Lists are missing if the evaluation failed.
+      worst_distance (m). Lists are missing if the evaluation failed.
     """
     iterations: pandas.DataFrame
     """One row per iteration; iteration 0 is the initial one. Columns: trial, iteration, evaluations
-    (so far), best_fitness (so far), best_evaluation (index of the fittest gait), best_distance_in
-    (its distance), stop, and the optimiser's report, such as mean_fitness."""
+    (so far), best_fitness (so far), best_evaluation (index of the fittest gait), best_distance
+    (of that gait, in m), stop, and the optimiser's report, such as mean_fitness."""
     reevaluations: pandas.DataFrame
     """Gaits evaluated again on the Drake diagram. Columns as in `evaluations`, without `placed`."""
 
@@ -168,13 +168,14 @@ class Run:
         status = TrialStatus(
             trial,
             self.scenario.evolution.evaluations,
+            units=self.scenario.units,
             evaluations=len(rows),
             failures=int(rows["failure"].notna().sum()),
             wall_time=float(rows["wall_time_s"].sum()),
         )
         lines = self.iterations[self.iterations["trial"] == trial]
         for line in lines.iloc[[0, -1]].to_dict("records") if len(lines) else ():
-            status.complete(line, best_distance_in=line["best_distance_in"])
+            status.complete(line, best_distance=line["best_distance"])
         return status
 
 
@@ -206,9 +207,9 @@ def load_run(path: str | Path) -> Run:
         for trial, lines in iterations.groupby("trial"):
             file = RecordFile.of(directory, manifest.run, ITERATIONS, trial=int(trial))
             _check_iterations(file, lines, evaluations[evaluations["trial"] == trial])
-        distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
+        distances = evaluations.set_index(["trial", "index"])["distance"].to_dict()
         best = zip(iterations["trial"], iterations["best_evaluation"], strict=True)
-        iterations["best_distance_in"] = [distances.get(key, math.nan) for key in best]
+        iterations["best_distance"] = [distances.get(key, math.nan) for key in best]
     return Run(directory, manifest, evaluations, iterations, reevaluations)
 
 
@@ -271,5 +272,5 @@ def _flat(entry: dict[str, Any], columns: list[str], bodies: Sequence[str]) -> d
     if draws is not None:
         metrics["draws_fitness"] = draws["fitness"]
         metrics["draws_distance"] = draws["distance"]
-        metrics["worst_distance_in"] = min(draws["distance"]) / INCH
+        metrics["worst_distance"] = min(draws["distance"])
     return entry | metrics | dict(zip(columns, genome, strict=True))

@@ -16,7 +16,7 @@ from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCHES, Units
 
 _SHOW_PERIOD = 1.0  # s
 
@@ -38,19 +38,21 @@ class TrialStatus:
     wall_time: float = 0.0
     """Sum of the wall times of all evaluations, in s."""
     best_fitness: float = -math.inf
-    best_distance_in: float = math.nan
-    """Distance (in) of the fittest gait; NaN if no gait has a fitness yet."""
+    best_distance: float = math.nan
+    """Distance (m) of the fittest gait; NaN if no gait has a fitness yet."""
+    units: Units = INCHES
+    """Units of the shown distance."""
     stop: str | None = None
     """Reason for the trial's end; None during the trial."""
 
-    def complete(self, line: Mapping[str, Any], *, best_distance_in: float) -> None:
+    def complete(self, line: Mapping[str, Any], *, best_distance: float) -> None:
         """Updates the state with a line of iterations.jsonl and the distance of the best gait."""
         self.iteration = line["iteration"]
         self.stop = line["stop"] if isinstance(line["stop"], str) else None
         best = line["best_fitness"]
         # A line from a table has NaN in place of null.
         self.best_fitness = -math.inf if best is None or math.isnan(best) else best
-        self.best_distance_in = best_distance_in
+        self.best_distance = best_distance
 
 
 _Evaluated = tuple[Task, Evaluation]
@@ -66,7 +68,8 @@ class Trial:
 
     def __init__(self, number: int, *, run: RunRecord, optimizer: Optimizer) -> None:
         self._manifest = run.manifest
-        self.status = TrialStatus(number, self._manifest.scenario.evolution.evaluations)
+        scenario = self._manifest.scenario
+        self.status = TrialStatus(number, scenario.evolution.evaluations, units=scenario.units)
         self.unevaluated: dict[int, Task] = {}
         """Tasks that the current iteration waits for, by index; empty at the end of the trial."""
         self.recalled: _Evaluated | None = None
@@ -149,7 +152,7 @@ class Trial:
             **outcome.report,
         }
         self._record.complete(results, line, placed=outcome.placed)
-        status.complete(line, best_distance_in=distance / INCH)
+        status.complete(line, best_distance=distance)
 
     def _save_best(self) -> None:
         if self._best is not None and self._best is not self._saved:

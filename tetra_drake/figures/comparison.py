@@ -20,7 +20,6 @@ from tetra_drake.figures.style import (
     page_of,
     save_findings,
     set_title,
-    units_named,
 )
 
 _FIRST = 10  # simulations; the axes of costs begin here
@@ -37,13 +36,13 @@ def save_comparison(compared: Compared, folder: Path) -> list[str]:
 
 
 @figure_function
-def comparison(compared: Compared, *, figure: Page | None = None, units: str = "in") -> Drawn:
+def comparison(compared: Compared, *, figure: Page | None = None) -> Drawn:
     """Comparison of runs: the best fitness so far, as median and interquartile band over the trials
     of each run.
 
     If a distance to reach was given, a second panel shows the share of trials that have reached it.
     Finished trials keep their last values. A dot marks the end of a run."""
-    columns, unit = 1 if compared.reach is None else 2, units_named(units)
+    columns, unit = 1 if compared.reach is None else 2, compared.scenario.units
     labels = []
     for label, count in compared.runs["trials"].items():
         labels.append(f"{label} (1 trial)" if count == 1 else f"{label} ({count} trials)")

@@ -19,10 +19,8 @@ from tetra_drake.figures.style import (
     line_style,
     page_of,
     set_title,
-    units_named,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.scenario.units import INCH
 
 _TICKS = 20  # largest number of labels below the axes
 _SEVERAL = 4  # least number of trials for which quartiles are drawn
@@ -35,19 +33,19 @@ _BAND: Any = {"color": OKABE_ITO["blue"], "alpha": 0.18, "linewidth": 0.0}
 
 
 def initial_extremes(run: Run) -> pandas.DataFrame:
-    """Distances (in) of the fittest and the least fit initial gait: a row per trial, columns best
+    """Distances (m) of the fittest and the least fit initial gait: a row per trial, columns best
     and worst. Failed gaits are left out."""
     walked = run.initial().dropna(subset="fitness").sort_values(["trial", "fitness"])
-    distances = walked.groupby("trial")["distance_in"]
+    distances = walked.groupby("trial")["distance"]
     return pandas.DataFrame({"best": distances.last(), "worst": distances.first()})
 
 
 @figure_function
-def initial_distances(run: Run, *, figure: Page | None = None, units: str = "in") -> Drawn:
+def initial_distances(run: Run, *, figure: Page | None = None) -> Drawn:
     """Distances of the fittest and the least fit initial gait of each trial. Failed gaits are left
     out."""
-    unit, width = units_named(units), 0.4
-    extremes = initial_extremes(run) * INCH / unit.length
+    unit, width = run.scenario.units, 0.4
+    extremes = initial_extremes(run) / unit.length
     page = page_of(figure, height_in=3.6)
     panel = page.subplots()
     blue, orange = OKABE_ITO["blue"], OKABE_ITO["orange"]
@@ -75,7 +73,7 @@ def initial_fitness(run: Run, trial: int, *, figure: Page | None = None) -> Draw
     """Histogram of the fitness of a trial's initial gaits. Gaits that walk backward are hatched."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
-    fitness, backward = walked["fitness"], walked["distance_in"] < 0.0
+    fitness, backward = walked["fitness"], walked["distance"] < 0.0
     page = page_of(figure, height_in=3.6)
     panel = page.subplots()
     # Bin edges are round numbers, so zero is an edge if the values have both signs.

@@ -25,7 +25,6 @@ from tetra_drake.figures.style import (
     panels_in_columns,
     set_title,
     shown_part,
-    units_named,
 )
 from tetra_drake.formatting import fixed
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
@@ -51,13 +50,12 @@ def signals_and_tensions(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
 ) -> Drawn:
     """Actuation signals and the tensions of the cables that they drive, in the last 4 s.
 
     The title of a panel is the name of the cable. If a signal drives several cables, the first is
     shown. The start-up is shaded; signals are 0 there."""
-    unit, trajectory = units_named(units), shown_part(result.trajectory, time or _last(result))
+    unit, trajectory = result.scenario.units, shown_part(result.trajectory, time or _last(result))
     forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
     driven = [signals.index(oscillator) for oscillator in oscillators]
@@ -84,14 +82,13 @@ def ground_forces(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
 ) -> Drawn:
     """Normal force and friction of the feet in the last 4 s.
 
     Friction is along x; on uneven ground, along x projected on the slope. Each foot that touches
     the ground has a panel; feet of one body with equal forces share a panel. Grey: stance. Peaks of
     impacts are cut off, because they are shorter than the time between samples."""
-    unit, end = units_named(units), shown_part(result.trajectory, time or _last(result))
+    unit, end = result.scenario.units, shown_part(result.trajectory, time or _last(result))
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)
     _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)

@@ -15,20 +15,19 @@ from tetra_drake.figures.style import (
     REFERENCE,
     Drawn,
     Page,
-    Units,
     figure_function,
     name_panel,
     own_words,
     page_of,
     set_title,
     shown_part,
-    units_named,
     write_beside,
 )
 from tetra_drake.formatting import fixed
 from tetra_drake.results import measures
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.units import Units
 
 _CYCLES = 3
 _LAST_SHARE = 0.25  # share of the time that is shown if no signal oscillates
@@ -55,7 +54,6 @@ def gait_diagram(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
 ) -> Drawn:
     """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
     speed of the centre of mass.
@@ -63,7 +61,7 @@ def gait_diagram(
     A bar shows when a foot bears load. The front body is on top. The duty factor is the share of
     time during which a foot bears load. Dotted lines mark cycles. If no signal has two periods in
     the second half of the simulation, the last quarter is shown."""
-    structure, unit = result.robot.structure, units_named(units)
+    structure, unit = result.robot.structure, result.scenario.units
     cycle = measures.last_step(result.trajectory)
     trajectory = shown_part(result.trajectory, time or _last_cycles(result.trajectory, cycle))
     stands = _stance(trajectory, structure)
@@ -176,7 +174,7 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, u
     panel.axhline(0.0, color="0.8", linewidth=0.5)
     panel.axhline(mean, **REFERENCE)
     panel.plot(over_time.time, over_time, **_SPEED)
-    write_beside(panel, mean, f"mean\n{fixed(mean, unit.digits)}")
+    write_beside(panel, mean, f"mean\n{fixed(mean, unit.decimals + 1)}")
     panel.set(xlabel="time (s)", xlim=trajectory.time.values[[0, -1]])
     name_panel(panel, f"{name} ({unit.length_name}/s)")
 

@@ -23,10 +23,16 @@ from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, 
 from tetra_drake.formatting import listed
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.scenario.units import customary
+from tetra_drake.scenario.units import Units
 
 _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}
-_NUMBER: Any = {"ha": "center", "va": "center", "fontsize": 7.0, "fontweight": "bold", "zorder": 4}
+_NUMBER: Any = {
+    "ha": "center",
+    "va": "center",
+    "fontsize": "small",
+    "fontweight": "bold",
+    "zorder": 4,
+}
 _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
 
 
@@ -37,13 +43,13 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
     If gaits were simulated on disturbed robots, the second panel shows the share of draws with
     nearly the undisturbed distance. A cross marks gaits for which this share is below one half.
     Numbers mark the fittest gait and the gaits nearest to the corners."""
-    kind = cast(QualityDiversity, run.scenario.optimizer)
+    kind, units = cast(QualityDiversity, run.scenario.optimizer), run.scenario.units
     gaits = elites(run)
     kept = kept_gaits(gaits)
     judged = bool(gaits["kept"].notna().any())
     count = 2 if judged else 1
     edges = [
-        np.linspace(low, high, cells + 1) / customary(UNITS[name])[0]
+        np.linspace(low, high, cells + 1) / units.of(UNITS[name])[0]
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
     named = distinct_gaits(notable_gaits(run))
@@ -56,7 +62,7 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
         shares = 100.0 * gaits["kept"]
         look: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
         _draw_cells(row[1], gaits, shares, edges, title="draws kept (%)", **look)
-    x_label, y_label = (_label(name) for name in kind.measures)
+    x_label, y_label = (_label(name, units) for name in kind.measures)
     row[0].set(ylabel=y_label)
     for panel in row:
         panel.set(xlabel=x_label)
@@ -65,7 +71,7 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
     notes = []
     for number, (names, gait) in enumerate(named, start=1):
         notes.append(f"{number}  {listed(names)}: {gait_label(gait)}")
-    page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=8.0, wrap=True)
+    page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize="small", wrap=True)
     set_title(page, "Map of gaits")
     return page
 
@@ -97,7 +103,7 @@ def _middles(gaits: Any, edges: Sequence[np.ndarray]) -> list[Any]:
     return middles
 
 
-def _label(name: str) -> str:
-    unit = customary(UNITS[name])[1]
+def _label(name: str, units: Units) -> str:
+    unit = units.of(UNITS[name])[1]
     title = name.replace("_", " ")
     return f"{title} ({unit})" if unit else title

@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from tetra_drake.figures.style import (
     LINE_COLOURS,
     OKABE_ITO,
-    WIDTH_IN,
     Drawn,
     Page,
-    Units,
     figure_function,
     legend_below,
     line_style,
@@ -27,7 +26,6 @@ from tetra_drake.figures.style import (
     panels_in_columns,
     set_title,
     shown_part,
-    units_named,
 )
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results import measures
@@ -35,7 +33,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, Units
 
 X, Y, Z = range(3)
 
@@ -64,11 +62,10 @@ def relative_distances(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
 ) -> Drawn:
     """Distance along x of each body from the first body, over time. Distances are between centres
     of mass. Grey lines: the distances at the start."""
-    unit, trajectory = units_named(units), shown_part(result.trajectory, time)
+    unit, trajectory = result.scenario.units, shown_part(result.trajectory, time)
     distances = measures.relative_distances(trajectory) / unit.length
     first, *names = distances.body.values
     page = page_of(figure, height_in=np.clip(1.5 + 0.6 * len(names), 2.4, 6.5))
@@ -91,11 +88,10 @@ def before_and_after(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
 ) -> Drawn:
     """Distance walked over time, before and after evolution: the best initial gait and the best
     gait of the best trial."""
-    unit = units_named(units)
+    unit = best.scenario.units
     page = page_of(figure, height_in=3.8)
     panel = page.subplots()
     legend = {}
@@ -103,7 +99,7 @@ def before_and_after(
         part = shown_part(result.trajectory, time)
         walked = _distance_walked(result, unit).sel(time=part.time)
         panel.plot(walked.time, walked, **look)
-        way = f"{fixed(float(walked[-1]), unit.digits)} {unit.length_name}"
+        way = f"{fixed(float(walked[-1]), unit.decimals + 1)} {unit.length_name}"
         legend[f"{when}: {way}, {textwrap.shorten(result.name, 70)}"] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
     legend_below(page, legend)
@@ -117,12 +113,11 @@ def time_lapse(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
     instants: int = 6,
 ) -> Drawn:
     """Time lapse of the robot from above, to scale, with the distance walked. Forward is to the
     right. The line is the path of the centre so far, with a dot at each full second."""
-    structure, unit = result.robot.structure, units_named(units)
+    structure, unit = result.robot.structure, result.scenario.units
     trajectory = shown_part(result.trajectory, time)
     first, last = (float(trajectory.time[i]) for i in (0, -1))
     samples = _nearest(trajectory, np.linspace(first, last, instants))
@@ -141,7 +136,7 @@ def time_lapse(
         seconds = _nearest(trajectory, np.arange(math.ceil(first), now + 1e-9))
         panel.plot(centre[: sample + 1, X], centre[: sample + 1, Y], **_PATH)
         panel.plot(centre[seconds, X], centre[seconds, Y], **_SECONDS)
-        way = signed(float(walked.sel(time=now)), unit.digits)
+        way = signed(float(walked.sel(time=now)), unit.decimals + 1)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
     if len(looks) <= len(LINE_COLOURS):
@@ -156,19 +151,18 @@ def path_of_the_centre(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
     instants: int = 9,
 ) -> Drawn:
     """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
     straight, its height along x is shown instead."""
-    structure, unit = result.robot.structure, units_named(units)
+    structure, unit = result.robot.structure, result.scenario.units
     trajectory = shown_part(result.trajectory, time)
     path = measures.path_of_centre(trajectory, structure)
     points = path.centre / unit.length
     if np.ptp(points[:, Y]) < _STRAIGHT * np.ptp(points[:, X]):
         return _draw_height(page_of(figure, height_in=2.6), points, result.robot, unit)
     ratio = np.ptp(points[:, Y]) / max(np.ptp(points[:, X]), _MARGIN / unit.length)
-    page = page_of(figure, height_in=min(WIDTH_IN * ratio, 5.0) + 1.4)
+    page = page_of(figure, height_in=min(rcParams["figure.figsize"][0] * ratio, 5.0) + 1.4)
     panel = page.subplots()
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
     panel.plot(points[:, X], points[:, Y], **_PATH)
@@ -206,7 +200,6 @@ def one_step(
     *,
     figure: Page | None = None,
     time: tuple[float, float] | None = None,
-    units: str = "in",
     instants: int = 6,
 ) -> Drawn:
     """One step to scale, from above and from the side. Bodies off the ground are red.
@@ -214,7 +207,7 @@ def one_step(
     A body is off the ground if all its feet are higher than 2 % of the robot's height. The lower
     panels show the path of one bottom node per body, or of the centre. If no signal has two periods
     in the second half of the simulation, the last quarter is shown."""
-    robot, unit = result.robot, units_named(units)
+    robot, unit = result.robot, result.scenario.units
     structure = robot.structure
     ends, title = _shown_step(result, time)
     step = shown_part(result.trajectory, ends)
@@ -350,7 +343,7 @@ def _fit(
     `wide` and `high` are the ranges that a picture shows. The pictures fill the caller's figure, or
     a page of the height `height_in`.
     """
-    page_width, page_height = WIDTH_IN, height_in
+    page_width, page_height = rcParams["figure.figsize"][0], height_in
     if figure is not None:
         page_width = figure.bbox.width / figure.dpi
         page_height = figure.bbox.height / figure.dpi
@@ -389,4 +382,6 @@ def _name_ends(panel: Axes, nodes: np.ndarray, structure: Structure) -> None:
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     for body in (0, len(structure.bodies) - 1):
         x, y, _ = nodes[structure.carriers == body].mean(axis=0)
-        panel.text(x, y, structure.bodies[body], ha="center", va="center", fontsize=7.5, bbox=box)
+        panel.text(
+            x, y, structure.bodies[body], ha="center", va="center", fontsize="small", bbox=box
+        )

@@ -22,16 +22,15 @@ from tetra_drake.figures.style import (
     SHADE,
     Drawn,
     Page,
-    Units,
     figure_function,
     name_panel,
     page_of,
     save_findings,
     set_title,
-    units_named,
     write_beside,
 )
 from tetra_drake.formatting import fixed
+from tetra_drake.scenario.units import Units
 
 _DOTS: Any = {
     "color": OKABE_ITO["sky_blue"],
@@ -73,7 +72,7 @@ def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
 
 
 @figure_function
-def robustness(judgement: Judgement, *, figure: Page | None = None, units: str = "in") -> Drawn:
+def robustness(judgement: Judgement, *, figure: Page | None = None) -> Drawn:
     """Robustness of gaits on disturbed robots.
 
     Above: the distance in each draw divided by the undisturbed distance. Boxes are quartiles,
@@ -83,7 +82,7 @@ def robustness(judgement: Judgement, *, figure: Page | None = None, units: str =
     Below left: one change alone. Bars are the median change of distance, lines the greatest loss.
     Below right: all changes together. Bars are the rank correlation of each change with the
     distance, without sign. A bar that ends in the grey may be chance."""
-    unit = units_named(units)
+    unit = judgement.scenario.units
     gaits = by_gait(judgement).sort_values("kept", kind="stable")
     changes, count = by_change(judgement).iloc[::-1], judgement.draws["draw"].nunique()
     rows = [max(len(gaits) + 1, 4), max(len(changes) + 1, 4)]

@@ -1,20 +1,22 @@
 """Common style of figures; saving of figures.
 
-A figure function has the decorator `@figure_function`. It draws on page_of(): the caller's figure,
-or a new one with matplotlib's constrained layout. save_figure() writes a figure to files. Figures
-need neither a display nor pyplot.
+A figure function has the decorator `@figure_function`, which adds the keywords of Look and `units`.
+It draws on page_of(): the caller's figure, or a new one with matplotlib's constrained layout.
+save_figure() writes a figure to files. Figures need neither a display nor pyplot.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import inspect
+import io
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ParamSpec, TypeAlias
+from typing import Any, TypeAlias
 
 import matplotlib.style
 import numpy as np
@@ -29,16 +31,13 @@ from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file, write_whole
-from tetra_drake.formatting import listed
-from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.scenario.units import shown_in
 
 Page: TypeAlias = Figure | SubFigure
 """A matplotlib figure or a part of one."""
 
 Drawn: TypeAlias = Figure | Any
 """A new figure. None if the caller gave the figure: a notebook would show a returned one twice."""
-
-_P = ParamSpec("_P")
 
 OKABE_ITO = {
     "black": "#000000",
@@ -58,40 +57,22 @@ LINE_COLOURS = tuple(colour for name, colour in OKABE_ITO.items() if name != "ye
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 """Line styles of series, for prints without colours. Colours and styles distinguish 28 series."""
 
-WIDTH_IN = 7.0
-"""Width of figures on paper, in inches."""
+
+@dataclass(frozen=True)
+class Look:
+    """Look of figures on paper: width in inches, size of letters in points, and whether they have a
+    title."""
+
+    width_in: float = 7.0
+    font_size: float = 9.0
+    title: bool = True
+
 
 SHADE = "0.9"
 """Grey behind marked intervals of time."""
 
 REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 """Line style of reference values."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """Units of lengths and forces in figures."""
-
-    length: float
-    """Size in m."""
-    length_name: str
-    digits: int
-    """Number of decimals of a length."""
-    force: float
-    """Size in N."""
-    force_name: str
-
-
-_UNITS = {"in": Units(INCH, "in", 2, POUND_FORCE, "lbf"), "SI": Units(1.0, "m", 3, 1.0, "N")}
-
-
-def units_named(name: str) -> Units:
-    """The units "in" (inches and lbf) or "SI". Raises InputError for another name."""
-    if name not in _UNITS:
-        raise InputError(
-            "figure", "units", f"found '{name}', expected one of {listed(list(_UNITS))}"
-        )
-    return _UNITS[name]
 
 
 def shown_part(trajectory: xarray.Dataset, time: tuple[float, float] | None) -> xarray.Dataset:
@@ -114,35 +95,68 @@ def line_style(index: int) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def common_style() -> Iterator[None]:
+def common_style(look: Look = Look()) -> Iterator[None]:
     """Context manager for the common style of figures. It ignores the user's matplotlibrc."""
     sheet = Path(__file__).with_name("tetra_drake.mplstyle")
     cycle = cycler(color=LINE_COLOURS * len(DASHES), linestyle=DASHES * len(LINE_COLOURS))
     with matplotlib.style.context(["default", sheet, {"axes.prop_cycle": cycle}]):
+        scale = look.font_size / Look.font_size
+        settings: Any = rcParams
+        settings.update({size: scale * settings[size] for size in _SIZES})
+        rcParams["figure.figsize"] = look.width_in, 1.0
         yield
 
 
-def figure_function(draw: Callable[_P, Drawn]) -> Callable[_P, Drawn]:
+_SIZES = (
+    "font.size",
+    *("axes.titlesize", "axes.labelsize", "figure.titlesize", "figure.labelsize"),
+    *("legend.fontsize", "xtick.labelsize", "ytick.labelsize"),
+)
+"""Names of matplotlib's sizes of letters."""
+
+
+def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
     """Decorator of a function that draws a figure and returns it.
 
-    The figure gets the common style. With the keyword `figure`, the function draws on it and
-    returns None.
+    The figure gets the common style. The function also takes the keywords of Look, and `units`: a
+    name in units.SYSTEMS in place of the scenario's units. With the keyword `figure`, the function
+    draws on it and returns None.
     """
 
     @functools.wraps(draw)
-    def drawn(*args: _P.args, **kwargs: _P.kwargs) -> Drawn:
-        with common_style():
+    def drawn(*args: Any, units: str | None = None, **kwargs: Any) -> Drawn:
+        look = Look(**{name: kwargs.pop(name) for name in vars(Look()) if name in kwargs})
+        with shown_in(units), common_style(look):
             page = draw(*args, **kwargs)
+        if not look.title:
+            page.suptitle("").set_in_layout(False)
         return page if kwargs.get("figure") is None else None
 
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    of_look = inspect.signature(Look).parameters.values()
+    added = [inspect.Parameter("units", keyword, default=None)]
+    added += [parameter.replace(kind=keyword) for parameter in of_look]
+    own = inspect.signature(draw)
+    shown: Any = drawn
+    shown.__signature__ = own.replace(parameters=[*own.parameters.values(), *added])
     return drawn
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook shows, even without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        self.savefig(file, format="png", dpi=100)
+        return file.getvalue()
+
+
 def page_of(figure: Page | None, *, height_in: float) -> Page:
-    """The figure to draw on: the caller's, or a new one, `height_in` inches high. It gets the
-    constrained layout, unless the caller has set another layout."""
+    """The figure to draw on: the caller's, or a new one, `height_in` inches high with letters of
+    the usual size. It gets the constrained layout, unless the caller has set another layout."""
     if figure is None:
-        return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+        height = height_in * rcParams["font.size"] / Look.font_size
+        return ShownFigure(figsize=(rcParams["figure.figsize"][0], height), layout="constrained")
     if figure.get_layout_engine() is None:
         figure.figure.set_layout_engine("constrained")
     return figure

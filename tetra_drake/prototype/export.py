@@ -66,9 +66,9 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
         write_whole(folder / LIMITS, loads.table.to_csv(float_format="%.6g"))
         save_scenario(folder, scenario)
 
-        played, distance = _played(scenario, folder / COMMAND), fixed(result.metrics.distance_in)
+        played = _played(scenario, folder / COMMAND)
         verdict = load_verdict(loads, result)
-        verdict += f"\n{played}; the gait itself goes {distance} in."
+        verdict += f"\n{played}; the gait itself goes {_distance(result)}."
         template = resources.files("tetra_drake") / "prototype/README.template.md"
         about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
         write_whole(folder / README, template.read_text("utf-8").format(**about))
@@ -109,4 +109,9 @@ def _played(scenario: Scenario, file: Path) -> str:
         result = simulate(scenario=scenario, command=load_command(file, scenario))
     except SimulationFailure as failure:
         return f"Played from {file.name}, the {failure}"
-    return f"Played from {file.name}, the robot goes {fixed(result.metrics.distance_in)} in"
+    return f"Played from {file.name}, the robot goes {_distance(result)}"
+
+
+def _distance(result: SimulationResult) -> str:
+    units = result.scenario.units
+    return f"{fixed(result.metrics.distance / units.length)} {units.length_name}"

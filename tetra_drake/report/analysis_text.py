@@ -1,4 +1,4 @@
-"""Texts of the commands `robustness` and `compare`: tables with distances in inches."""
+"""Texts of the commands `robustness` and `compare`: tables in the scenario's units."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tetra_drake.analysis.comparison import Compared
 from tetra_drake.analysis.robustness import LOSS, Judgement, by_change, by_gait, chance
 from tetra_drake.formatting import Table, fixed, percents, ranged, rounded, signed
-from tetra_drake.scenario.units import INCH, shown
+from tetra_drake.scenario.units import Units
 
 if TYPE_CHECKING:
     import pandas
@@ -20,45 +20,47 @@ def robustness_text(judgement: Judgement) -> str:
     """Tables of a judgement: distances of gaits on disturbed robots, and the most harmful
     changes."""
     gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
-    require = bool(judgement.scenario.require)
+    require, units = bool(judgement.scenario.require), judgement.scenario.units
     misses = " and misses no requirement" if require else ""
     texts = [
-        f"Distances in inches in {count} draws of disturbances: undisturbed, percentiles, mean.\n"
+        f"Distances in {units.length_word} in {count} draws of disturbances: undisturbed, "
+        "percentiles, mean.\n"
         f"Robust: share of draws in which a gait loses at most {100.0 * LOSS:g} %{misses}.\n"
         "In brackets: 95 % confidence intervals.",
-        _gaits_table(gaits, with_missed=require).text(),
-        "What hurts most: change of the distance in inches by one disturbance alone.\n"
+        _gaits_table(gaits, units, with_missed=require).text(),
+        f"What hurts most: change of the distance in {units.length_word} by one disturbance "
+        "alone.\n"
         "Correlation: Spearman's, of factor and distance over the draws of a gait; mean, and\n"
         f"median of its absolute value. Chance alone gives up to {chance(count):.2f}.",
-        _changes_table(by_change(judgement)).text(),
+        _changes_table(by_change(judgement), units).text(),
     ]
     return "\n\n".join(texts)
 
 
-def _gaits_table(gaits: pandas.DataFrame, *, with_missed: bool) -> Table:
-    lengths = ["undisturbed", "5 %", "50 %", "95 %"]
+def _gaits_table(gaits: pandas.DataFrame, units: Units, *, with_missed: bool) -> Table:
+    shown = ["undisturbed", "5 %", "50 %", "95 %"]
     counts = ["failed", "missed"] if with_missed else ["failed"]
     rows = []
     for gait, row in gaits.iterrows():
         name = str(gait)
         if len(name) >= _LONGEST_NAME:
             name = f"{name[: _LONGEST_NAME - 1]}…"
-        cells = [name, *(rounded(row[length] / INCH) for length in lengths)]
-        inches = row / INCH
-        cells.append(ranged(inches["mean"], inches["mean_low"], inches["mean_high"]))
+        cells = [name, *(rounded(row[length] / units.length) for length in shown)]
+        lengths = row / units.length
+        cells.append(ranged(lengths["mean"], lengths["mean_low"], lengths["mean_high"]))
         cells.append(percents(row["kept"], row["kept_low"], row["kept_high"]))
         cells += [f"{row[count]:.0f}" for count in counts]
         rows.append(cells)
-    return Table(["gait", *lengths, "mean", "robust", *counts], rows)
+    return Table(["gait", *shown, "mean", "robust", *counts], rows)
 
 
-def _changes_table(changes: pandas.DataFrame) -> Table:
+def _changes_table(changes: pandas.DataFrame, units: Units) -> Table:
     rows = []
     for what, row in changes.iterrows():
         correlation, size = signed(row["correlation"]), fixed(row["correlation_size"])
         if math.isnan(row["correlation"]):
             correlation, size = "", ""
-        median, worst = fixed(row["median"] / INCH), signed(row["worst"] / INCH)
+        median, worst = fixed(row["median"] / units.length), signed(row["worst"] / units.length)
         rows.append([str(what), median, worst, f"{row['failed']:.0f}", correlation, size])
     headings = ["disturbance", "median change", "worst", "failed", "correlation", "|correlation|"]
     return Table(headings, rows)
@@ -66,10 +68,14 @@ def _changes_table(changes: pandas.DataFrame) -> Table:
 
 def comparison_text(compared: Compared) -> str:
     """Tables of the fitnesses and distances of compared runs."""
-    distances = "Distance in inches of the best gait of each trial, also as interquartile mean."
+    units = compared.scenario.units
+    distances = (
+        f"Distance in {units.length_word} of the best gait of each trial, also as interquartile "
+        "mean."
+    )
     if compared.reach is not None:
         distances += (
-            f"\nSimulations until a trial's best gait walks {shown(compared.reach, 'm')}: "
+            f"\nSimulations until a trial's best gait walks {units.shown(compared.reach, 'm')}: "
             "median (quartiles) over trials."
         )
     texts = [
@@ -95,13 +101,13 @@ def _fitness_table(compared: Compared) -> Table:
 
 
 def _distance_table(compared: Compared) -> Table:
-    headings = ["run", "distance", "s per evaluation"]
+    headings, units = ["run", "distance", "s per evaluation"], compared.scenario.units
     if compared.reach is not None:
-        headings += [f"simulations to {shown(compared.reach, 'm')}", "trials that reach it"]
+        headings += [f"simulations to {units.shown(compared.reach, 'm')}", "trials that reach it"]
     rows = []
     for label, row in compared.runs.iterrows():
-        inches = row / INCH
-        mean = ranged(inches["distance_mean"], inches["distance_low"], inches["distance_high"])
+        lengths = row / units.length
+        mean = ranged(lengths["distance_mean"], lengths["distance_low"], lengths["distance_high"])
         cells = [str(label), mean, rounded(row["wall_time"], 2)]
         if compared.reach is not None:
             low, high = _cost(row["reached_low"]), _cost(row["reached_high"])

@@ -88,7 +88,7 @@ def load_result(folder: str | Path) -> SimulationResult:
         robot=robot,
         name=file.name,
         gait=gait,
-        metrics=Metrics(**file.metrics),
+        metrics=Metrics(**file.metrics, units=scenario.units),
         fitness=_number(file.fitness),
         duration=file.duration_s,
         wall_time=file.wall_time_s,

@@ -41,9 +41,9 @@ class RecordedGait:
         return gait_label(self.recorded)
 
     @property
-    def distance_in(self) -> float:
-        """Distance (in) in the new simulation."""
-        return self.result.metrics.distance_in
+    def distance(self) -> float:
+        """Distance (m) in the new simulation."""
+        return self.result.metrics.distance
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from tetra_drake.robot.weights import KINDS
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import shown
+from tetra_drake.scenario.units import Units
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites.csv"
@@ -129,9 +129,9 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
         map_pages[names[0]] = page
     changed = {}
     for shown_gait in (shown.best, shown.initial):
-        change = abs(shown_gait.distance_in - shown_gait.recorded["distance_in"])
-        if change > 1e-6:
-            changed[shown_gait.label] = change
+        change = abs(shown_gait.distance - shown_gait.recorded["distance"])
+        if change > 1e-8:
+            changed[shown_gait.label] = change / scenario.units.length
     gait = run.gait(shown.trial, shown.best.recorded["index"])
     return render(
         "report/report.html.jinja",
@@ -141,13 +141,14 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
         evaluations=f"{sum(status.evaluations for status in run.statuses):,}",
         ground=ground_text(scenario),
         best=shown.best,
+        units=scenario.units,
         changed=changed,
         versions=versions(),
         differences=_settings(scenario),
         results=results(run),
         trials=trials_table(run),
-        objective=_terms(scenario.objective, inverse),
-        require=_terms(scenario.require, str),
+        objective=_terms(scenario.objective, inverse, scenario.units),
+        require=_terms(scenario.require, str, scenario.units),
         gaits=gaits,
         label=gait_label,
         links={"best": best_gait},
@@ -180,9 +181,9 @@ def _settings(scenario: Scenario) -> list[tuple[str, str]]:
     ]
 
 
-def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
+def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str], units: Units) -> str:
     """Weights or limits of metrics as text. `unit_of` gives their unit from the metric's unit."""
-    terms = [f"{name}: {shown(x, unit_of(UNITS[name]))}" for name, x in weights.items()]
+    terms = [f"{name}: {units.shown(x, unit_of(UNITS[name]))}" for name, x in weights.items()]
     return ", ".join(terms)
 
 

@@ -16,7 +16,6 @@ from tetra_drake.robot.robot import Robot, undisturbed_structure
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.visualization.replay import save_replay
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
 
 
 def structure_text(study: EquilibriumStudy) -> str:
-    """Description of a robot and its equilibrium, with tables in g, in and lbf."""
+    """Description of a robot and its equilibrium, with tables in g and the robot's units."""
     robot, statics = study.robot, study.statics
     structure = robot.structure
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
@@ -68,31 +67,37 @@ def structure_text(study: EquilibriumStudy) -> str:
 
 
 def _bodies_table(study: EquilibriumStudy) -> Table:
-    rows, structure = [], study.robot.structure
+    rows, structure, units = [], study.robot.structure, study.robot.scenario.units
     for body, mass in zip(structure.bodies, structure.mass, strict=True):
         nodes = study.nodes[study.nodes["body"] == body]
-        heights = _range(nodes["z"] / INCH, fixed)
-        load = rounded(nodes["load"].sum() / POUND_FORCE)
+        heights = _range(nodes["z"] / units.length, fixed)
+        load = rounded(nodes["load"].sum() / units.force)
         rows.append([body, rounded(1e3 * mass, 4), heights, load])
-    return Table(["body", "mass (g)", "heights of nodes (in)", "load on the ground (lbf)"], rows)
+    heights, load = (
+        f"heights of nodes ({units.length_name})",
+        f"load on the ground ({units.force_name})",
+    )
+    return Table(["body", "mass (g)", heights, load], rows)
 
 
 def _anchors_table(study: EquilibriumStudy) -> Table:
+    units = study.robot.scenario.units
     forces = study.nodes.loc[study.robot.structure.held.any(axis=1), "anchor_x":"anchor_z"]
     noise = _NOISE * forces.abs().to_numpy().max()
-    pounds = (forces.where(forces.abs() > noise, 0.0) / POUND_FORCE).itertuples()
-    rows = [[str(node), *map(rounded, pushes)] for node, *pushes in pounds]
-    return Table(["anchor", *(f"force along {axis} (lbf)" for axis in "xyz")], rows)
+    shown = (forces.where(forces.abs() > noise, 0.0) / units.force).itertuples()
+    rows = [[str(node), *map(rounded, pushes)] for node, *pushes in shown]
+    return Table(["anchor", *(f"force along {axis} ({units.force_name})" for axis in "xyz")], rows)
 
 
 def _cables_table(study: EquilibriumStudy) -> Table:
-    rows = []
+    rows, units = [], study.robot.scenario.units
     for group, cables in study.cables.groupby("group", sort=False):
-        free = rounded(cables["free_length"].mean() / INCH)
-        lengths, tensions = cables["length"] / INCH, cables["tension"] / POUND_FORCE
+        free = rounded(cables["free_length"].mean() / units.length)
+        lengths, tensions = cables["length"] / units.length, cables["tension"] / units.force
         rows.append([str(group), str(len(cables)), free, _range(lengths), _range(tensions)])
-    headings = ["cables", "number", "free length (in)", "length (in)", "tension (lbf)"]
-    return Table(headings, rows)
+    length, force = units.length_name, units.force_name
+    names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
+    return Table(["cables", "number", *names], rows)
 
 
 def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> str:

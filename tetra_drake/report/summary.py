@@ -13,7 +13,7 @@ from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import customary
+from tetra_drake.scenario.units import Units
 
 if TYPE_CHECKING:
     import pandas
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _SHARES = ("kept", *(name for name, metric in METRICS.items() if metric.is_share))
 """Names of the numbers that are shown in percent."""
 
-_TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robust (%)"}
+_TITLES = {"worst_distance": "distance in the worst draw", "kept": "robust"}
 """Titles of numbers that are no metrics."""
 
 _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
@@ -43,10 +43,10 @@ def metrics_table(
     """
     *_, last = gaits.values()
     first = headline_metric(scenario.objective, last)
-    names = dict.fromkeys([first, "fitness", "worst_distance_in", *METRICS, "kept"])
+    names = dict.fromkeys([first, "fitness", "worst_distance", *METRICS, "kept"])
     rows = []
     for name in names:
-        size, title = _size_and_title(name)
+        size, title = _size_and_title(name, scenario.units)
         values = [gait.get(name, math.nan) / size for gait in gaits.values()]
         if any(math.isfinite(value) and abs(value) >= _NOTHING for value in values):
             digits = [fixed(x, 0) if name in _SHARES else rounded(x) for x in values]
@@ -54,13 +54,13 @@ def metrics_table(
     return Table(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))
 
 
-def _size_and_title(name: str) -> tuple[float, str]:
+def _size_and_title(name: str, units: Units) -> tuple[float, str]:
     """Size of the unit for a number, and the title of its row."""
-    title = name.replace("_", " ")
+    title = _TITLES.get(name, name.replace("_", " "))
     if name in _SHARES:
-        return 0.01, _TITLES.get(name, f"{title} (%)")
-    size, unit = customary(UNITS.get(name, ""))
-    return size, _TITLES.get(name, f"{title} ({unit})" if unit else title)
+        return 0.01, f"{title} (%)"
+    size, unit = units.of("m" if name == "worst_distance" else UNITS.get(name, ""))
+    return size, f"{title} ({unit})" if unit else title
 
 
 def result_text(result: SimulationResult) -> str:
@@ -120,14 +120,19 @@ def results(run: Run) -> list[tuple[str, str]]:
     starts = [run.initial_best(trial) for trial in best["trial"]]
     initial = max(starts, key=lambda gait: gait["fitness"])
     name = _about(run)
-    title, unit = name.replace("_", " "), UNITS[name]
+    title = name.replace("_", " ")
+    size, unit = run.scenario.units.of(UNITS[name])
+
+    def three(value: float) -> str:
+        return f"{rounded(value / size)} {unit}".rstrip()
+
     rows = [
-        (title, f"{_three(fittest[name], unit)}, {gait_label(fittest)}"),
-        ("best initial gait", f"{_three(initial[name], unit)}, {gait_label(initial)}"),
+        (title, f"{three(fittest[name])}, {gait_label(fittest)}"),
+        ("best initial gait", f"{three(initial[name])}, {gait_label(initial)}"),
     ]
     if len(best) > 1:
-        median = _three(best[name].median(), unit)
-        low, high = (_three(best[name].quantile(share), unit) for share in (0.25, 0.75))
+        median = three(best[name].median())
+        low, high = (three(best[name].quantile(share)) for share in (0.25, 0.75))
         rows.append(("best of each trial", f"median {median}, quartiles {low} and {high}"))
     return rows + effort
 
@@ -138,7 +143,7 @@ def trials_table(run: Run) -> Table:
     Gaits are described by the main metric of the objective. "in Drake" is the final best gait,
     evaluated again on the Drake diagram. Columns without values are left out.
     """
-    size, title = _size_and_title(_about(run))
+    size, title = _size_and_title(_about(run), run.scenario.units)
     best = {row["trial"]: row for _, row in run.best().iterrows()}
     in_drake = run.reevaluations.set_index(["trial", "index"])
     columns = ["trial", f"initial {title}", "best", "in Drake", "evaluations", "failed", "end"]
@@ -169,12 +174,6 @@ def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[f
 def _about(run: Run) -> str:
     """Name of the main metric in the objective of a run."""
     return headline_metric(run.scenario.objective, run.fittest())
-
-
-def _three(value: float, unit: str) -> str:
-    """A number given in an SI unit, as text with three digits in the customary unit."""
-    size, name = customary(unit)
-    return f"{rounded(value / size)} {name}".rstrip()
 
 
 def _time(seconds: float) -> str:

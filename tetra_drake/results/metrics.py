@@ -14,7 +14,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes
 from tetra_drake.scenario.metrics import METRICS, UNITS, Metrics, Poses, Walk, looks_for_distance
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH, shown
+from tetra_drake.scenario.units import INCH, current
 
 
 def steady_start(scenario: Scenario) -> float:
@@ -44,7 +44,7 @@ def compute_metrics(
         actuators=robot.driven.size,
         tally=totals,
     )
-    return Metrics.of(walk, lacking=scenario.lacking)
+    return Metrics.of(walk, lacking=scenario.lacking, units=scenario.units)
 
 
 def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) -> Poses:
@@ -87,21 +87,22 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
     """Short result of a gait, chosen by the scenario's objective, such as "walks 14.3 inches in
     15 s"."""
     seconds = f"in {scenario.simulation.duration:g} s"
-    inches = metrics["distance"] / INCH
-    way = [f"walks {fixed(abs(inches), 1)} inches", "backward" if inches < 0.0 else ""]
+    units, distance = scenario.units, metrics["distance"]
+    length = fixed(abs(distance) / units.length, units.decimals)
+    way = [f"walks {length} {units.length_word}", "backward" if distance < 0.0 else ""]
     walk = " ".join(filter(None, [*way, scenario.terrain.where, seconds]))
     name = headline_metric(scenario.objective, metrics)
     if name == "distance":
         return walk
     if name == "heading_change":
         return f"turns {fixed(abs(math.degrees(metrics[name])), 0)} degrees {seconds}"
-    return f"{name.replace('_', ' ')} {shown(metrics[name], UNITS[name])}, {walk}"
+    return f"{name.replace('_', ' ')} {units.shown(metrics[name], UNITS[name])}, {walk}"
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
     """Texts about the metrics that do not meet their required SI values, such as "clearance is
     0.05 in, less than 0.125 in". NaN meets no requirement."""
-    texts = []
+    texts, shown = [], current(metrics.units).shown
     for name, limit in require.items():
         value, unit, most = getattr(metrics, name), UNITS[name], METRICS[name].most
         is_met = value <= limit if most else value >= limit

@@ -67,14 +67,18 @@ def _check_start(
     corner, cells = np.array(grid.corner), np.array(grid.heights.shape) - 1
     low, high = start[:, :2].min(axis=0), start[:, :2].max(axis=0)
     if (low < corner).any() or (high > corner + cells * grid.cell).any():
-        reach = [f"{side / INCH:.4g} in" for side in (*corner, *(corner + cells * grid.cell))]
+        reach = [
+            scenario.units.shown(side, "m") for side in (*corner, *(corner + cells * grid.cell))
+        ]
         problem = f"the robot starts off its grid, which goes from x, y = {reach[0]}, {reach[1]} "
         raise InputError(scenario.name, "terrain", problem + f"to {reach[2]}, {reach[3]}")
-    gaps = ground_frames(start, ground)[:, terrain.GAP]
+    units, gaps = scenario.units, ground_frames(start, ground)[:, terrain.GAP]
     weight = float(structure.mass.sum()) * scenario.robot.gravity
     if gaps.min() < -START_DEPTH - weight / scenario.ground.stiffness:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
-        problem = f"the robot starts with node {node} {-gaps.min() / INCH:.3g} in below the ground"
+        problem = (
+            f"the robot starts with node {node} {units.shown(-gaps.min(), 'm')} below the ground"
+        )
         problem += "; move what is there, or robot.offsets"
         raise InputError(scenario.name, "terrain", problem)
 

@@ -16,7 +16,6 @@ from tetra_drake.files import whole_file
 from tetra_drake.physics.oscillator import make_neurons, network_output
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
-from tetra_drake.scenario.units import POUND_FORCE
 
 
 def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
@@ -77,25 +76,18 @@ def signals_at(
     return signals
 
 
-UNITS = {"lbf": POUND_FORCE, "N": 1.0}
-"""Units of force for save_signals()."""
-
-
-def save_signals(
-    path: str | Path, robot: Robot, gait: Gait, *, unit: str = "lbf", rate: float | None = None
-) -> None:
+def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:
     """Writes the signals of a gait as CSV with the columns time_s, signal_1 ... signal_m.
 
-    The first lines begin with # and describe the columns.
+    The first lines begin with # and describe the columns. Forces are in the scenario's unit.
 
     Args:
-        unit: one of UNITS.
         rate: samples per second (Hz); one per `cpg.listing_step` by default.
 
     Raises:
         InputError: if the rate is above its default, or the file cannot be written.
     """
-    scenario, cpg = robot.scenario, robot.scenario.cpg
+    scenario, cpg, units = robot.scenario, robot.scenario.cpg, robot.scenario.units
     duration = scenario.simulation.duration
     most = 1.0 / cpg.listing_step
     if rate is not None and not 0.0 < rate <= most * (1.0 + 1e-9):
@@ -103,12 +95,12 @@ def save_signals(
         raise InputError("rate", "", problem)
     period = cpg.listing_step if rate is None else 1.0 / rate
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
-    signals = signals_at(robot, gait, times) / UNITS[unit]
+    signals = signals_at(robot, gait, times) / units.force
     names = [f"signal_{i + 1}" for i in range(robot.structure.signals)]
     cables = zip(names, robot.structure.driven_cables, strict=True)
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
-        f"# time_s: time in s; signal_i: force in {unit} that shortens the cables",
+        f"# time_s: time in s; signal_i: force in {units.force_name} that shortens the cables",
         *(f"# {name}: {driven}" for name, driven in cables),
         ",".join(["time_s", *names]),
     ]

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from tetra_drake.scenario.section import Section, written
-from tetra_drake.scenario.units import shown
+from tetra_drake.scenario.units import plainest
 
 
 def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
     """Settings in brackets after a blank, such as " (slope 5 deg)"; empty if there are none.
 
-    Lengths are in inches. Defaults are left out, except the settings named in `always`.
+    Numbers have the unit that needs the fewest digits. Defaults are left out, except the settings
+    named in `always`.
     """
-    given = written(kind.model_dump(exclude_defaults=True), shown)
+    given = written(kind.model_dump(exclude_defaults=True), plainest)
     settings = {name: getattr(kind, name) for name in always} | given
     texts = []
     for name, value in settings.items():

@@ -14,7 +14,7 @@ import numpy as np
 from tetra_drake.files import json_number
 from tetra_drake.formatting import Table
 from tetra_drake.physics.curves import curvature, travelling_index
-from tetra_drake.scenario.units import INCH, customary, shown
+from tetra_drake.scenario.units import INCH, INCHES, Units, current
 
 if TYPE_CHECKING:
     from tetra_drake.physics.tally import Tally
@@ -271,30 +271,37 @@ class Metrics:
     actuators."""
     lifted_shares: tuple[float, ...] = ()
     """Share of the steady stretch during which each body is off the ground, from T1 on."""
+    units: Units = field(default=INCHES, repr=False, compare=False)
+    """Units of the printed metrics; see also units.shown_in()."""
 
     @classmethod
-    def of(cls, walk: Walk, *, lacking: Collection[str]) -> Self:
+    def of(cls, walk: Walk, *, lacking: Collection[str], units: Units) -> Self:
         """Computes all metrics. A metric is NaN if it needs a property that the robot is
-        `lacking`."""
+        `lacking`. They are printed in `units`."""
         numbers = {
             name: math.nan if metric.needs in lacking else float(metric.compute(walk))
             for name, metric in METRICS.items()
         }
-        return cls(**numbers, lifted_shares=walk.lifted_shares)
+        return cls(**numbers, lifted_shares=walk.lifted_shares, units=units)
 
-    def __str__(self) -> str:
-        """Table of the metrics that apply to the robot, in SI and in customary units."""
-        rows = []
+    @property
+    def table(self) -> Table:
+        """Table of the metrics that apply to the robot, with units, in two pairs of columns."""
+        rows, units = [], current(self.units)
         for name, unit in UNITS.items():
             value = round(getattr(self, name), 9) + 0.0  # neither -0 nor rounding errors
             if not math.isnan(value):
-                read = shown(value, unit) if customary(unit)[1] != unit else ""
-                rows.append([name, f"{value:.4g} {unit}".rstrip(), read])
+                rows.append([name, units.shown(value, unit)])
         half = (len(rows) + 1) // 2
-        pairs = itertools.zip_longest(rows[:half], rows[half:], fillvalue=[""] * 3)
-        headings = ["metric", "SI", "in, lbf, deg"]
+        pairs = itertools.zip_longest(rows[:half], rows[half:], fillvalue=["", ""])
         side_by_side = [left + right for left, right in pairs]
-        return Table(headings * 2, side_by_side, text_columns=range(6)).text()
+        return Table(["metric", "value"] * 2, side_by_side, text_columns=range(4))
+
+    def __str__(self) -> str:
+        return self.table.text()
+
+    def _repr_html_(self) -> str:
+        return self.table.html()
 
     @property
     def distance_in(self) -> float:

@@ -35,7 +35,7 @@ from tetra_drake.scenario.section import Section, Tree, flattened, written
 from tetra_drake.scenario.structure_files import names_structure, with_structure
 from tetra_drake.scenario.strut_contact_kinds import NoStrutContact, StrutContactKind
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
-from tetra_drake.scenario.units import plainest, rounded_in_text, shortest
+from tetra_drake.scenario.units import Units, plainest, rounded_in_text, shortest, units_for
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
@@ -130,6 +130,12 @@ class Scenario(Section):
         """Values by dotted keys, without the scenario's name. Scenarios with the same values are
         equal; the name is only a label."""
         return flattened(self.model_dump(exclude={"name"}))
+
+    @property
+    def units(self) -> Units:
+        """Units of this scenario in texts, pages and figures: those that need the fewest digits for
+        the long lengths of its robot, or the units of units.shown_in()."""
+        return units_for(self.robot.lengths)
 
     @property
     def oscillators(self) -> int:

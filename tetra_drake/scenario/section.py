@@ -7,6 +7,7 @@ TAG.
 
 from __future__ import annotations
 
+import functools
 import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
@@ -82,6 +83,12 @@ class Section(BaseModel):
     def values(self) -> dict[str, Any]:
         """Values by dotted keys."""
         return flattened(self.model_dump())
+
+    @functools.cached_property
+    def lengths(self) -> tuple[float, ...]:
+        """All lengths in m. A copy with disturbed numbers keeps them."""
+        numbers = _quantities(self.model_dump())
+        return tuple(float(number) for number in numbers if number.unit == "m")
 
     def _compared(self) -> Any:
         # The order counts: it numbers the bodies and oscillators of a structure.
@@ -278,6 +285,15 @@ def written(value: Any, show: Show = "{!r} {}".format) -> Any:
     if isinstance(value, list):
         return [written(item, show) for item in value]
     return value
+
+
+def _quantities(value: Any) -> Iterator[Quantity]:
+    """All quantities in a tree's value."""
+    if isinstance(value, Quantity):
+        yield value
+    elif isinstance(value, (dict, list)):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _quantities(item)
 
 
 def flattened(tree: Tree, key: str = "") -> dict[str, Any]:

@@ -1,16 +1,129 @@
-"""Units: conversion of texts to SI numbers, and of SI numbers to texts in customary units."""
+"""Units: conversion of texts to SI numbers, and of SI numbers to texts in units for people.
+
+Each scenario has its own units, see Scenario.units. shown_in() replaces them.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import re
+from collections.abc import Iterator
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+from tetra_drake.errors import InputError
+from tetra_drake.formatting import listed
 
 INCH = 0.0254  # m, exact
 POUND_FORCE = 4.4482216152605  # N, exact
 
-_READ = {"m": (INCH, "in"), "N": (POUND_FORCE, "lbf"), "rad": (math.pi / 180.0, "deg")}
-"""Customary unit of each SI unit: size in SI, and name."""
+
+@dataclass(frozen=True)
+class Units:
+    """Units of shown numbers: of lengths and forces. Angles are in degrees, the rest is in SI."""
+
+    length: float
+    """Size in m."""
+    length_name: str
+    length_word: str
+    """Name of the unit of length in a sentence."""
+    decimals: int
+    """Number of decimals of a distance in a sentence; figures have one more."""
+    square: float
+    """Side of a square on the floor of a replay, in m."""
+    squares: int
+    """Number of squares between two dark lines of the floor."""
+    force: float = 1.0
+    """Size in N."""
+    force_name: str = "N"
+
+    def of(self, unit: str) -> tuple[float, str]:
+        """Unit in place of an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name. A
+        unit with other dimensions than length, force, angle and time is returned as it is."""
+        if self.force == 1.0 and "N" in unit:
+            return 1.0, unit
+        read = {
+            "m": (self.length, self.length_name),
+            "N": (self.force, self.force_name),
+            "rad": (math.pi / 180.0, "deg"),
+        }
+        above, _, below = unit.partition("/")
+        size = 1.0
+        for factors, sign in ((above, 1), (below, -1)):
+            for factor in factors.split("*"):
+                name, _, power = factor.partition("^")
+                if name not in {*read, "s", "1", ""}:
+                    return 1.0, unit
+                size *= read.get(name, (1.0, ""))[0] ** (sign * int(power or 1))
+        name = re.sub(r"[A-Za-z]+", lambda word: read.get(word[0], (1.0, word[0]))[1], unit)
+        return size, name.removeprefix("1")
+
+    def shown(self, number: float, unit: str) -> str:
+        """A number given in an SI unit, as text in these units, such as "25 lbf/in"."""
+        size, name = self.of(unit)
+        return f"{number / size:.4g} {name}".rstrip()
+
+
+INCHES = Units(INCH, "in", "inches", 1, INCH, 6, POUND_FORCE, "lbf")
+
+SYSTEMS = {
+    "cm": Units(0.01, "cm", "cm", 1, 0.02, 5),
+    "mm": Units(0.001, "mm", "mm", 0, 0.02, 5),
+    "SI": Units(1.0, "m", "m", 2, 0.1, 10),
+    "in": INCHES,
+}
+"""Units by name."""
+
+_chosen: ContextVar[Units | None] = ContextVar("units", default=None)
+
+
+def units_named(name: str) -> Units:
+    """The units of a name in SYSTEMS. Raises InputError for another name."""
+    if name not in SYSTEMS:
+        raise InputError("units", "", f"found '{name}', expected one of {listed(list(SYSTEMS))}")
+    return SYSTEMS[name]
+
+
+@contextlib.contextmanager
+def shown_in(name: str | None) -> Iterator[None]:
+    """Context manager: all numbers are shown in the units of a name in SYSTEMS. Without a name,
+    each scenario keeps its own. Raises InputError for another name."""
+    token = _chosen.set(units_named(name) if name else _chosen.get())
+    try:
+        yield
+    finally:
+        _chosen.reset(token)
+
+
+def units_for(lengths: tuple[float, ...]) -> Units:
+    """The units of shown_in(); otherwise the units of a robot with these lengths (m)."""
+    return current(_fitting(lengths))
+
+
+def current(own: Units) -> Units:
+    """The units of shown_in(); otherwise `own`."""
+    return _chosen.get() or own
+
+
+@functools.lru_cache(maxsize=1000)
+def _fitting(lengths: tuple[float, ...]) -> Units:
+    """The units that need the fewest digits for the long ones among lengths (m)."""
+    least = _LONG * max(map(abs, lengths), default=0.0)
+    long = [abs(length) for length in lengths if abs(length) >= least]
+    return min(SYSTEMS.values(), key=lambda units: sum(_digits(x / units.length) for x in long))
+
+
+_LONG = 0.25
+"""Least length, as a share of the greatest, that counts. Diameters are in mm also where lengths are
+in cm."""
+
+
+def _digits(number: float) -> int:
+    """Number of digits of a number in a text."""
+    return sum(letter.isdecimal() for letter in f"{number:.9g}")
+
 
 _SMALL = {
     "m": [(1e-3, "mm"), (1e-2, "cm")],
@@ -59,38 +172,13 @@ def rounded_in_text(text: str) -> str:
     return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
 
 
-def customary(unit: str) -> tuple[float, str]:
-    """Customary unit for an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name. A
-    unit with other dimensions than length, force, angle and time is returned as it is."""
-    above, _, below = unit.partition("/")
-    size = 1.0
-    for factors, sign in ((above, 1), (below, -1)):
-        for factor in factors.split("*"):
-            name, _, power = factor.partition("^")
-            if name not in {*_READ, "s", "1", ""}:
-                return 1.0, unit
-            size *= _READ.get(name, (1.0, ""))[0] ** (sign * int(power or 1))
-    name = re.sub(r"[A-Za-z]+", lambda word: _READ.get(word[0], (1.0, word[0]))[1], unit)
-    return size, name.removeprefix("1")
-
-
-def shown(number: float, unit: str) -> str:
-    """A number given in an SI unit, as text in the customary unit, such as "25 lbf/in"."""
-    size, name = customary(unit)
-    return f"{number / size:.4g} {name}".rstrip()
-
-
 def plainest(number: float, unit: str) -> str:
     """A number given in an SI unit, as text in the unit that needs the fewest digits, such as
     "20 ms"."""
     if number == 0.0:
         return "0"
-    candidates = [customary(unit), *_SMALL.get(unit, []), (1.0, unit.removeprefix("1"))]
-
-    def digits(candidate: tuple[float, str]) -> int:
-        return sum(letter.isdecimal() for letter in f"{number / candidate[0]:.9g}")
-
-    size, name = min(candidates, key=digits)
+    candidates = [INCHES.of(unit), *_SMALL.get(unit, []), (1.0, unit.removeprefix("1"))]
+    size, name = min(candidates, key=lambda candidate: _digits(number / candidate[0]))
     return f"{number / size:.6g} {name}".rstrip()
 
 

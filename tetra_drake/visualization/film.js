@@ -11,7 +11,7 @@ window.addEventListener("load", () => {
   const {Color, CylinderGeometry, ConeGeometry, BufferGeometry, Fog, Group, Line} = MeshCat.THREE;
   const {LineBasicMaterial, Mesh, MeshPhongMaterial, Quaternion, Raycaster, Vector3} = MeshCat.THREE;
   const {bodies, cables, colours, contacts, nodes, progress, strut, times} = recording;
-  const INCH = 0.0254, UP = new Vector3(0, 0, 1);
+  const UP = new Vector3(0, 0, 1);
   const WIDTH_FILLED = 0.7, HEIGHT_FILLED = 0.58;  // shares of the picture
   const AFAR = 30;  // robots
   const SMOOTHING = 0.6;  // s before and after a time over which the camera's target is averaged
@@ -211,7 +211,8 @@ window.addEventListener("load", () => {
       }, "name");
     });
   }
-  const gap = 6 * Math.ceil(size / (15 * INCH));
+  const {length, dark} = recording;
+  const gap = dark * Math.ceil(size / (2.5 * dark));  // between two marks of the ruler, in m
   const heights = new Map();
   function height(x, y) {
     const key = `${x} ${y}`;
@@ -223,14 +224,14 @@ window.addEventListener("load", () => {
     return heights.get(key);
   }
   for (let mark = -2; mark <= 2; mark += 1) {
-    const inches = () => gap * (Math.round(middle().x / INCH / gap) + mark);
+    const along = () => gap * (Math.round(middle().x / gap) + mark);
     const point = () => {
-      const y = 6 * INCH * Math.floor((middle().y - 0.5 * size) / INCH / 6);
-      const x = inches() * INCH;
+      const y = dark * Math.floor((middle().y - 0.5 * size) / dark);
+      const x = along();
       return new Vector3(x, y, height(x, y));
     };
     label("", point, "ruler");
-    labels.at(-1).text = () => `${inches()} in`;
+    labels.at(-1).text = () => `${Number((along() / length.size).toPrecision(6))} ${length.name}`;
   }
   function show_labels() {
     const {offsetWidth, offsetHeight} = viewer.dom_element;
@@ -251,6 +252,7 @@ window.addEventListener("load", () => {
     light(middle());
     if (element("follow").checked) aim(middle());
     element("time").value = time;
+    element("time").setAttribute("aria-valuetext", `${time.toFixed(1)} s`);
     element("clock").value = `${time.toFixed(1)} / ${duration.toFixed(1)} s`;
     element("reached").value = `${progress.what} ${shown(now(progress.values))}`;
     viewer.set_dirty();
@@ -259,6 +261,7 @@ window.addEventListener("load", () => {
   function set_playing(on) {
     playing = on;
     element("play").textContent = on ? "❚❚" : "▶";
+    element("play").setAttribute("aria-pressed", on);
   }
   function show(seconds) {
     set_playing(false);
@@ -280,10 +283,14 @@ window.addEventListener("load", () => {
   element("follow").addEventListener("change", (event) => follow(event.target.checked));
   element("forces").addEventListener("change", () => { place(time); viewer.set_dirty(); });
   element("legend").open = window.innerWidth > 900;
+  const ARROWS = {ArrowLeft: -0.1, ArrowRight: 0.1};  // s
   window.addEventListener("keydown", (event) => {
+    if (event.target.matches("input[type=range], select")) return;  // they have keys of their own
     if (event.code == "Space" && event.target == document.body) set_playing(!playing);
+    if (event.code in ARROWS) show(time + ARROWS[event.code] * (event.shiftKey ? 10 : 1));
   });
-  window.addEventListener("resize", frame_picture);
+  element("legend").addEventListener("toggle", arrange);
+  window.addEventListener("resize", arrange);
 
   let before = performance.now();
   function tick(instant) {
@@ -364,13 +371,24 @@ window.addEventListener("load", () => {
   function dress(on) {
     for (const id of ["heading", "legend", "bar", "labels"]) element(id).hidden = !on;
     document.documentElement.style.setProperty("--bar", on ? null : "0px");
+    arrange();
+  }
+  // On a narrow screen, heading and legend have room of their own, so that they hide nothing.
+  function arrange() {
+    const narrow = window.matchMedia("(max-width: 700px)").matches;
+    for (const id of ["heading", "legend"]) {
+      const height = narrow ? element(id).offsetHeight : 0;
+      document.documentElement.style.setProperty(`--${id}`, `${height}px`);
+    }
     viewer.set_3d_pane_size();
     frame_picture();
   }
 
+  viewer.renderer.domElement.setAttribute("role", "img");
+  viewer.renderer.domElement.setAttribute("aria-label", document.title);
   viewer.set_3d_pane_size();
   aim(middle());
-  frame_picture();
+  arrange();
   set_playing(true);
   requestAnimationFrame(tick);
   const play = () => set_playing(true), pause = () => set_playing(false);

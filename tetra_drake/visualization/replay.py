@@ -25,7 +25,7 @@ from tetra_drake.robot.path import follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metrics import looks_for_distance
-from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.scenario.units import Units
 from tetra_drake.visualization.scene import (
     COLOURS,
     add_robot,
@@ -57,6 +57,8 @@ LONG_ARROW = 0.8
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
 """Pattern of the asynchronous commands in Meshcat's page that add parts of the scene. The film runs
 them at once, because it needs the whole scene."""
+_TO_SCALE = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+"""Without this line, phones show a page small."""
 _USUAL = 99.0
 """Percentile of tensions and forces that is drawn at full size. Impacts are far larger."""
 
@@ -110,8 +112,9 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     per_newton = radius_per_newton(structure, greatest)
     sizes = np.linalg.norm(force, axis=-1)
     usual_force = float(np.percentile(sizes, _USUAL)) if sizes.size else 0.0
-    inches = LONG_ARROW * float(np.ptp(frames["p_WN"].values[0, :, 2])) / INCH
-    inch_of_arrow = round_force(usual_force / max(inches, 1.0))
+    units = robot.scenario.units
+    arrow = LONG_ARROW * float(np.ptp(frames["p_WN"].values[0, :, 2])) / units.square
+    force_of_square = round_force(usual_force / max(arrow, 1.0), units)
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
     ends = structure.cables[["node_a", "node_b"]].tolist()
     return {
@@ -134,15 +137,19 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "colours": COLOURS,
         "anchored": bool(structure.held.any()),
         "strut": float(size),
+        "length": {"size": units.length, "name": units.length_name},
+        "dark": units.squares * units.square,
         "poses": _steps(poses),
         "radii": _steps(cable_radii(structure, frames, per_newton)),
         "touches": _steps(frames["in_contact"].values * RESOLUTION),
-        "arrows": _steps(force * INCH / inch_of_arrow),
+        "arrows": _steps(force * units.square / force_of_square),
         "traces": _steps(followed_nodes(frames["p_WN"].values, structure)[:, :2]),
         "progress": _progress(robot, frames),
         "legend": {
-            "tension": f"{greatest / POUND_FORCE:.2g} lbf",
-            "force": f"{inch_of_arrow / POUND_FORCE:.2g} lbf",
+            "tension": f"{greatest / units.force:.2g} {units.force_name}",
+            "force": f"{force_of_square / units.force:.2g} {units.force_name}",
+            "square": units.shown(units.square, "m"),
+            "dark": units.shown(units.squares * units.square, "m"),
             "trace": "rear feet" if structure.markers.size else "centre",
         },
     }
@@ -161,11 +168,11 @@ def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
     return turned
 
 
-def round_force(force: float) -> float:
-    """Rounds a force (N) up to 1, 2 or 5 times a power of ten in lbf; the result is in N."""
-    pounds = max(force / POUND_FORCE, 1e-6)
-    power = 10.0 ** math.floor(math.log10(pounds))
-    return next(n for n in (1.0, 2.0, 5.0, 10.0) if n * power >= pounds) * power * POUND_FORCE
+def round_force(force: float, units: Units) -> float:
+    """Rounds a force (N) up to 1, 2 or 5 times a power of ten in its unit; the result is in N."""
+    shown = max(force / units.force, 1e-6)
+    power = 10.0 ** math.floor(math.log10(shown))
+    return next(n for n in (1.0, 2.0, 5.0, 10.0) if n * power >= shown) * power * units.force
 
 
 def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
@@ -178,8 +185,10 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         heading = np.rad2deg(follow(frames["time"].values, poses, structure).heading)
         values, what, unit, digits = heading - heading[0], "turned", "°", 0
     else:
-        x = followed_nodes(frames["p_WN"].values, structure)[:, 0, 0] / INCH
-        values, what, unit, digits = x - x[0], "walked", " in", 1
+        units = robot.scenario.units
+        x = followed_nodes(frames["p_WN"].values, structure)[:, 0, 0] / units.length
+        values, what, unit = x - x[0], "walked", f" {units.length_name}"
+        digits = units.decimals
     return {"what": what, "unit": unit, "digits": digits, "values": values.round(digits).tolist()}
 
 
@@ -234,7 +243,8 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
     )
     page = _COMMAND.sub(r"handle(\1);", page)
     # The replacements are functions, because backslashes in a text would be interpreted.
-    named = f"<title>{html.escape(title)}</title>"
+    named = f"<title>{html.escape(title)}</title>{_TO_SCALE}"
+    page = page.replace("<html>", '<html lang="en">', 1)
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
 

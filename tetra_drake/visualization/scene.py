@@ -16,7 +16,7 @@ from tetra_drake.robot.bodies import strut_pose
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, Units
 
 if TYPE_CHECKING:
     import xarray
@@ -34,9 +34,9 @@ COLOURS = {
     "floor": "#f3f4f5",
     "low": "#d6c6a6",
     "high": "#f7f4ec",
-    "inch": "#d5d8dc",
-    "inch_on_relief": "#bfb6a2",
-    "six_inches": "#8b929b",
+    "square": "#d5d8dc",
+    "square_on_relief": "#bfb6a2",
+    "dark_line": "#8b929b",
     "sky": "#eef2f6",
 }
 """Colours of the scene. Bodies range from `rear` to `lead`, uneven ground from `low` to `high`. A
@@ -52,10 +52,9 @@ smaller one, because it needs much space in a page."""
 MOST_POINTS = 5_000
 """Approximate largest number of points of uneven ground."""
 MOST_SQUARES = 200_000
-"""Largest number of square inches of flat ground. On a larger floor, only every sixth line is
-drawn."""
+"""Largest number of squares of flat ground. On a larger floor, only its dark lines are drawn."""
 
-_FINEST = 12  # points per inch of uneven ground, at most
+_FINEST = 12  # points per square of uneven ground, at most
 _BEND = 1e-6  # m; the ground is straight if second differences of heights are smaller
 _WALL = 0.5 * INCH  # least height of the walls around uneven ground
 _GAMMA = 2.2  # in browsers, colours of vertices are linear; all other colours are sRGB
@@ -182,15 +181,15 @@ def set_surroundings(
 
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
     """Adds the floor around `points` (..., 3). `reach` (m) is half of the robot's length."""
-    ground = robot.ground
-    corners = floor_corners(points, (MARGIN if ground.flat else UNEVEN_MARGIN) * reach)
-    floor = floor_points(ground, corners)
+    ground, units = robot.ground, robot.scenario.units
+    corners = floor_corners(points, (MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
+    floor = floor_points(ground, corners, units)
     floor[..., 2] -= drawn_radii(robot.structure)[1].min()
     if ground.flat:
         _add_slab(meshcat, floor)
     else:
         _add_relief(meshcat, floor)
-    _add_grid(meshcat, floor, inch="inch" if ground.flat else "inch_on_relief")
+    _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
 
 
 def _set_lights(meshcat: Meshcat, *, reach: float) -> None:
@@ -217,37 +216,38 @@ def _set_lights(meshcat: Meshcat, *, reach: float) -> None:
         meshcat.SetProperty("/Lights/FillLight/<object>", name, value)
 
 
-def floor_corners(points: np.ndarray, margin: float) -> np.ndarray:
-    """Corners of the floor: least and greatest x and y (2, 2) in inches, multiples of 6.
+def floor_corners(points: np.ndarray, margin: float, units: Units) -> np.ndarray:
+    """Corners of the floor: least and greatest x and y (2, 2) in squares, on dark lines.
 
     The floor surrounds `points` (..., 3) with a margin, both in m.
     """
-    x_y = points.reshape(-1, 3)[:, :2] / INCH
-    low, high = x_y.min(axis=0) - margin / INCH, x_y.max(axis=0) + margin / INCH
-    return np.array([6 * np.floor(low / 6), 6 * np.ceil(high / 6)], dtype=int)
+    x_y, dark = points.reshape(-1, 3)[:, :2], units.squares * units.square
+    low, high = x_y.min(axis=0) - margin, x_y.max(axis=0) + margin
+    return units.squares * np.array([np.floor(low / dark), np.ceil(high / dark)], dtype=int)
 
 
-def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
-    """Points of the ground (rows, columns, 3) in m, between corners (2, 2) in whole inches.
+def floor_points(ground: Ground, corners: np.ndarray, units: Units) -> np.ndarray:
+    """Points of the ground (rows, columns, 3) in m, between corners (2, 2) in whole squares.
 
-    Rows are along x, columns along y. There are points at every inch, or at every six inches on
-    flat ground beyond MOST_SQUARES. Where the ground bends, there are points in between, as many as
+    Rows are along x, columns along y. There are points at every line, or at every dark line on flat
+    ground beyond MOST_SQUARES. Where the ground bends, there are points in between, as many as
     MOST_POINTS allows.
     """
     (x_low, y_low), (x_high, y_high) = corners
+    side, every = units.square, units.squares
     if ground.flat and (x_high - x_low) * (y_high - y_low) > MOST_SQUARES:
-        rows, columns = np.arange(x_low, x_high + 1, 6), np.arange(y_low, y_high + 1, 6)
-        x, y = np.meshgrid(rows * INCH, columns * INCH, indexing="ij")
+        rows, columns = np.arange(x_low, x_high + 1, every), np.arange(y_low, y_high + 1, every)
+        x, y = np.meshgrid(rows * side, columns * side, indexing="ij")
         return np.stack([x, y, np.zeros_like(x)], axis=-1)
-    for per_inch in range(1 if ground.flat else _FINEST, 0, -1):
-        rows = np.arange(x_low * per_inch, x_high * per_inch + 1)
-        columns = np.arange(y_low * per_inch, y_high * per_inch + 1)
-        x, y = np.meshgrid(rows / per_inch * INCH, columns / per_inch * INCH, indexing="ij")
+    for finer in range(1 if ground.flat else _FINEST, 0, -1):
+        rows = np.arange(x_low * finer, x_high * finer + 1)
+        columns = np.arange(y_low * finer, y_high * finer + 1)
+        x, y = np.meshgrid(rows / finer * side, columns / finer * side, indexing="ij")
         z = ground_heights(np.stack([x, y], axis=-1), ground)
         bend_along = np.abs(np.diff(z, 2, axis=0)).max(axis=1)
         bend_across = np.abs(np.diff(z, 2, axis=1)).max(axis=0)
-        rows = np.flatnonzero((rows % per_inch == 0) | np.pad(bend_along > _BEND, 1))
-        columns = np.flatnonzero((columns % per_inch == 0) | np.pad(bend_across > _BEND, 1))
+        rows = np.flatnonzero((rows % finer == 0) | np.pad(bend_along > _BEND, 1))
+        columns = np.flatnonzero((columns % finer == 0) | np.pad(bend_across > _BEND, 1))
         if len(rows) * len(columns) <= MOST_POINTS:
             break
     return np.stack([x, y, z], axis=-1)[np.ix_(rows, columns)]
@@ -312,23 +312,22 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
     )
 
 
-def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
-    """Adds lines along and across the floor (rows, columns, 3), one per inch. `inch` is their
-    colour; every sixth line is darker."""
-    inches: list[np.ndarray] = []
-    six_inches: list[np.ndarray] = []
+def _add_grid(meshcat: Meshcat, floor: np.ndarray, units: Units, *, colour: str) -> None:
+    """Adds lines along and across the floor (rows, columns, 3), around its squares."""
+    light: list[np.ndarray] = []
+    dark: list[np.ndarray] = []
     for axis in (0, 1):
         for line in np.moveaxis(floor, axis, 0):
-            position = line[0, axis] / INCH
+            position = line[0, axis] / units.square
             if abs(position - round(position)) > 1e-6:
                 continue
             # A straight line has pieces, too: some browsers lose lines that pass the camera.
-            points = line[::6] if np.ptp(line[:, 2]) == 0.0 else line
-            (six_inches if round(position) % 6 == 0 else inches).append(points)
+            points = line[:: units.squares] if np.ptp(line[:, 2]) == 0.0 else line
+            (light if round(position) % units.squares else dark).append(points)
     # Lines are a little above the floor. Otherwise the floor would hide parts of them.
-    if inches:
-        _add_lines(meshcat, "/floor/inch", inches, lift=0.0002, colour=rgba(inch))
-    _add_lines(meshcat, "/floor/six_inches", six_inches, lift=0.0004, colour=rgba("six_inches"))
+    if light:
+        _add_lines(meshcat, "/floor/squares", light, lift=0.0002, colour=rgba(colour))
+    _add_lines(meshcat, "/floor/dark", dark, lift=0.0004, colour=rgba("dark_line"))
 
 
 def _add_lines(
