@@ -25,10 +25,10 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import Robot, make_structure
-from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes
+from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_nodes
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS, TOP
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.systems import GroundContact
+from tetra_drake.systems import AddGroundContact
 
 BASE = BOTTOM_LEFT, BOTTOM_RIGHT, TOP
 LEADING, TRAILING = TOP, BOTTOM_LEFT
@@ -101,15 +101,14 @@ def make_diagram(scenario: Scenario) -> Diagram:
     tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    AddBodies(plant, tetrahedron.structure)
+    structure = tetrahedron.structure
+    nodes = AddNodes(plant, structure, AddBodies(plant, structure))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
-    ground = builder.AddNamedSystem("ground", GroundContact(tetrahedron, witness=True))
+    base = [nodes[node] for node in BASE]
+    ground = AddGroundContact(builder, plant, frames=base, ground=tetrahedron.ground, witness=True)
 
-    state, force = plant.get_state_output_port(), ground.GetOutputPort("generalized_force")
-    builder.Connect(state, ground.GetInputPort("state"))
-    builder.Connect(force, plant.get_applied_generalized_force_input_port())
-    LogVectorOutput(state, builder).set_name("state_log")
+    LogVectorOutput(plant.get_state_output_port(), builder).set_name("state_log")
     for port in ("normal_forces", "friction_forces", "modes"):
         LogVectorOutput(ground.GetOutputPort(port), builder).set_name(f"{port}_log")
     return builder.Build()

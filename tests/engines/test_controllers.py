@@ -123,7 +123,8 @@ def test_a_controller_is_connected_by_the_names_of_its_ports(walking, refused):
 
 
 def test_the_rates_of_the_cables_are_the_slopes_of_their_lengths(robot):
-    cables, state = CableNetwork(robot), robot.structure.initial_state
+    cables = CableNetwork(robot.model, signals=robot.structure.signals)
+    state = robot.structure.initial_state
     context = cables.CreateDefaultContext()
     velocity, step = np.random.default_rng(0).normal(size=(5, 3)), 1e-7
     state.reshape(-1)[35:].reshape(5, 6)[:, 3:] = velocity

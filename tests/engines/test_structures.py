@@ -12,7 +12,7 @@ from helpers.kernels import forces_at, make_step
 from helpers.structures import onto_recorded, poses_of, recorded_structure, simulated
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import Adder, Sine
+from pydrake.systems.primitives import Sine
 
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.rosenbrock import take_step
@@ -29,7 +29,7 @@ from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.simd.packed import Packed
-from tetra_drake.systems import CableNetwork, GroundContact
+from tetra_drake.systems import Attach, CableNetwork, GroundContact
 
 AMPLITUDE, FREQUENCY, INTERVAL = 1.5, 2.0 * np.pi, 0.5  # N, rad/s, s between recorded centres
 
@@ -88,15 +88,11 @@ def test_the_diagrams_systems_move_as_the_independent_simulation(name, data):
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -robot.scenario.robot.gravity])
     plant.Finalize()
     sines = builder.AddSystem(Sine(AMPLITUDE + 0.0 * phase, FREQUENCY + 0.0 * phase, phase))
-    cables, ground = builder.AddSystem(CableNetwork(robot)), builder.AddSystem(GroundContact(robot))
-    forces = builder.AddSystem(Adder(2, 6 * len(structure.bodies)))
-    state = plant.get_state_output_port()
+    cables = builder.AddSystem(CableNetwork(robot.model, signals=phase.size))
     builder.Connect(sines.get_output_port(0), cables.GetInputPort("signals"))
-    for i, part in enumerate((cables, ground)):
-        builder.Connect(state, part.GetInputPort("state"))
-        builder.Connect(part.GetOutputPort("generalized_force"), forces.get_input_port(i))
-    builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
-    builder.ExportOutput(state, "state")
+    for part in (cables, builder.AddSystem(GroundContact(robot.model))):
+        Attach(builder, plant, part)
+    builder.ExportOutput(plant.get_state_output_port(), "state")
     diagram = builder.Build()
     fine = Drake(scheme="radau3", accuracy=1e-6, max_step=1e-3)
     simulator = MakeSimulator(diagram, fine)

@@ -28,7 +28,7 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 def test_has_the_blocks_of_the_thesis_and_nothing_to_show_or_log(robot, gait):
     names = {system.get_name() for system in MakeTensegrityDiagram(robot, gait).GetSystems()}
-    assert names == {"cpg", "start_up", "cables", "ground", "forces", "plant"}
+    assert names == {"cpg", "start_up", "cables", "ground", "forces_with_ground", "plant"}
 
 
 def test_exports_what_a_user_plots(robot, gait):
@@ -52,7 +52,7 @@ def test_the_friction_brings_no_continuous_state(scenario, robot, gait):
 @pytest.mark.parametrize(("slack", "least"), [(True, 0.0), (False, -97.4)])
 def test_slack_cables_do_not_push(scenario, slack, least):
     robot = Robot.of(scenario.with_changes({"robot.cables.slack": slack}))
-    cables = CableNetwork(robot)
+    cables = CableNetwork(robot.model, signals=4)
     context = cables.CreateDefaultContext()
     cables.GetInputPort("state").FixValue(context, robot.structure.initial_state)
     cables.GetInputPort("signals").FixValue(context, np.full(4, -100.0))

@@ -95,7 +95,7 @@ def near_sizes(struts: Struts) -> dict[str, int]:
     of_bodies = np.diff(struts.first_strut)
     pairs = (of_bodies.sum() ** 2 - (of_bodies**2).sum()) // 2
     return {
-        "strut_nodes": int(max(struts.node_a.max(), struts.node_b.max())) + 1,
+        "strut_nodes": int(max(struts.node_a.max(initial=-1), struts.node_b.max(initial=-1))) + 1,
         "strut_pairs": int(pairs),
     }
 

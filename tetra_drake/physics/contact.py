@@ -12,7 +12,9 @@ The laws use the frames of `terrain`. On flat ground these are the axes of the w
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
+
+import numpy as np
 
 from tetra_drake.physics import friction, kinematics, terrain
 from tetra_drake.physics.vectors import difference, vector_at
@@ -60,6 +62,12 @@ class Ground(NamedTuple):
     """Table of the numbers of SurfaceGrid."""
     heights: Table
     """Heights (points,) of the surface's control points in m, row by row."""
+
+    @classmethod
+    def nowhere(cls) -> Self:
+        """Ground that no node may touch."""
+        no_index, friction_law = np.zeros(0, dtype=np.int64), friction.FrictionLaw(0, np.zeros(1))
+        return cls(no_index, no_index, np.zeros(2), friction_law, True, np.zeros(1), np.zeros(0))
 
 
 @inlined

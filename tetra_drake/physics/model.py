@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
-from tetra_drake.physics.actuator import Actuator
-from tetra_drake.physics.cable import Cables
+import numpy as np
+
+from tetra_drake.physics.actuator import DIRECT, Actuator
+from tetra_drake.physics.cable import CABLE, Cables
 from tetra_drake.physics.capsules import StrutContactLaw
 from tetra_drake.physics.contact import Ground
 from tetra_drake.physics.node_forces import AnchorSprings, NodeLoads
@@ -63,3 +65,34 @@ class Model(NamedTuple):
     """True if each body has the same moment of inertia about all axes."""
     slack: bool
     """True if cables go slack instead of pushing."""
+
+    @classmethod
+    def of_nodes(
+        cls,
+        p_BN: Table,
+        first_node: Table,
+        *,
+        cables: Cables | None = None,
+        actuator: Actuator | None = None,
+        ground: Ground | None = None,
+        slack: bool = True,
+    ) -> Self:
+        """Model of cables, or of a ground, at nodes of bodies, and of nothing else."""
+        bodies, none = first_node.size - 1, np.zeros(0)
+        no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        first = np.zeros(bodies + 1, dtype=np.int64)
+        return cls(
+            p_BN=p_BN,
+            first_node=first_node,
+            cables=cables or Cables.of(np.zeros(0, dtype=CABLE)),
+            actuator=actuator or Actuator.of(DIRECT),
+            couplings=Couplings(no_index, no_index, first[:1], no_index),
+            ground=ground or Ground.nowhere(),
+            anchors=AnchorSprings(no_index, no_index, no_vectors, no_vectors, no_vectors),
+            loads=NodeLoads(no_index, no_vectors),
+            bodies=Bodies(np.zeros(bodies), np.zeros((bodies, 6)), *np.zeros((2, bodies))),
+            struts=Struts(no_index, no_index, first, none, none),
+            strut_contact=StrutContactLaw(acts=False, normal=np.zeros(2), search=np.zeros(2)),
+            isotropic=True,
+            slack=slack,
+        )

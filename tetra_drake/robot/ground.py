@@ -9,8 +9,10 @@ from tetra_drake.physics import terrain
 from tetra_drake.physics.contact import Ground, NormalForce
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.scenario.common_sections import GroundSection
+from tetra_drake.scenario.friction_kinds import FrictionKind
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Grid
+from tetra_drake.scenario.terrain_kinds import Grid, Relief
 from tetra_drake.scenario.units import INCH
 
 STEP_AHEAD = 1.0 * INCH
@@ -29,18 +31,30 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     start = node_positions(structure, structure.initial_state)[structure.contacts]
     ahead = start[:, 0].max(initial=-np.inf) + STEP_AHEAD  # not used without contact nodes
     grid = scenario.terrain.grid(ahead=ahead, source=scenario.name)
-    made = Ground(
-        contacts=structure.contacts,
-        carriers=structure.carriers[structure.contacts],
-        normal=np.array(NormalForce(scenario.ground.stiffness, scenario.ground.damping)),
-        friction=scenario.friction.law(),
-        flat=scenario.terrain.is_flat,
-        grid=np.array(_surface_grid(grid)),
-        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
-    )
+    surface = make_surface(scenario.ground, scenario.friction, scenario.terrain, grid)
+    carriers = structure.carriers[structure.contacts]
+    made = surface._replace(contacts=structure.contacts, carriers=carriers)
     if not made.flat:
         _check_start(scenario, structure, made, grid, start)
     return made
+
+
+def make_surface(
+    ground: GroundSection,
+    friction: FrictionKind,
+    terrain_kind: Relief,
+    grid: Grid | None = None,
+) -> Ground:
+    """The ground with these laws and this terrain, without contact nodes. `grid` has the terrain's
+    heights; by default the terrain begins at the origin."""
+    grid = grid or terrain_kind.grid(ahead=0.0, source="make_surface")
+    return Ground.nowhere()._replace(
+        normal=np.array(NormalForce(ground.stiffness, ground.damping)),
+        friction=friction.law(),
+        flat=terrain_kind.is_flat,
+        grid=np.array(_surface_grid(grid)),
+        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
+    )
 
 
 def _surface_grid(grid: Grid) -> terrain.SurfaceGrid:

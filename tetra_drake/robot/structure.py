@@ -5,22 +5,33 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from pydrake.geometry import Cylinder, Sphere
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    RigidBody,
+    SpatialInertia,
+    UnitInertia,
+)
 
 from tetra_drake.physics import cable, kinematics
 from tetra_drake.physics.capsules import Search
 from tetra_drake.physics.model import Couplings
 from tetra_drake.physics.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.physics.struts import Struts
-from tetra_drake.robot.bodies import body_inertias
+from tetra_drake.robot.bodies import body_inertias, strut_pose
 from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import WORLD, Blueprint
 
+STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
+"""Colours of struts and spheres in a SceneGraph."""
 SKIN = 0.05
 """Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
 pairs are near; with a smaller one, near pairs are searched more often."""
@@ -201,10 +212,43 @@ def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
 
 
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
-    """Adds the bodies of a structure, as free bodies, to a plant that is not finalized."""
-    return [
+    """Adds the bodies of a structure, as free bodies, to a plant that is not finalized. If the
+    plant has a SceneGraph, struts and spheres are shown."""
+    bodies = [
         plant.AddRigidBody(name, SpatialInertia(mass, np.zeros(3), UnitInertia(*unit)))
         for name, mass, unit in zip(
             structure.bodies, structure.mass, structure.unit_inertia, strict=True
+        )
+    ]
+    if plant.geometry_source_is_registered():
+        _show_bodies(plant, structure, bodies)
+    return bodies
+
+
+def _show_bodies(plant: MultibodyPlant, structure: Structure, bodies: list[RigidBody]) -> None:
+    """Adds visual shapes of struts and spheres."""
+    table, p_BN = structure.strut_table, structure.p_BN
+    for strut, (a, b) in enumerate(structure.struts):
+        shape = Cylinder(table.radius[strut], table.length[strut])
+        X_BS, name = strut_pose(p_BN[a], p_BN[b]), f"strut {structure.strut_name(strut)}"
+        body = bodies[structure.carriers[a]]
+        plant.RegisterVisualGeometry(body, X_BS, shape, name, STRUT_COLOUR)
+    for node in np.flatnonzero(structure.node_radius):
+        body, X_BN = bodies[structure.carriers[node]], RigidTransform(p_BN[node])
+        shape, name = Sphere(structure.node_radius[node]), f"sphere {structure.node_names[node]}"
+        plant.RegisterVisualGeometry(body, X_BN, shape, name, NODE_COLOUR)
+
+
+def AddNodes(
+    plant: MultibodyPlant, structure: Structure, bodies: Sequence[RigidBody]
+) -> list[Frame]:
+    """Adds a frame "node NAME" for each node of a structure to a plant that is not finalized."""
+    carriers = [*bodies, plant.world_body()]
+    return [
+        plant.AddFrame(
+            FixedOffsetFrame(f"node {name}", carriers[carrier].body_frame(), RigidTransform(p_BN))
+        )
+        for name, carrier, p_BN in zip(
+            structure.node_names, structure.carriers, structure.p_BN, strict=True
         )
     ]

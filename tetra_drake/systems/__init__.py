@@ -1,9 +1,10 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
 
 from tetra_drake.systems.actuators import Actuators
-from tetra_drake.systems.cable_network import CableNetwork
+from tetra_drake.systems.attachment import Attach
+from tetra_drake.systems.cable_network import AddCables, Cable, CableNetwork
 from tetra_drake.systems.feedback import Feedback
-from tetra_drake.systems.ground_contact import GroundContact
+from tetra_drake.systems.ground_contact import AddGroundContact, GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.sampled_controller import HeldSignals, SampledController
 from tetra_drake.systems.start_up_gate import StartUpGate
@@ -12,7 +13,11 @@ from tetra_drake.systems.steering import Steering
 
 __all__ = [
     "Actuators",
+    "AddCables",
+    "AddGroundContact",
     "Anchors",
+    "Attach",
+    "Cable",
     "CableNetwork",
     "Feedback",
     "GroundContact",

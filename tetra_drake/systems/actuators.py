@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
-
-from tetra_drake.robot.robot import Robot
 
 
 class Actuators(LeafSystem):
@@ -19,9 +18,9 @@ class Actuators(LeafSystem):
     algebraic loop with the cables, which compute the rates.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, start: np.ndarray) -> None:
+        """`start` (drives,) are the drives at t = 0."""
         super().__init__()
-        start = robot.starting_drives()
         self._rates = self.DeclareVectorInputPort("rates", len(start))
         self.DeclareContinuousState(BasicVector(start))
         self.DeclareVectorOutputPort("drives", len(start), self._calc_drives, {self.xc_ticket()})

@@ -1,15 +1,28 @@
-"""Cables of the robot as a LeafSystem."""
+"""Cables between bodies of a plant as a LeafSystem."""
 
 from __future__ import annotations
 
-import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from tetra_drake.physics import actuator, cable
+import numpy as np
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+
+from tetra_drake.errors import InputError
+from tetra_drake.physics import actuator, cable, kinematics
 from tetra_drake.physics.forces import Forces, compute_cable_forces
-from tetra_drake.robot.robot import Robot
+from tetra_drake.physics.model import Model
+from tetra_drake.scenario.actuator_kinds import Actuation, DrivenCables, Force
+from tetra_drake.scenario.refusals import hint
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
+from tetra_drake.systems.actuators import Actuators
+from tetra_drake.systems.attachment import Attach, Nodes
+from tetra_drake.systems.cable_geometry import AddCableGeometry
 
 
 class CableNetwork(LeafSystem):
@@ -17,37 +30,42 @@ class CableNetwork(LeafSystem):
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
-    | state             | (13 n,)        | SI     | [q; v] of n free bodies, from the plant  |
-    | signals           | (m,)           | N      | actuation, one per oscillator            |
+    | state             | (13 n,)        | SI     | [q; v] of n bodies, as if free           |
+    | signals           | (m,)           | N      | actuation, one per group of cables       |
     | drives            | (drives,)      | m or N | states of the actuators                  |
     | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
     | tensions          | (cables,)      | N      | tension of each cable                    |
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (cables,)      | m/s    | rate of each cable's length              |
     | cable_forces      | (7 cables,)    | SI     | table of physics.cable, row by row       |
+    | ends              | (6 cables,)    | m      | positions of the two ends, by cable      |
     | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
-    loop. With `robot.cables.slack`, a cable goes slack instead of pushing. The ports `drives` and
-    `drive_rates` exist only if the kind of actuators has states.
+    loop. Where the model is `slack`, a cable goes slack instead of pushing. The port `signals`
+    exists only if there are any, `drives` and `drive_rates` only if the kind of actuators has
+    states.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, model: Model, *, signals: int) -> None:
         super().__init__()
-        structure = robot.structure
-        bodies, count = len(structure.bodies), len(structure.cables)
+        bodies, count = model.bodies.mass.size, model.cables.signal.size
         # The kernel writes to these arrays at every call.
-        self._forces, self._force = Forces.of(robot.model), np.empty(6 * bodies)
-        self._parts = Packed((robot.model, self._forces))
-        state, self._no_signals = np.empty(13 * bodies), np.zeros(structure.signals)
+        self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
+        self._parts = Packed((model, self._forces))
+        state, self._no_signals = np.empty(13 * bodies), np.zeros(signals)
+        self._ends = np.stack([model.cables.node_a, model.cables.node_b], axis=1)
         self._compute_forces = machine_code(
             compute_cable_forces, self._parts, state, self._no_signals, self._force
         )
         self._state = self.DeclareVectorInputPort("state", state.size)
-        self._signals = self.DeclareVectorInputPort("signals", structure.signals)
         motion = {self._state.ticket()}
-        inputs = motion | {self._signals.ticket()}
-        self._drives, drives = None, len(self._forces.drives)
+        inputs = set(motion)
+        self._signals = self._drives = None
+        if signals:
+            self._signals = self.DeclareVectorInputPort("signals", signals)
+            inputs.add(self._signals.ticket())
+        drives = len(self._forces.drives)
         if drives:
             self._drives = self.DeclareVectorInputPort("drives", drives)
             inputs.add(self._drives.ticket())
@@ -58,13 +76,14 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("rates", count, self._calc_rates, motion)
         size = self._forces.cable_forces.size
         self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
+        self.DeclareVectorOutputPort("ends", 6 * count, self._calc_ends, motion)
 
     def _compute(self, context: Context, force: np.ndarray) -> None:
         """Writes the generalized force to `force`, and the table `cable_forces`."""
         if self._drives is not None:
             self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
-        state, signals = self._state.Eval(context), self._signals.Eval(context)
-        self._compute_forces(self._parts, state, signals, force)
+        signals = self._no_signals if self._signals is None else self._signals.Eval(context)
+        self._compute_forces(self._parts, self._state.Eval(context), signals, force)
 
     def _move(self, context: Context) -> np.ndarray:
         """The table `cable_forces`; only lengths and rates are valid."""
@@ -89,6 +108,114 @@ class CableNetwork(LeafSystem):
         self._compute(context, self._force)
         output.SetFromVector(self._forces.cable_forces.ravel())
 
+    def _calc_ends(self, context: Context, output: BasicVector) -> None:
+        self._move(context)
+        p_WN = self._forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
+        output.SetFromVector(p_WN[self._ends].ravel())
+
     def _calc_drive_rates(self, context: Context, output: BasicVector) -> None:
         self._compute(context, self._force)
         output.SetFromVector(self._forces.drives[:, actuator.RATE])
+
+
+@dataclass(frozen=True)
+class Cable:
+    """Cable between the origins of two frames of a plant."""
+
+    name: str
+    frame_a: Frame
+    frame_b: Frame
+    law: cable.CableLaw
+    """Its constants in SI units."""
+
+
+def AddCables(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    *,
+    cables: Sequence[Cable],
+    actuated: Mapping[str, Sequence[str]] | None = None,
+    actuation: Actuation | None = None,
+    drives: np.ndarray | None = None,
+    slack: bool = True,
+    scene_graph: SceneGraph | None = None,
+    name: str = "cables",
+) -> CableNetwork:
+    """Adds cables between bodies of a plant, or from a body to the world.
+
+    The plant must be finalized, may have any joints, and should be continuous. Connect the port
+    `signals` of the returned system if cables are actuated.
+
+    Args:
+        actuated: names of the cables that each signal drives, in the order of the signals.
+        actuation: kind of the actuators, Force() by default. Kinds with states are added as the
+            system NAME_actuators.
+        drives: states of the actuators at t = 0; by default without signals, at the plant's
+            default positions.
+        slack: False if cables also push.
+        scene_graph: where to show the cables.
+        name: name of the system.
+
+    Raises:
+        InputError: `actuated` has an unknown cable.
+    """
+    actuated, actuation = actuated or {}, actuation or Force()
+    nodes = Nodes.of(plant, (frame for one in cables for frame in (one.frame_a, one.frame_b)))
+    table = _CableTable(cables, actuated, nodes)
+    model = Model.of_nodes(
+        nodes.p_BN,
+        nodes.first_node,
+        cables=cable.Cables.of(table),
+        actuator=actuation.actuator(),
+        slack=slack,
+    )
+    network = builder.AddNamedSystem(name, CableNetwork(model, signals=len(actuated)))
+    Attach(builder, plant, network)
+    lengths = _DefaultLengths(plant, cables)
+    if drives is None:
+        drives = actuation.drives(_cables_at_rest(table, lengths))
+    if len(drives):
+        actuators = builder.AddNamedSystem(f"{name}_actuators", Actuators(drives))
+        builder.Connect(network.GetOutputPort("drive_rates"), actuators.GetInputPort("rates"))
+        builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
+    if scene_graph is not None:
+        shown = {one.name: length for one, length in zip(cables, lengths, strict=True)}
+        AddCableGeometry(builder, scene_graph, network.GetOutputPort("ends"), lengths=shown)
+    return network
+
+
+def _CableTable(
+    cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
+) -> np.ndarray:
+    """Records of the cables, of dtype CABLE."""
+    names = [one.name for one in cables]
+    table = np.zeros(len(cables), dtype=cable.CABLE)
+    table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]
+    table["node_b"] = [nodes.of_frame[one.frame_b.index()] for one in cables]
+    table["signal"] = cable.PASSIVE
+    for constant in cable.CableLaw._fields:
+        table[constant] = [getattr(one.law, constant) for one in cables]
+    for signal, (group, driven) in enumerate(actuated.items()):
+        for one in driven:
+            if one not in names:
+                problem = f"found unknown cable '{one}'; {hint(one, names)}"
+                raise InputError("AddCables", f"actuated.{group}", problem)
+            table["signal"][names.index(one)] = signal
+    return table
+
+
+def _DefaultLengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> np.ndarray:
+    """Lengths of cables (cables,) in m at the plant's default positions."""
+    context = plant.CreateDefaultContext()
+    return np.array(
+        [np.linalg.norm(one.frame_b.CalcPose(context, one.frame_a).translation()) for one in cables]
+    )
+
+
+def _cables_at_rest(table: np.ndarray, lengths: np.ndarray) -> DrivenCables:
+    """Properties of the driven cables at rest without signals."""
+    is_driven = table["signal"] != cable.PASSIVE
+    law, length = cable.CableLaw.of(table[is_driven]), lengths[is_driven]
+    none: Any = np.zeros(len(length))
+    tension = np.maximum(cable.cable_tension(length, none, none, law), 0.0)
+    return DrivenCables(law, none, length, none, tension, law.free_length)

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
-from pydrake.systems.primitives import Adder, ConstantVectorSource, TrajectorySource
+from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.errors import InputError
+from tetra_drake.physics.cable import CableLaw
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import AddBodies
+from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import (
-    Actuators,
+    AddCables,
+    AddGroundContact,
     Anchors,
-    CableNetwork,
+    Attach,
+    Cable,
     Feedback,
-    GroundContact,
     Loads,
     MatsuokaCpg,
     StartUpGate,
@@ -34,6 +40,7 @@ def MakeTensegrityDiagram(
     *,
     steering: SteeringSignal | None = None,
     controller: System | None = None,
+    meshcat: Meshcat | None = None,
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is the scenario's start.
 
@@ -45,7 +52,7 @@ def MakeTensegrityDiagram(
                                 ↑           │        │                     │
                                 └───────────┴────────┴─────────────────────┘
 
-        actuators ←──→ cables
+        cables_actuators ←──→ cables
 
         anchors, loads ──→ forces
 
@@ -54,7 +61,7 @@ def MakeTensegrityDiagram(
     - cpg: with `cpg.signals: live` the network, otherwise its signals, computed beforehand. A robot
       without oscillators has no cpg.
     - feedback: only if `cpg.feedback` is not empty
-    - actuators: only if the kind of actuators has states, as winches have
+    - cables_actuators: only if the kind of actuators has states, as winches have
     - strut_contact: only if struts touch
     - anchors, loads: only if nodes of bodies are held, or loaded
     - controller: in place of cpg and start_up, a system with the output port `signals`. Its input
@@ -65,7 +72,8 @@ def MakeTensegrityDiagram(
     `steering` replaces the gait's turn. Input port: turn (of a live network). Output ports: state
     (from plant), signals (start_up or controller), drives (actuators), tensions and lengths
     (cables), normal_forces, friction_forces and modes (ground). For shapes and units, see the
-    systems. There is no SceneGraph: pages and films are made from trajectories.
+    systems. With `meshcat`, a SceneGraph shows struts, spheres and cables there during a
+    simulation; pages and films are made from trajectories.
 
     Raises InputError if there is neither a gait nor a controller, or a port of the controller has
     another name.
@@ -74,7 +82,8 @@ def MakeTensegrityDiagram(
     builder = DiagramBuilder()
 
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    AddBodies(plant, structure)
+    scene_graph = _AddSceneGraph(builder, plant, meshcat) if meshcat else None
+    nodes = AddNodes(plant, structure, AddBodies(plant, structure))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
@@ -85,28 +94,38 @@ def MakeTensegrityDiagram(
         source = _AddSignals(builder, robot, gait, steering)
     else:
         raise InputError("MakeTensegrityDiagram", "gait", "is needed, or a controller")
-    cables = builder.AddNamedSystem("cables", CableNetwork(robot))
-    witness = isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness"
-    ground = builder.AddNamedSystem("ground", GroundContact(robot, witness=witness))
-    acting: list[System] = [cables, ground]
+    cables = AddCables(
+        builder,
+        plant,
+        cables=_cables(structure, nodes),
+        actuated={
+            oscillator: [structure.cable_names[cable] for cable in group]
+            for oscillator, group in zip(structure.oscillators, structure.groups, strict=True)
+        },
+        actuation=scenario.actuation,
+        drives=robot.starting_drives(),
+        slack=structure.slack,
+        scene_graph=scene_graph,
+    )
+    ground = AddGroundContact(
+        builder,
+        plant,
+        frames=[nodes[node] for node in structure.contacts],
+        ground=robot.ground,
+        witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
+    )
     if robot.model.strut_contact.acts:
-        acting.append(builder.AddNamedSystem("strut_contact", StrutContact(robot)))
+        Attach(builder, plant, builder.AddNamedSystem("strut_contact", StrutContact(robot)))
     if structure.anchors.nodes.size:
-        acting.append(builder.AddNamedSystem("anchors", Anchors(robot)))
+        Attach(builder, plant, builder.AddNamedSystem("anchors", Anchors(robot)))
     if structure.loads.nodes.size:
-        acting.append(builder.AddNamedSystem("loads", Loads(robot)))
-    forces = builder.AddNamedSystem("forces", Adder(len(acting), 6 * len(structure.bodies)))
+        Attach(builder, plant, builder.AddNamedSystem("loads", Loads(robot)))
 
     state, signals = plant.get_state_output_port(), source.get_output_port()
-    builder.Connect(signals, cables.GetInputPort("signals"))
-    for i, system in enumerate(acting):
-        builder.Connect(state, system.GetInputPort("state"))
-        builder.Connect(system.GetOutputPort("generalized_force"), forces.get_input_port(i))
-    builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
-    if len(robot.starting_drives()):
-        actuators = builder.AddNamedSystem("actuators", Actuators(robot))
-        builder.Connect(cables.GetOutputPort("drive_rates"), actuators.GetInputPort("rates"))
-        builder.Connect(actuators.get_output_port(), cables.GetInputPort("drives"))
+    if structure.signals:
+        builder.Connect(signals, cables.GetInputPort("signals"))
+    if builder.HasSubsystemNamed("cables_actuators"):
+        actuators = builder.GetSubsystemByName("cables_actuators")
         builder.ExportOutput(actuators.get_output_port(), "drives")
     if controller is not None:
         _ConnectController(builder, controller, state, (cables, ground))
@@ -129,6 +148,26 @@ def MakeTensegrityDiagram(
     diagram = builder.Build()
     diagram.set_name("tensegrity_robot")
     return diagram
+
+
+def _cables(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
+    """The cables of a structure between the frames of its nodes."""
+    return [
+        Cable(name, nodes[a], nodes[b], CableLaw(**law))
+        for name, (a, b), law in zip(
+            structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True
+        )
+    ]
+
+
+def _AddSceneGraph(builder: DiagramBuilder, plant: MultibodyPlant, meshcat: Meshcat) -> SceneGraph:
+    """Adds a SceneGraph of a plant, and its view in Meshcat."""
+    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
+    source = plant.RegisterAsSourceForSceneGraph(scene_graph)
+    pose_port = scene_graph.get_source_pose_port(source)
+    builder.Connect(plant.get_geometry_pose_output_port(), pose_port)
+    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    return scene_graph
 
 
 def _ConnectController(

@@ -1,13 +1,17 @@
-"""Ground under the robot as a LeafSystem: normal forces and friction."""
+"""Ground under bodies of a plant as a LeafSystem: normal forces and friction."""
 
 from __future__ import annotations
 
 import weakref
+from collections.abc import Sequence
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import (
     BasicVector,
     Context,
+    DiagramBuilder,
     DiscreteValues,
     EventStatus,
     LeafSystem,
@@ -15,20 +19,22 @@ from pydrake.systems.framework import (
     WitnessFunctionDirection,
 )
 
+from tetra_drake.errors import InputError
 from tetra_drake.physics import contact
 from tetra_drake.physics.forces import Forces, compute_ground_forces
 from tetra_drake.physics.mode_change import mode_margin, modes_after_step, next_mode_change
-from tetra_drake.robot.robot import Robot
+from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
+from tetra_drake.systems.attachment import Attach, Nodes
 
 
 class GroundContact(LeafSystem):
-    """Normal force (thesis Eq. 1) and friction at m contact nodes, on the scenario's terrain.
+    """Normal force (thesis Eq. 1) and friction at m contact nodes, on any terrain.
 
     | port              | shape   | unit   | meaning                                           |
     |-------------------|---------|--------|---------------------------------------------------|
-    | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant           |
+    | state             | (13 n,) | SI     | [q; v] of n bodies, as if free                    |
     | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin                  |
     | normal_forces     | (m,)    | N      | along the normal of the surface, by contact node  |
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
@@ -36,8 +42,8 @@ class GroundContact(LeafSystem):
     |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
     | ground_forces     | (3 m,)  | N      | table of physics.contact, row by row              |
 
-    On flat ground t1 and t2 are x and y; otherwise see `physics.terrain`. The scenario chooses the
-    law of friction, and `physics.friction` explains modes.
+    On flat ground t1 and t2 are x and y; otherwise see `physics.terrain`; `physics.friction`
+    explains modes.
 
     The discrete state is `modes` of `physics.contact`. Deflections follow from the stick points, so
     no continuous state has to be reset. Modes are updated at the end of a step; Initialize() sets
@@ -47,12 +53,12 @@ class GroundContact(LeafSystem):
     0.01 s times the accuracy of Context.SetAccuracy().
     """
 
-    def __init__(self, robot: Robot, *, witness: bool = False) -> None:
+    def __init__(self, model: Model, *, witness: bool = False) -> None:
         super().__init__()
-        bodies, count = len(robot.structure.bodies), len(robot.structure.contacts)
+        bodies, count = model.bodies.mass.size, model.ground.contacts.size
         # The kernels write to these arrays at every call.
-        self._forces, self._force = Forces.of(robot.model), np.empty(6 * bodies)
-        self._parts = Packed((robot.model, self._forces))
+        self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
+        self._parts = Packed((model, self._forces))
         state, modes = np.empty(13 * bodies), np.empty((count, contact.MODE_COLUMNS))
         self._compute_forces = machine_code(
             compute_ground_forces, self._parts, state, modes, self._force
@@ -134,3 +140,29 @@ class GroundContact(LeafSystem):
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._modes(context)[:, : contact.STICK_POINT].ravel())
+
+
+def AddGroundContact(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    *,
+    frames: Sequence[Frame],
+    ground: contact.Ground,
+    witness: bool = False,
+    name: str = "ground",
+) -> GroundContact:
+    """Adds a ground that touches the origins of frames of a plant's bodies.
+
+    The plant must be finalized, may have any joints, and should be continuous. `ground` is by
+    robot.ground.make_surface(), or a robot's, whose own contact nodes do not count. For `witness`
+    see GroundContact. The ports have the contact nodes in the order of `frames`.
+    """
+    if any(frame.body() is plant.world_body() for frame in frames):
+        raise InputError("AddGroundContact", "frames", "found a frame of the world")
+    nodes = Nodes.of(plant, frames)
+    contacts = np.array([nodes.of_frame[frame.index()] for frame in frames], dtype=np.int64)
+    placed = ground._replace(contacts=contacts, carriers=nodes.carriers[contacts])
+    model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
+    system = builder.AddNamedSystem(name, GroundContact(model, witness=witness))
+    Attach(builder, plant, system)
+    return system

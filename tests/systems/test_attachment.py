@@ -1,0 +1,239 @@
+"""Cables, ground and actuators on bodies of plants with joints, against Drake and closed forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat, SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    LinearSpringDamper,
+    RevoluteJoint,
+    SpatialInertia,
+)
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+
+from tetra_drake.physics.cable import CableLaw
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.ground import make_surface
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.actuator_kinds import Winch
+from tetra_drake.scenario.common_sections import GroundSection
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.systems import AddCables, AddGroundContact, Cable
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+MASS, LENGTH, GRAVITY = 0.5, 0.4, 9.81  # of a uniform rod on a hinge at the origin
+LAW = CableLaw(stiffness=60.0, damping=8.0, free_length=0.0)
+LEFT, RIGHT = np.array([-0.2, 0.0, 0.5]), np.array([0.6, 0.0, 0.3])  # anchors of two tendons
+
+
+def add_point(plant: MultibodyPlant, name: str, parent: Frame, p: np.ndarray) -> Frame:
+    return plant.AddFrame(FixedOffsetFrame(name, parent, RigidTransform(np.array(p))))
+
+
+def hinged_rod(builder: DiagramBuilder) -> tuple[MultibodyPlant, Frame]:
+    """A plant with a rod along x that turns about y, and the frame at its free end."""
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    inertia = SpatialInertia.ThinRodWithMassAboutEnd(MASS, LENGTH, [1.0, 0.0, 0.0])
+    rod = plant.AddRigidBody("rod", inertia)
+    hinge = RevoluteJoint("hinge", plant.world_frame(), rod.body_frame(), [0.0, -1.0, 0.0])
+    plant.AddJoint(hinge)
+    tip = add_point(plant, "tip", rod.body_frame(), [LENGTH, 0.0, 0.0])
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -GRAVITY])
+    return plant, tip
+
+
+def tendons(plant: MultibodyPlant, tip: Frame, law: CableLaw = LAW) -> list[Cable]:
+    """Tendons from the world to the free end. The plant must not be finalized."""
+    anchors = {"left": LEFT, "right": RIGHT}
+    return [
+        Cable(name, add_point(plant, name, plant.world_frame(), place), tip, law)
+        for name, place in anchors.items()
+    ]
+
+
+def simulated(diagram: Diagram, time: float) -> Simulator:
+    simulator = Simulator(diagram)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3)
+    simulator.get_mutable_integrator().set_target_accuracy(1e-8)
+    simulator.AdvanceTo(time)
+    return simulator
+
+
+def state_at(diagram: Diagram, time: float) -> np.ndarray:
+    plant = diagram.GetSubsystemByName("plant")
+    root = simulated(diagram, time).get_context()
+    state: np.ndarray = plant.GetPositionsAndVelocities(plant.GetMyContextFromRoot(root))
+    return state
+
+
+def test_an_arm_comes_to_rest_where_two_tendons_balance_its_weight():
+    # Tendons without free length: the energy is -u . (k L (a + b) - m g L / 2 z), up to a
+    # constant, for the direction u of the rod and the anchors a and b.
+    builder = DiagramBuilder()
+    plant, tip = hinged_rod(builder)
+    cables = tendons(plant, tip)
+    plant.Finalize()
+    AddCables(builder, plant, cables=cables)
+    angle, rate = state_at(builder.Build(), 4.0)
+    pull = LAW.stiffness * (LEFT + RIGHT) - 0.5 * MASS * GRAVITY * np.array([0.0, 0.0, 1.0])
+    assert angle == pytest.approx(math.atan2(pull[2], pull[0]), abs=1e-6)
+    assert rate == pytest.approx(0.0, abs=1e-6)
+
+
+def test_tendons_of_an_arm_of_drakes_are_its_linear_spring_dampers():
+    def moved(attach: Callable[..., None], state: list[float]) -> np.ndarray:
+        builder = DiagramBuilder()
+        plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+        Parser(plant).AddModelsFromUrl("package://drake/examples/acrobot/Acrobot.urdf")
+        ends = [
+            (plant.world_frame(), [0.3, 0.1, 0.0]),
+            (plant.GetFrameByName("upper_link"), [0.0, 0.02, -0.7]),
+            (plant.GetFrameByName("lower_link"), [0.0, 0.0, -1.0]),
+        ]
+        frames = [add_point(plant, f"end {i}", *end) for i, end in enumerate(ends)]
+        law = CableLaw(stiffness=40.0, damping=1.5, free_length=0.1)
+        pairs = {"upper": frames[:2], "lower": frames[1:], "both": [frames[0], frames[2]]}
+        attach(builder, plant, [Cable(name, a, b, law) for name, (a, b) in pairs.items()])
+        diagram = builder.Build()
+        plant.SetDefaultPositions(state)
+        return state_at(diagram, 0.5)
+
+    def with_springs(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
+        for cable in cables:
+            ends: list[object] = []
+            for frame in (cable.frame_a, cable.frame_b):
+                ends += [frame.body(), frame.GetFixedPoseInBodyFrame().translation()]
+            law = [cable.law.free_length, cable.law.stiffness, cable.law.damping]
+            plant.AddForceElement(LinearSpringDamper(*ends, *law))
+        plant.Finalize()
+
+    def with_cables(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
+        plant.Finalize()
+        AddCables(builder, plant, cables=cables, slack=False)
+
+    expected = moved(with_springs, [0.7, -1.1])
+    assert np.abs(expected[2:]).min() > 0.1  # it swings
+    np.testing.assert_allclose(moved(with_cables, [0.7, -1.1]), expected, atol=1e-6)
+
+
+def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffness():
+    builder = DiagramBuilder()
+    plant, tip = hinged_rod(builder)
+    plant.Finalize()
+    law = GroundSection(stiffness=2e3, damping=2e4)
+    ground = make_surface(law, Coulomb(), Flat())
+    contact = AddGroundContact(builder, plant, frames=[tip], ground=ground)
+    builder.ExportOutput(contact.GetOutputPort("normal_forces"), "normal_forces")
+    diagram = builder.Build()
+    simulator = simulated(diagram, 3.0)
+    (load,) = diagram.GetOutputPort("normal_forces").Eval(simulator.get_context())
+    assert load == pytest.approx(0.5 * MASS * GRAVITY, rel=1e-5)
+    context = plant.GetMyContextFromRoot(simulator.get_context())
+    depth = -tip.CalcPoseInWorld(context).translation()[2]
+    assert depth == pytest.approx(0.5 * MASS * GRAVITY / law.stiffness, rel=1e-5)
+
+
+def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
+    def angle(actuation: Winch | None) -> float:
+        builder = DiagramBuilder()
+        plant, tip = hinged_rod(builder)
+        cables = tendons(plant, tip, LAW._replace(free_length=0.15))
+        plant.Finalize()
+        actuated = {"pull": ["right"]}
+        network = AddCables(builder, plant, cables=cables, actuated=actuated, actuation=actuation)
+        signal = builder.AddSystem(ConstantVectorSource([6.0]))
+        builder.Connect(signal.get_output_port(), network.GetInputPort("signals"))
+        return float(state_at(builder.Build(), 4.0)[0])
+
+    winch = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
+    assert angle(winch) == pytest.approx(angle(None), abs=1e-6)
+
+
+def test_an_unknown_cable_and_a_frame_of_the_world_are_refused(refused):
+    builder = DiagramBuilder()
+    plant, tip = hinged_rod(builder)
+    cables = tendons(plant, tip)
+    plant.Finalize()
+    with refused("AddCables", "actuated.pull", "'rigth'", "right"):
+        AddCables(builder, plant, cables=cables, actuated={"pull": ["rigth"]})
+    ground = make_surface(GroundSection(stiffness=1e3, damping=0.0), Coulomb(), Flat())
+    with refused("AddGroundContact", "frames", "world"):
+        AddGroundContact(builder, plant, frames=[cables[0].frame_a], ground=ground)
+
+
+def test_forces_add_to_what_is_connected_to_the_plant(scenario):
+    def acceleration(push: float, *, attached: bool) -> np.ndarray:
+        builder = DiagramBuilder()
+        plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+        bodies = [
+            plant.AddRigidBody(name, SpatialInertia.SolidSphereWithMass(1.0, 0.1)) for name in "ab"
+        ]
+        plant.Finalize()
+        force = builder.AddSystem(ConstantVectorSource(np.full(12, push)))
+        port = plant.get_applied_generalized_force_input_port()
+        builder.Connect(force.get_output_port(), port)
+        plant.SetDefaultFloatingBaseBodyPose(bodies[1], RigidTransform([0.3, 0.0, 0.0]))
+        if attached:
+            ends = [body.body_frame() for body in bodies]
+            AddCables(builder, plant, cables=[Cable("between", *ends, CableLaw(10.0, 0.0, 0.1))])
+        diagram = builder.Build()
+        derivatives = diagram.EvalTimeDerivatives(diagram.CreateDefaultContext())
+        return derivatives.get_generalized_velocity().CopyToVector()
+
+    difference = acceleration(3.0, attached=True) - acceleration(3.0, attached=False)
+    expected = np.zeros((2, 6))
+    expected[:, 3] = [2.0, -2.0]  # 10 N/m (0.3 m - 0.1 m) on 1 kg
+    np.testing.assert_allclose(difference.reshape(2, 6), expected, atol=1e-12)
+
+
+def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    inertia = SpatialInertia.SolidSphereWithMass(1.0, 0.1)
+    ball = plant.AddRigidBody("ball", inertia)
+    plant.Finalize()
+    plant.SetDefaultFloatingBaseBodyPose(ball, RigidTransform([0.0, 0.0, 1.0]))
+    cable = Cable("cable", plant.world_frame(), ball.body_frame(), LAW)
+    AddCables(builder, plant, cables=[cable], scene_graph=scene_graph)
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    for height in (0.5, 1.0, 1.5):
+        place = RigidTransform([0.0, 0.0, height])
+        plant.SetFreeBodyPose(plant.GetMyMutableContextFromRoot(root), ball, place)
+        ends = np.sort(shown_cylinders(scene_graph, scene_graph.GetMyContextFromRoot(root)), axis=0)
+        assert (ends.min(), ends.max()) == pytest.approx((0.0, height))
+        assert (ends[1:, 0] <= ends[:-1, 1] + 1e-12).all()  # no gap
+
+
+def shown_cylinders(scene_graph: SceneGraph, context: object) -> np.ndarray:
+    """Lower and upper ends (cylinders, 2) of all upright cylinders in m."""
+    query = scene_graph.get_query_output_port().Eval(context)
+    inspector, ends = query.inspector(), []
+    for geometry in inspector.GetAllGeometryIds():
+        half = inspector.GetShape(geometry).length() / 2
+        height = query.GetPoseInWorld(geometry).translation()[2]
+        ends.append([height - half, height + half])
+    return np.array(ends)
+
+
+def test_a_robot_is_shown_in_meshcat_with_struts_nodes_and_cables():
+    robot, meshcat = Robot.of(load_scenario("thesis")), Meshcat()
+    diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario), meshcat=meshcat)
+    inspector = diagram.GetSubsystemByName("scene_graph").model_inspector()
+    assert inspector.num_geometries() == 5 * (6 + 4) + 24 * 4
+    diagram.ForcedPublish(diagram.CreateDefaultContext())
+    for path in ("T1", "T1-T2 outer top 0"):
+        assert meshcat.HasPath(f"/drake/visualizer/{path}")

@@ -1,0 +1,195 @@
+"""Attachment of forces to the bodies of a MultibodyPlant, whatever joins them.
+
+Attached systems, such as CableNetwork, take the state of all bodies as if these were free, and give
+a torque and a force on each. If the bodies are free, these are the plant's own state and
+generalized force; otherwise BodyStates and BodyForces translate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple, Self
+
+import numpy as np
+from pydrake.common.value import AbstractValue
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import (
+    ExternallyAppliedSpatialForce,
+    ExternallyAppliedSpatialForceMultiplexer,
+    MultibodyPlant,
+)
+from pydrake.multibody.tree import BodyIndex, Frame, FrameIndex, RigidBody
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+    System,
+)
+from pydrake.systems.primitives import Adder
+
+from tetra_drake.scenario.blueprint import WORLD
+
+
+class Nodes(NamedTuple):
+    """Nodes at the origins of a plant's frames, in the form of the kernels."""
+
+    p_BN: np.ndarray
+    """Positions (nodes, 3) in the frames of the bodies, in the order of the bodies; then positions
+    of the world's nodes."""
+    first_node: np.ndarray
+    """Index of each body's first node (bodies + 1,); the last number is the index of the world's
+    first node. Bodies are numbered as in the plant, without the world."""
+    carriers: np.ndarray
+    """Index of the body of each node (nodes,); WORLD for the world."""
+    of_frame: dict[FrameIndex, int]
+    """Index of the node at each frame."""
+
+    @classmethod
+    def of(cls, plant: MultibodyPlant, frames: Iterable[Frame]) -> Self:
+        """The nodes at frames of a finalized plant; a frame may occur several times."""
+        by_index = {frame.index(): frame for frame in frames}
+        ordered = sorted(by_index.values(), key=_place)
+        carriers = np.array([_number(frame.body()) for frame in ordered], dtype=np.int64)
+        counts = np.bincount(carriers[carriers != WORLD], minlength=plant.num_bodies() - 1)
+        p_BN = [frame.GetFixedPoseInBodyFrame().translation() for frame in ordered]
+        return cls(
+            p_BN=np.array(p_BN).reshape(-1, 3),
+            first_node=np.append(0, np.cumsum(counts)),
+            carriers=carriers,
+            of_frame={frame.index(): node for node, frame in enumerate(ordered)},
+        )
+
+
+def _place(frame: Frame) -> tuple[bool, int, int]:
+    """Place of a frame's node: by body, the world last, then by frame."""
+    body = _number(frame.body())
+    return body == WORLD, body, int(frame.index())
+
+
+def _number(body: RigidBody) -> int:
+    """Index of a body without the world; WORLD for the world, which is a plant's first body."""
+    return int(body.index()) + WORLD
+
+
+class BodyStates(LeafSystem):
+    """State of the bodies of a plant, as if they were free. The system has no state.
+
+    | port               | shape   | unit | meaning                                      |
+    |--------------------|---------|------|----------------------------------------------|
+    | body_poses         |         | SI   | list of the poses X_WB, from the plant       |
+    | spatial_velocities |         | SI   | list of the velocities V_WB, from the plant  |
+    | state              | (13 n,) | SI   | [q; v] of the n bodies other than the world  |
+    """
+
+    def __init__(self, plant: MultibodyPlant) -> None:
+        super().__init__()
+        self._poses, self._velocities = (
+            self.DeclareAbstractInputPort(name, port.Allocate())
+            for name, port in (
+                ("body_poses", plant.get_body_poses_output_port()),
+                ("spatial_velocities", plant.get_body_spatial_velocities_output_port()),
+            )
+        )
+        sources = {self._poses.ticket(), self._velocities.ticket()}
+        size = 13 * (plant.num_bodies() - 1)
+        self.DeclareVectorOutputPort("state", size, self._calc_state, sources)
+
+    def _calc_state(self, context: Context, output: BasicVector) -> None:
+        poses, velocities = self._poses.Eval(context)[1:], self._velocities.Eval(context)[1:]
+        q = [[*X_WB.rotation().ToQuaternion().wxyz(), *X_WB.translation()] for X_WB in poses]
+        v = [V_WB.get_coeffs() for V_WB in velocities]
+        output.SetFromVector(np.concatenate([np.ravel(q), np.ravel(v)]))
+
+
+class BodyForces(LeafSystem):
+    """Forces on the bodies of a plant, as the plant takes them. The system has no state.
+
+    | port              | shape  | unit   | meaning                                           |
+    |-------------------|--------|--------|---------------------------------------------------|
+    | generalized_force | (6 n,) | N m, N | [t_W; f_W] at the origins of the n bodies other   |
+    |                   |        |        | than the world                                    |
+    | spatial_forces    |        | N m, N | list of ExternallyAppliedSpatialForce             |
+    """
+
+    def __init__(self, plant: MultibodyPlant) -> None:
+        super().__init__()
+        self._force = self.DeclareVectorInputPort("generalized_force", 6 * (plant.num_bodies() - 1))
+        self.DeclareAbstractOutputPort(
+            "spatial_forces",
+            lambda: AbstractValue.Make([ExternallyAppliedSpatialForce()]),
+            self._calc_forces,
+            {self._force.ticket()},
+        )
+
+    def _calc_forces(self, context: Context, output: AbstractValue) -> None:
+        forces = self._force.Eval(context).reshape(-1, 6)
+        acting = np.flatnonzero(forces.any(axis=1)).tolist()
+        output.set_value([_on_body(body, forces[body]) for body in acting])
+
+
+def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
+    """A torque and a force (6,) on a body at its origin."""
+    applied = ExternallyAppliedSpatialForce()
+    applied.body_index = BodyIndex(body - WORLD)
+    applied.F_Bq_W = SpatialForce(force)
+    return applied
+
+
+def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:
+    """Connects a system with the ports `state` and `generalized_force` to a plant.
+
+    Its force is added to all forces that are connected to the plant before. The plant must be
+    finalized.
+    """
+    name, force = system.get_name(), system.GetOutputPort("generalized_force")
+    builder.Connect(BodyStatePort(builder, plant), system.GetInputPort("state"))
+    if _has_free_bodies(plant):
+        port = plant.get_applied_generalized_force_input_port()
+        _Add(builder, force, port, Adder(2, force.size()), name)
+        return
+    forces = builder.AddNamedSystem(f"forces_of_{name}", BodyForces(plant))
+    builder.Connect(force, forces.get_input_port())
+    port = plant.get_applied_spatial_force_input_port()
+    _Add(builder, forces.get_output_port(), port, ExternallyAppliedSpatialForceMultiplexer(2), name)
+
+
+def BodyStatePort(builder: DiagramBuilder, plant: MultibodyPlant) -> OutputPort:
+    """Port with the state [q; v] (13 n,) of the n bodies of a plant as if they were free."""
+    if _has_free_bodies(plant):
+        return plant.get_state_output_port()
+    name = f"bodies_of_{plant.get_name()}"
+    if builder.HasSubsystemNamed(name):
+        return builder.GetSubsystemByName(name).get_output_port()
+    states = builder.AddNamedSystem(name, BodyStates(plant))
+    builder.Connect(plant.get_body_poses_output_port(), states.get_input_port(0))
+    builder.Connect(plant.get_body_spatial_velocities_output_port(), states.get_input_port(1))
+    return states.get_output_port()
+
+
+def _has_free_bodies(plant: MultibodyPlant) -> bool:
+    """True if all bodies of a plant are free, and its state has them in their order."""
+    bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
+    return all(
+        body.is_floating_base_body()
+        and body.has_quaternion_dofs()
+        and body.floating_positions_start() == 7 * number
+        for number, body in enumerate(bodies)
+    )
+
+
+def _Add(
+    builder: DiagramBuilder, source: OutputPort, port: InputPort, adder: System, name: str
+) -> None:
+    """Adds a source to what is connected to a port."""
+    earlier = builder.connection_map().get((port.get_system(), port.get_index()))
+    if earlier is not None:
+        before = earlier[0].get_output_port(earlier[1])
+        builder.Disconnect(before, port)
+        builder.AddNamedSystem(f"forces_with_{name}", adder)
+        builder.Connect(before, adder.get_input_port(0))
+        builder.Connect(source, adder.get_input_port(1))
+        source = adder.get_output_port()
+    builder.Connect(source, port)
