@@ -404,7 +404,11 @@ def _compare(runs: list[Run], *, reach: Length | None = None, out: Folder | None
 
 
 def _fit(
-    source: FitPath, *, scenario: ScenarioName | None = None, out: Folder = Path("fit")
+    source: FitPath,
+    *,
+    scenario: ScenarioName | None = None,
+    search: bool = False,
+    out: Folder = Path("fit"),
 ) -> None:
     """Fit values of a scenario to measurements.
 
@@ -417,6 +421,7 @@ def _fit(
     Args:
         source: the file of the fit
         scenario: (default: scenario.yaml beside the file, or thesis)
+        search: first search all values within the bounds, by CMA-ES; a few hundred simulations
         out: the folder to write to (default: %(default)s)
 
     Example: tetra-drake fit lab/fit.yaml --scenario prism --out fit
@@ -433,6 +438,7 @@ def _fit(
             chosen,
             given.measurements,
             given.parameters,
+            search=search,
             out=out,
             say=lambda text: print(text, flush=True),
         )

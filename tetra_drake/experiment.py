@@ -128,6 +128,7 @@ def fit(
     measurements: Sequence[Measurement],
     parameters: Mapping[str, Bounds],
     *,
+    search: bool = False,
     out: str | Path | None = None,
     say: Say | None = None,
 ) -> Fit:
@@ -147,6 +148,8 @@ def fit(
         scenario: a scenario, its name or file, or a run. Its values are the start.
         measurements: values of the kinds td.MotionCapture and td.Rest.
         parameters: the bounds, least and most, by scenario key. Texts have units; numbers are SI.
+        search: searches all values within the bounds for a better start, by CMA-ES, for data that
+            several minima may fit.
         out: a folder for the fitted scenario, tables, figure and page. It also keeps each
             evaluation, so that an interrupted fit goes on where it was.
         say: is told of each iteration.
@@ -160,7 +163,12 @@ def fit(
         if (folder / SCENARIO).exists() and not (folder / EVALUATIONS).exists():
             raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
     found = fit_values(
-        given_scenario(scenario), list(measurements), parameters, folder=folder, say=say
+        given_scenario(scenario),
+        list(measurements),
+        parameters,
+        search=search,
+        folder=folder,
+        say=say,
     )
     if folder is not None:
         from tetra_drake.report.fit_page import save_fit

@@ -122,11 +122,30 @@ def test_predictions_that_are_not_smooth_have_no_intervals(monkeypatch):
     assert any(STIFFNESS in warning for warning in found.warnings)
 
 
+def test_a_search_finds_the_deepest_of_many_minima(monkeypatch):
+    cases, predict = pulled_down(310.0, 0.4, np.zeros(4)), measurements._MeasuredRest.predict
+
+    def wavy(self, scenarios):
+        waves = [
+            math.sin(0.3 * (each.robot.cables["line"].stiffness - 310.0)) for each in scenarios
+        ]
+        pairs = zip(predict(self, scenarios), waves, strict=True)
+        return [each._replace(values=each.values + 5e-3 * wave) for each, wave in pairs]
+
+    monkeypatch.setattr(measurements._MeasuredRest, "predict", wavy)
+    bounds = {STIFFNESS: (100.0, 400.0)}
+    near, found = (fit_values(hung(), cases, bounds, search=search) for search in (False, True))
+    assert near.misfit > 10.0
+    assert found.parameters["value"][STIFFNESS] == pytest.approx(310.0, rel=1e-4)
+    assert found.misfit < 1e-3
+
+
 class Stopped(Exception):
     pass
 
 
-def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
+@pytest.mark.parametrize("search", [False, True])
+def test_an_interrupted_fit_goes_on_where_it_was(search, tmp_path, monkeypatch):
     cases, predict = pulled_down(210.0, 0.39, np.zeros(4)), measurements._MeasuredRest.predict
     predicted = []
 
@@ -138,17 +157,17 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
 
     monkeypatch.setattr(measurements._MeasuredRest, "predict", counted)
     stop = 0
-    whole = fit(hung(), cases, BOUNDS)
+    whole = fit(hung(), cases, BOUNDS, search=search)
     needed = len(predicted)
     predicted, stop = [], 2 * len(cases)
     with pytest.raises(Stopped):
-        fit(hung(), cases, BOUNDS, out=tmp_path)
+        fit(hung(), cases, BOUNDS, search=search, out=tmp_path)
     stop = 0
-    again = fit(hung(), cases, BOUNDS, out=tmp_path)
+    again = fit(hung(), cases, BOUNDS, search=search, out=tmp_path)
     assert len(predicted) == needed
     assert again.parameters.equals(whole.parameters)
     predicted = []
-    fit(hung(), cases, BOUNDS, out=tmp_path)
+    fit(hung(), cases, BOUNDS, search=search, out=tmp_path)
     assert not predicted
     # Other data, or other values, are other evaluations.
     fit(hung().with_changes({DAMPING: "1 N*s/m"}), cases, BOUNDS, out=tmp_path)
@@ -198,7 +217,7 @@ def test_stiffness_and_damping_come_back_from_a_noisy_motion_with_another_clock(
         clock=0.1,
     )
     found = fit(load_scenario(lab / "scenario.yaml"), [capture], SIDE)
-    assert found.clock_offsets["log.csv"] == pytest.approx(0.03, abs=5e-4)
+    assert found.clock_offsets["measurement 1, log.csv"] == pytest.approx(0.03, abs=5e-4)
     table = found.parameters
     half = table["high"] - table["value"]
     assert (abs(table["value"] - [110.0, 0.6]) < 2.0 * half).all()  # of the one draw of noise
@@ -253,11 +272,12 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
         (BOUNDS, "parameters"),  # two for one number
     ],
 )
-def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, refused):
+def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, tmp_path, refused):
     (case, *_) = pulled_down(210.0, 0.39, np.zeros(4))
     source = "fit" if named == "parameters" else "scenario anchored"
     with refused(source, named):
-        fit_values(hung(), [case], parameters)
+        fit(hung(), [case], parameters, out=tmp_path / "fit")
+    assert not (tmp_path / "fit").exists()
 
 
 @pytest.mark.parametrize(
@@ -272,6 +292,7 @@ def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, refused
         ("time_s,n3 z_mm\n0,x\n", "line 2, n3 z_mm"),
         ("time_s,n3 z_mm\n0,\n1,\n", ""),
         ("time_s,n3 z_mm\n0,1\n9,1\n", "time_s"),
+        ("time_s,n3 z_mm\n0,1\n1,1\n", "time_s"),  # the command takes 1.45 s
     ],
 )
 def test_a_log_that_does_not_fit_is_refused(log, named, lab, tmp_path, refused):
@@ -279,7 +300,34 @@ def test_a_log_that_does_not_fit_is_refused(log, named, lab, tmp_path, refused):
     file.write_text(log)
     capture = MotionCapture(log=str(file), command=str(lab / "command.csv"), uncertainty=NOISE)
     with refused(file, named):
-        fit_values(load_scenario(lab / "scenario.yaml"), [capture], SIDE)
+        fit(load_scenario(lab / "scenario.yaml"), [capture], SIDE, out=tmp_path / "fit")
+    assert not (tmp_path / "fit").exists()
+
+
+def test_a_log_in_parquet_has_the_numbers_of_the_csv_file(lab, tmp_path, monkeypatch, refused):
+    pytest.importorskip("pyarrow")
+    table, scenario = pandas.read_csv(lab / "log.csv"), load_scenario(lab / "scenario.yaml")
+    table.to_parquet(tmp_path / "log.parquet")
+    table.set_index("time_s").to_parquet(tmp_path / "indexed.parquet")
+
+    def numbers(log):
+        capture = MotionCapture(log=str(log), command=str(lab / "command.csv"), uncertainty=NOISE)
+        return capture.read(scenario, "").numbers
+
+    expected = numbers(lab / "log.csv")
+    assert len(expected) > 100
+    assert numbers(tmp_path / "log.parquet").equals(expected)
+    assert numbers(tmp_path / "indexed.parquet").equals(expected)
+    (tmp_path / "text.parquet").write_text("time_s,n3 z_mm\n0,1\n")
+    with refused(tmp_path / "text.parquet", ""):
+        numbers(tmp_path / "text.parquet")
+
+    def without_pyarrow(content):
+        raise ImportError("pyarrow")
+
+    monkeypatch.setattr(pandas, "read_parquet", without_pyarrow)
+    with refused(tmp_path / "log.parquet", "", "pip install 'tetra_drake[parquet]'"):
+        numbers(tmp_path / "log.parquet")
 
 
 def test_unknown_names_and_keys_of_measurements_are_refused(tmp_path, refused):

@@ -9,22 +9,21 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import pandas
 
 from tetra_drake import __version__
 from tetra_drake.analysis.measurements import Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Table, fixed, listed, rounded
+from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import value_at
 from tetra_drake.scenario.units import plainest, quantity_to_si
-
-if TYPE_CHECKING:
-    import pandas
 
 STEP = 1e-3
 """Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and
@@ -33,16 +32,22 @@ LONGER, ROUGH = 10.0, 0.2
 """Factor of a longer step; and difference of the derivatives with both steps, as a share of the
 derivative, from which a prediction is rough. Contacts that come and go make it so in long motion:
 the search may end in any of many minima, and intervals from derivatives mean nothing."""
-TOLERANCE = 1e-6
-"""Relative change of parameters at which the search ends."""
+TOLERANCE = 1e-4
+"""Relative change of parameters at which the fit ends: a tenth of STEP. A smooth fit is far more
+exact by then, because its steps shrink quadratically."""
 NEGLIGIBLE = 0.01
-"""Change of the sum of squares at which the search ends; 1 is a standard deviation."""
+"""Change of the sum of squares at which the fit ends; 1 is a standard deviation."""
+POPULATION, MOST = 16, 480
+"""Evaluations per iteration of a global search, which fill the lanes of two cores; and the most of
+all its iterations."""
 NORMAL = 1.96
 """Half width of a 95 % interval in standard deviations."""
 SAME_DIRECTION = 1e-10
 """Singular value, as a share of the greatest, below which the data say nothing of a direction."""
 STRONG = 0.95
 """Correlation above which two parameters are named."""
+HUGE = 1e200
+"""Sum of squares where a simulation fails."""
 EVALUATIONS = "evaluations"
 """Folder of the evaluations of a fit."""
 
@@ -64,9 +69,9 @@ class Parameter(NamedTuple):
         """Unit of the relative parameter: the start, or the width of the bounds if it is 0."""
         return abs(self.start) or self.most - self.least
 
-    def text(self, number: float) -> str:
+    def given(self, number: float) -> str | float:
         """The number for a scenario."""
-        return f"{number!r} {self.unit}".strip()
+        return f"{number!r} {self.unit}" if self.unit else number
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,8 @@ class Fit:
     """The scenario with the fitted values."""
     parameters: pandas.DataFrame
     """A row per key in SI: value, its 95 % interval low and high (NaN if unknown), start, bounds
-    least and most, unit, and whether the data determine it."""
+    least and most, unit, whether the data determine it, and whether predictions are smooth in it.
+    """
     correlations: pandas.DataFrame = field(repr=False)
     """Correlations of the parameters, by keys."""
     residuals: pandas.DataFrame = field(repr=False)
@@ -140,6 +146,7 @@ def fit_values(
     measurements: Sequence[Measurement],
     parameters: Mapping[str, Bounds],
     *,
+    search: bool = False,
     folder: Path | None = None,
     say: Say | None = None,
 ) -> Fit:
@@ -149,6 +156,7 @@ def fit_values(
         scenario: the scenario whose values are the start.
         measurements: the measurements.
         parameters: the bounds, least and most, by key.
+        search: searches all values within the bounds for a better start, by CMA-ES.
         folder: keeps each evaluation; another fit to the same data takes them from there.
         say: is told of each iteration.
 
@@ -163,7 +171,7 @@ def fit_values(
         each.read(scenario, f"measurement {number}")
         for number, each in enumerate(measurements, start=1)
     ]
-    numbers = sum(len(each.values) for each in measured)
+    numbers = sum(len(each.numbers) for each in measured)
     if not fitted or numbers < len(fitted):
         found = f"found {len(fitted)} for {numbers} measured numbers"
         raise InputError("fit", "parameters", f"{found}, expected one at least, and no more")
@@ -176,13 +184,13 @@ def fit_values(
         raise InputError(scenario.name, "", what)
     solution = least_squares(
         problem.residuals,
-        start,
+        _searched(problem, start) if search else start,
         jac=problem.jacobian,
         bounds=problem.bounds,
         x_scale="jac",
         ftol=2.0 * NEGLIGIBLE / numbers,
         xtol=TOLERANCE,
-        gtol=TOLERANCE,
+        gtol=None,
     )
     return _result(problem, start, solution.x, time.perf_counter() - began)
 
@@ -203,9 +211,10 @@ def _parameter(scenario: Scenario, key: str, bounds: Bounds) -> Parameter:
     if not least <= start <= most:
         problem = f"found bounds {least:g} to {most:g} {unit}".rstrip()
         raise InputError(source, key, f"{problem}, expected them around the start, {start:g}")
+    parameter = Parameter(key, unit, float(start), least, most)
     for bound in (least, most):  # a scenario may have limits of its own
-        scenario.with_changes({key: f"{bound!r} {unit}" if unit else bound})
-    return Parameter(key, unit, float(start), least, most)
+        scenario.with_changes({key: parameter.given(bound)})
+    return parameter
 
 
 def _bound(bound: str | float, unit: str, source: str, key: str) -> float:
@@ -249,8 +258,10 @@ class _Problem:
             np.array([parameter.least for parameter in parameters]) / self.scale,
             np.array([parameter.most for parameter in parameters]) / self.scale,
         )
-        self.values = np.concatenate([each.values for each in measured])
-        self.uncertainty = np.concatenate([each.uncertainty for each in measured])
+        tables = [each.numbers.assign(measurement=each.name) for each in measured]
+        self.numbers = pandas.concat(tables, ignore_index=True)
+        self.values = self.numbers["measured"].to_numpy(dtype=float)
+        self.uncertainty = self.numbers["uncertainty"].to_numpy(dtype=float)
         self._digest, self._folder, self._say = digest, folder, say
         self._known: dict[str, list[Prediction]] = {}
 
@@ -264,35 +275,40 @@ class _Problem:
         numbers = (x * self.scale).tolist()
         pairs = zip(self.parameters, numbers, strict=True)
         return self.scenario.with_changes(
-            {one.key: one.text(number) if one.unit else number for one, number in pairs}
+            {parameter.key: parameter.given(number) for parameter, number in pairs}
         )
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Weighted residuals (numbers,); the neighbours of the point are simulated with it."""
         before = self.evaluations
-        self._evaluate([x, *self._neighbours(x)])
-        residuals = self._residuals_at(x)
-        if self._say and self.evaluations > before:
-            misfit = self.misfit(residuals)
-            self._say(f"{self.evaluations} evaluations, misfit {misfit:.3g}")
+        self._evaluate([x, *self._neighbours(x, STEP)])
+        residuals = self.residuals_at(x)
+        if self.evaluations > before:
+            self.tell(residuals)
         return residuals
+
+    def sums_of_squares(self, points: np.ndarray) -> np.ndarray:
+        """Sums (k,) of the squares of the weighted residuals at points (k, n), which are simulated
+        side by side; a huge number where that fails."""
+        self._evaluate(list(points))
+        residuals = np.array([self.residuals_at(point) for point in points])
+        return np.nan_to_num((residuals**2).sum(axis=1), nan=HUGE)
 
     def jacobian(self, x: np.ndarray, step: float = STEP) -> np.ndarray:
         """Derivatives (numbers, n) of the residuals by central differences; one-sided where a
         neighbour cannot be simulated. Raises InputError where none can."""
-        self._evaluate([x, *self._neighbours(x, step)])
-        here, columns = self._residuals_at(x), []
+        points = self._neighbours(x, step)
+        self._evaluate([x, *points])
+        columns = []
         for place, parameter in enumerate(self.parameters):
-            points = self._neighbours(x, step)[2 * place : 2 * place + 2]
-            sides = [(point[place], self._residuals_at(point)) for point in points]
+            near = [points[2 * place], x, points[2 * place + 1]]
+            sides = [(point[place], self.residuals_at(point)) for point in near]
             sides = [side for side in sides if np.isfinite(side[1]).all()]
-            if len(sides) == 1:
-                sides.append((x[place], here))
-            if not sides:
+            (low, left), (high, right) = sides[0], sides[-1]
+            if low == high:
                 problem = "neighbouring values cannot be simulated, expected other bounds"
                 raise InputError(f"scenario {self.scenario.name}", parameter.key, problem)
-            (one, low), (other, high) = sides
-            columns.append((high - low) / (other - one))
+            columns.append((right - left) / (high - low))
         return np.column_stack(columns)
 
     def roughness(self, x: np.ndarray) -> np.ndarray:
@@ -306,21 +322,22 @@ class _Problem:
         """Sum of squares per degree of freedom."""
         return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
 
+    def tell(self, residuals: np.ndarray) -> None:
+        """Tells the user of an iteration that ended with these residuals."""
+        if self._say:
+            self._say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
+
     def predictions(self, x: np.ndarray) -> list[Prediction]:
         """Predictions for each measurement at a point that was evaluated."""
         return self._known[self._name(x)]
 
-    def _neighbours(self, x: np.ndarray, step: float = STEP) -> list[np.ndarray]:
+    def _neighbours(self, x: np.ndarray, step: float) -> list[np.ndarray]:
         """Two neighbours of a point for each parameter, within the bounds."""
-        neighbours = []
-        for place in range(x.size):
-            for sign in (-1.0, 1.0):
-                moved = x.copy()
-                moved[place] += sign * step
-                neighbours.append(np.clip(moved, *self.bounds))
-        return neighbours
+        moves = step * np.kron(np.eye(x.size), [[-1.0], [1.0]])
+        return list(np.clip(x + moves, *self.bounds))
 
-    def _residuals_at(self, x: np.ndarray) -> np.ndarray:
+    def residuals_at(self, x: np.ndarray) -> np.ndarray:
+        """Weighted residuals (numbers,) at a point that was evaluated."""
         predicted = np.concatenate([each.values for each in self.predictions(x)])
         residuals: np.ndarray = (predicted - self.values) / self.uncertainty
         return residuals
@@ -365,56 +382,56 @@ class _Problem:
         return True
 
 
+def _searched(problem: _Problem, start: np.ndarray) -> np.ndarray:
+    """Relative parameters (n,) with the least sum of squares in a search by CMA-ES, which ends when
+    it has converged roughly."""
+    low, high = problem.bounds
+    origin = (start - low) / (high - low)
+    search = Search(POPULATION, Box(start.size), np.random.default_rng(0), origin)
+    while not search.restarts and search.evaluations < MOST:
+        shares = search.draw()
+        search.learn(shares, -problem.sums_of_squares(low + shares * (high - low)))
+        problem.tell(problem.residuals_at(low + search.best_point * (high - low)))
+    points = np.array([start, low + search.best_point * (high - low)])
+    return points[np.argmin(problem.sums_of_squares(points))]
+
+
 def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: float) -> Fit:
     """The result of a fit that started at relative parameters and ended at `x` (n,)."""
-    import pandas
-
     first, last = problem.residuals(start), problem.residuals(x)
     misfit = problem.misfit(last)
     half, correlation = _uncertainty(problem, x, misfit)
-    parameters = problem.parameters
-    keys = [parameter.key for parameter in parameters]
-    values, determined = x * problem.scale, np.isfinite(half)
-    is_rough = determined & (problem.roughness(x) > ROUGH)
-    known = determined & ~is_rough.any()
+    determined, smooth = np.isfinite(half), problem.roughness(x) < ROUGH
+    known = determined & (smooth | ~determined).all()
+    values, given = x * problem.scale, pandas.DataFrame(problem.parameters).set_index("key")
     table = pandas.DataFrame(
         {
             "value": values,
             "low": np.where(known, values - half, np.nan),
             "high": np.where(known, values + half, np.nan),
-            "start": [parameter.start for parameter in parameters],
-            "least": [parameter.least for parameter in parameters],
-            "most": [parameter.most for parameter in parameters],
-            "unit": [parameter.unit for parameter in parameters],
+            **given,
             "determined": determined,
+            "smooth": smooth,
         },
-        index=pandas.Index(keys, name="key"),
+        index=given.index,
     )
-    sizes = [len(each.values) for each in problem.measured]
-    residuals = pandas.DataFrame(
-        {
-            "measurement": np.repeat([each.name for each in problem.measured], sizes),
-            "label": [label for each in problem.measured for label in each.labels],
-            "along": np.concatenate([each.along for each in problem.measured]),
-            "measured": problem.values,
-            "uncertainty": problem.uncertainty,
-            "start": problem.values + problem.uncertainty * first,
-            "fitted": problem.values + problem.uncertainty * last,
-        }
-    )
-    correlations = pandas.DataFrame(correlation, index=keys, columns=keys)
+    predicted = {
+        "start": problem.values + problem.uncertainty * first,
+        "fitted": problem.values + problem.uncertainty * last,
+    }
+    correlations = pandas.DataFrame(correlation, index=given.index, columns=given.index)
     return Fit(
         scenario=problem.scenario_at(x),
         parameters=table,
         correlations=correlations,
-        residuals=residuals,
+        residuals=problem.numbers.assign(**predicted),
         clock_offsets={
             each.name: prediction.clock_offset
             for each, prediction in zip(problem.measured, problem.predictions(x), strict=True)
         },
         misfit=misfit,
         start_misfit=problem.misfit(first),
-        warnings=_warnings(table, correlations) + _warnings_of_roughness(table[is_rough]),
+        warnings=_warnings(table, correlations),
         evaluations=problem.evaluations,
         wall_time=wall_time,
     )
@@ -455,24 +472,9 @@ def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[s
         ]
         if others:
             warnings.append(f"the data hardly tell {one} from {listed(others)}")
+    rough = [str(key) for key in determined if not table["smooth"][key]]
+    if rough:
+        problem = f"the predictions are not smooth in {listed(rough)}"
+        advice = "a shorter motion, or a larger uncertainty, may help"
+        warnings.append(f"{problem}: the values may be far off, and have no intervals; {advice}")
     return warnings
-
-
-def _warnings_of_roughness(table: pandas.DataFrame) -> list[str]:
-    if not len(table):
-        return []
-    problem = f"the predictions are not smooth in {listed(list(table.index))}"
-    advice = "a shorter motion, or a larger uncertainty, may help"
-    return [f"{problem}: the values may be far off, and have no intervals; {advice}"]
-
-
-def summary_of(fit: Fit) -> dict[str, Any]:
-    """Numbers of a fit for JSON."""
-    return {
-        "misfit": fit.misfit,
-        "start_misfit": fit.start_misfit,
-        "clock_offsets_s": fit.clock_offsets,
-        "warnings": fit.warnings,
-        "evaluations": fit.evaluations,
-        "wall_time_s": fit.wall_time,
-    }

@@ -5,8 +5,9 @@ Each kind of measurement has its settings, reads its numbers, and predicts them 
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -20,9 +21,10 @@ from tetra_drake.engines.gait_simulation import Driver
 from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import MOST_BYTES, read_text
+from tetra_drake.files import MOST_BYTES, read_bytes, read_text
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.prototype.command_file import TIME, column_numbers, load_command, table_cells
+from tetra_drake.robot.command import Command
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
@@ -35,7 +37,7 @@ from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import read_mapping
 
 if TYPE_CHECKING:
-    import xarray
+    from scipy.interpolate import CubicHermiteSpline
 
 SAMPLE_PERIOD = 5e-3
 """Time (s) between samples of simulated motion. Cubic curves join the samples."""
@@ -45,6 +47,9 @@ CLOCK_DIGITS = 1e-7
 """Tolerance (s) of the offset of a clock."""
 ROUNDING = 1e-6
 """Time (s) by which times in a log may be rounded."""
+CUT = 0.05
+"""Share of a command that may be missing at the end of a log."""
+INSTALL = "pip install 'tetra_drake[parquet]'"
 
 Frequency = Annotated[float, Unit("Hz")]
 
@@ -63,14 +68,9 @@ class Measured:
     """Measured numbers, and their prediction."""
 
     name: str
-    labels: Sequence[str]
-    """What was measured (numbers,), such as "n3 z"."""
-    along: np.ndarray
-    """Times (s) of the numbers (numbers,), or their places in a list."""
-    values: np.ndarray
-    """Measured numbers (numbers,) in SI."""
-    uncertainty: np.ndarray
-    """Standard deviations (numbers,) in SI."""
+    numbers: pandas.DataFrame
+    """A row per number in SI: label, such as "n3 z"; along, its time (s) or its place in the list;
+    measured; uncertainty, its standard deviation."""
 
     def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
         """What the scenarios predict; NaN if a scenario cannot be simulated."""
@@ -86,7 +86,8 @@ class MotionCapture(Section):
     """
 
     log: str
-    """CSV file: a column time_s and columns such as "n3 x_mm". An empty cell is a gap."""
+    """CSV or Parquet file: a column time_s and columns such as "n3 x_mm". An empty cell is a gap.
+    It lasts as long as the command, or as the simulation if that is shorter."""
     command: str | None = None
     """File of the commands that the robot followed."""
     gait: str | None = None
@@ -113,22 +114,22 @@ class MotionCapture(Section):
             driver = load_gait(str(self.gait), scenario)
         nodes = Robot.of(scenario).structure.node_names
         table = _log(self.log, nodes)
-        times = table.index.to_numpy()
-        duration = scenario.simulation.duration
-        if times[-1] - times[0] > duration + ROUNDING:
-            found = f"found {times[-1] - times[0]:g} s, expected at most the duration, {duration:g}"
-            raise InputError(self.log, TIME, f"{found} s; give simulation.duration more")
+        _check_length(table.index.to_numpy(), driver, scenario, self.log)
         row, column = np.nonzero(np.isfinite(table.to_numpy()))
-        values = table.to_numpy()[row, column]
+        numbers = {
+            "label": table.columns.to_numpy()[column],
+            "along": table.index.to_numpy()[row],
+            "measured": table.to_numpy()[row, column],
+            "uncertainty": self.uncertainty,
+        }
         return _MeasuredMotion(
-            name=Path(self.log).name,
-            labels=[" ".join(table.columns[place]) for place in column],
-            along=times[row],
-            values=values,
-            uncertainty=np.full(len(values), self.uncertainty),
+            name=f"{name}, {Path(self.log).name}",
+            numbers=pandas.DataFrame(numbers),
             driver=driver,
-            nodes=np.array([nodes.index(table.columns[place][0]) for place in column]),
-            axes=np.array(["xyz".index(table.columns[place][1]) for place in column]),
+            times=table.index.to_numpy(),
+            places=[_coordinates(nodes).index(name) for name in table.columns],
+            row=row,
+            column=column,
             clock=self.clock,
         )
 
@@ -165,7 +166,7 @@ class Rest(Section):
     def read(self, scenario: Scenario, name: str) -> Measured:
         """Checks the names. Raises InputError for a node or cable that there is not."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
-        places = [f"{node} {axis}" for node in structure.node_names for axis in "xyz"]
+        places = _coordinates(structure.node_names)
         for key, given, known in (
             ("positions", self.positions, places),
             ("tensions", self.tensions, structure.cable_names),
@@ -173,19 +174,21 @@ class Rest(Section):
             for label in given:
                 if label not in known:
                     raise InputError(name, f"{key}.{label}", f"is unknown; {hint(label, known)}")
-        numbers = [len(self.positions), len(self.tensions), len(self.frequencies)]
+        counts = [len(self.positions), len(self.tensions), len(self.frequencies)]
         spread = self.position_uncertainty, self.tension_uncertainty, self.frequency_uncertainty
-        values = [*self.positions.values(), *self.tensions.values(), *self.frequencies]
         modes = [f"frequency {mode + 1}" for mode in range(len(self.frequencies))]
+        numbers = {
+            "label": [*self.positions, *self.tensions, *modes],
+            "along": 1.0 + np.arange(sum(counts)),
+            "measured": [*self.positions.values(), *self.tensions.values(), *self.frequencies],
+            "uncertainty": np.repeat(spread, counts),
+        }
         return _MeasuredRest(
             name=name,
-            labels=[*self.positions, *self.tensions, *modes],
-            along=1.0 + np.arange(len(values)),
-            values=np.array(values, dtype=float),
-            uncertainty=np.repeat(spread, numbers),
+            numbers=pandas.DataFrame(numbers),
             changes=self.changes,
-            places=np.array([places.index(label) for label in self.positions], dtype=int),
-            cables=np.array([structure.cable_names.index(c) for c in self.tensions], dtype=int),
+            places=[places.index(label) for label in self.positions],
+            cables=[structure.cable_names.index(label) for label in self.tensions],
             modes=len(self.frequencies),
         )
 
@@ -217,10 +220,14 @@ def load_fit_file(path: str | Path) -> FitFile:
 @dataclass(frozen=True)
 class _MeasuredMotion(Measured):
     driver: Driver
-    nodes: np.ndarray
-    """Index of the node of each number."""
-    axes: np.ndarray
-    """Index of the axis of each number."""
+    times: np.ndarray
+    """Times (s) of the log."""
+    places: list[int]
+    """Places of the log's columns among all coordinates of the nodes."""
+    row: np.ndarray
+    """Row of each number in the log."""
+    column: np.ndarray
+    """Column of each number in the log."""
     clock: float
 
     def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
@@ -234,22 +241,24 @@ class _MeasuredMotion(Measured):
         return [self._prediction(outcome) for outcome in outcomes]
 
     def _prediction(self, outcome: Outcome) -> Prediction:
+        from scipy.interpolate import CubicHermiteSpline
+
         if isinstance(outcome, SimulationFailure):
-            return Prediction(np.full(self.values.shape, np.nan))
-        trajectory = outcome.trajectory
+            return Prediction(np.full(len(self.numbers), np.nan))
+        moved = outcome.trajectory
+        p, v = (each.values.reshape(len(each), -1) for each in (moved.p_WN, moved.v_WN))
+        curves = CubicHermiteSpline(moved.time.values, p[:, self.places], v[:, self.places])
+        offset = self._best_offset(curves) if self.clock else 0.0
+        return Prediction(self._numbers(curves, offset), offset)
 
-        def at(offset: float) -> np.ndarray:
-            return self._coordinates(trajectory, self.along - offset)
-
-        offset = self._best_offset(at) if self.clock else 0.0
-        return Prediction(at(offset), offset)
-
-    def _best_offset(self, at: Callable[[float], np.ndarray]) -> float:
-        """Offset (s) of the clock with the least squares of differences to the coordinates at()."""
+    def _best_offset(self, curves: CubicHermiteSpline) -> float:
+        """Offset (s) of the clock with the least squares of differences to the curves."""
         from scipy.optimize import minimize_scalar
 
+        measured = self.numbers["measured"].to_numpy()
+
         def misfit(offset: float) -> float:
-            return float(((at(offset) - self.values) ** 2).sum())
+            return float(((self._numbers(curves, offset) - measured) ** 2).sum())
 
         tried = np.linspace(-self.clock, self.clock, OFFSETS)
         nearest = tried[np.argmin([misfit(each) for each in tried])]
@@ -257,29 +266,20 @@ class _MeasuredMotion(Measured):
         bounds = max(nearest - step, -self.clock), min(nearest + step, self.clock)
         return float(minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS}).x)
 
-    def _coordinates(self, trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
-        """Coordinates (numbers,) of a trajectory at times (numbers,), by cubic curves between its
-        samples. It stands still before and after them."""
-        samples = trajectory.time.values
-        times = np.clip(times, samples[0], samples[-1])
-        before = np.clip(np.searchsorted(samples, times) - 1, 0, len(samples) - 2)
-        step = samples[before + 1] - samples[before]
-        share = (times - samples[before]) / step
-        p, v = trajectory.p_WN.values, trajectory.v_WN.values
-        start, end = p[before, self.nodes, self.axes], p[before + 1, self.nodes, self.axes]
-        leaving = step * v[before, self.nodes, self.axes]
-        arriving = step * v[before + 1, self.nodes, self.axes]
-        bend = (1.0 - share) * (leaving - (end - start)) - share * (arriving - (end - start))
-        coordinates: np.ndarray = start + share * (end - start) + share * (1.0 - share) * bend
-        return coordinates
+    def _numbers(self, curves: CubicHermiteSpline, offset: float) -> np.ndarray:
+        """Coordinates (numbers,) on curves at the log's times. The robot stands still before and
+        after the simulation."""
+        times = np.clip(self.times - offset, curves.x[0], curves.x[-1])
+        numbers: np.ndarray = curves(times)[self.row, self.column]
+        return numbers
 
 
 @dataclass(frozen=True)
 class _MeasuredRest(Measured):
     changes: dict[str, Any]
-    places: np.ndarray
-    """Indices of the measured coordinates among all coordinates of the nodes."""
-    cables: np.ndarray
+    places: list[int]
+    """Places of the measured coordinates among all coordinates of the nodes."""
+    cables: list[int]
     """Indices of the cables whose tension was measured."""
     modes: int
     """Number of measured frequencies."""
@@ -292,24 +292,27 @@ class _MeasuredRest(Measured):
             robot = Robot.of(scenario.with_changes(self.changes))
             rest = robot.equilibrium
         except InputError:  # there may be no equilibrium with such values
-            return Prediction(np.full(self.values.shape, np.nan))
+            return Prediction(np.full(len(self.numbers), np.nan))
         p_WN = node_positions(robot.structure, rest.state).ravel()[self.places]
-        forces, frequencies = np.zeros(0), np.zeros(0)
-        if self.cables.size:
-            unactuated = Unactuated.of(robot.model)
-            force_at_rest(unactuated, rest.state)
-            forces = unactuated.forces.cable_forces[self.cables, TENSION]
+        unactuated = Unactuated.of(robot.model)
+        force_at_rest(unactuated, rest.state)
+        forces = unactuated.forces.cable_forces[self.cables, TENSION]
+        frequencies = np.full(self.modes, np.nan)
         if self.modes:
-            frequencies = study_equilibrium(robot).frequencies[: self.modes]
-            missing = self.modes - len(frequencies)
-            frequencies = np.append(frequencies, np.full(missing, np.nan))
+            found = study_equilibrium(robot).frequencies[: self.modes]
+            frequencies[: len(found)] = found
         return Prediction(np.concatenate([p_WN, forces, frequencies]))
 
 
+def _coordinates(nodes: Sequence[str]) -> list[str]:
+    """Names of the coordinates of nodes, such as "n3 z"."""
+    return [f"{node} {axis}" for node in nodes for axis in "xyz"]
+
+
 def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
-    """Coordinates in m of a log by time in s, NaN in gaps. The columns are pairs of node and axis.
+    """Coordinates in m of a log by time in s, NaN in gaps, with a column such as "n3 z" for each.
     Raises InputError, naming line or column, if the log is wrong."""
-    cells = table_cells(read_text(path, "log"), path)
+    cells = table_cells(_log_text(path), path)
     if TIME not in cells:
         raise InputError(path, TIME, "is missing, expected a column with the time in s")
     times = column_numbers(cells.pop(TIME), path)
@@ -318,19 +321,48 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
         raise InputError(path, f"line {row + 3}, {TIME}", f"{found}, expected ascending times")
     columns = {}
     for name in cells:
-        match = re.fullmatch(r"(.+) ([xyz])_(\w+)", name)
+        match = re.fullmatch(r"((.+) [xyz])_(\w+)", name)
         if match is None:
             expected = f"expected node, axis and unit, such as '{nodes[0]} x_mm'"
             raise InputError(path, name, f"is no column of a log; {expected}")
-        node, axis, unit = match.groups()
+        coordinate, node, unit = match.groups()
         if node not in nodes:
             raise InputError(path, name, f"found unknown node '{node}'; {hint(node, nodes)}")
         try:
             scale = quantity_to_si(f"1 {unit}", "m")
         except ValueError as error:
             raise InputError(path, name, str(error)) from error
-        columns[node, axis] = scale * column_numbers(cells[name], path, gaps=True)
+        columns[coordinate] = scale * column_numbers(cells[name], path, gaps=True)
     table = pandas.DataFrame(columns, index=times)
     if not np.isfinite(table.to_numpy(dtype=float)).any():
         raise InputError(path, "", "has no positions, expected one at least")
     return table
+
+
+def _log_text(path: str) -> str:
+    """The CSV text of a log. Raises InputError if the file cannot be read."""
+    if not path.endswith(".parquet"):
+        return read_text(path, "log")
+    content = io.BytesIO(read_bytes(path, "log"))
+    try:
+        table = pandas.read_parquet(content)
+    except ImportError as error:
+        raise InputError(path, "", f"cannot be read: pyarrow is missing; {INSTALL}") from error
+    except (ValueError, OSError) as error:
+        raise InputError(path, "", f"is no Parquet file: {error}") from error
+    return table.to_csv(index=bool(table.index.name))
+
+
+def _check_length(times: np.ndarray, driver: Driver, scenario: Scenario, log: str) -> None:
+    """Raises InputError if a log is longer than the simulation, or shorter than the command."""
+    found, duration = times[-1] - times[0], scenario.simulation.duration
+    if found > duration + ROUNDING:
+        expected = f"expected at most the duration, {duration:g}"
+        problem = f"found {found:g} s, {expected} s; give simulation.duration more"
+        raise InputError(log, TIME, problem)
+    if not isinstance(driver, Command):
+        return
+    least = min(duration, driver.period * (len(driver.samples) - 1))
+    if found < (1.0 - CUT) * least:
+        problem = f"found {found:g} s, expected at least the command's {least:g} s"
+        raise InputError(log, TIME, f"{problem}; give simulation.duration less to fit a part")

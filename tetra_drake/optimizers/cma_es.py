@@ -47,7 +47,7 @@ class CmaEs(Generational[kinds.CmaEs]):
         super().__post_init__()
         affordable = max(1, self.evolution.evaluations // (2 * TRYOUT))
         self._starts = min(self.settings.starts, affordable)
-        self._searches: list[_Search] = []
+        self._searches: list[Search] = []
         """The searches. Empty until the random sample is evaluated."""
         if not self.settings.sample:
             middle = np.full(self._ranges.size, MIDDLE)
@@ -57,7 +57,7 @@ class CmaEs(Generational[kinds.CmaEs]):
         """Begins one search at each of the first points."""
         population = self.settings.population
         self._searches = [
-            _Search(population, self._ranges, self.generator, start)
+            Search(population, self._ranges, self.generator, start)
             for start in points[: self._starts]
         ]
 
@@ -73,7 +73,7 @@ class CmaEs(Generational[kinds.CmaEs]):
         self._begin(np.vstack([mean, ranked]))
 
     @property
-    def _current(self) -> _Search:
+    def _current(self) -> Search:
         """The search whose points are being evaluated."""
         for search in self._searches:
             if search.evaluations < TRYOUT:
@@ -88,14 +88,29 @@ class CmaEs(Generational[kinds.CmaEs]):
         return {"start": start, "restart": current.restarts, "sigma": current.sigma}
 
 
-class _Search:
+class Box:
+    """Points between 0 and 1. A root is an angle in half turns, so every root is a valid point."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+
+    def from_roots(self, roots: Matrix) -> Matrix:
+        """Converts roots to points."""
+        return 0.5 - 0.5 * np.cos(np.pi * roots)
+
+    def roots(self, points: Matrix) -> Matrix:
+        """Converts points to roots between 0 and 1."""
+        return np.arccos(1.0 - 2.0 * points) / np.pi
+
+
+class Search:
     """A search by CMA-ES. When it has converged, it restarts at its best point with a larger
     population."""
 
     def __init__(
         self,
         population: int | None,
-        ranges: Ranges,
+        ranges: Ranges | Box,
         generator: np.random.Generator,
         start: Vector,
     ) -> None:
@@ -104,7 +119,7 @@ class _Search:
         self.evaluations = self.restarts = 0
         self.best = -math.inf
         """Fitness of the best point."""
-        self._best = start
+        self.best_point = start
         self._drawn: Matrix = np.empty((0, 0))
         """Roots that were drawn last. pycma needs two dimensions, so a single parameter gets an
         unused second one."""
@@ -125,7 +140,7 @@ class _Search:
         self.evaluations += len(points)
         best = int(np.argmax(fitnesses))
         if fitnesses[best] > self.best:
-            self.best, self._best = float(fitnesses[best]), points[best].copy()
+            self.best, self.best_point = float(fitnesses[best]), points[best].copy()
         told, size = self._drawn, self._ranges.size
         told[:, :size] = np.copysign(self._ranges.roots(points), told[:, :size])
         self._strategy.tell(list(told), (-fitnesses).tolist(), check_points=False)
@@ -144,5 +159,5 @@ class _Search:
             "seed": math.nan,  # does not seed numpy's global generator
             "verbose": -10,  # no output, and no file of options
         }
-        roots = np.pad(self._ranges.roots(self._best), (0, max(0, 2 - len(self._best))))
+        roots = np.pad(self._ranges.roots(self.best_point), (0, max(0, 2 - len(self.best_point))))
         return cma.CMAEvolutionStrategy(roots, SIGMA, options)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tetra_drake.analysis.fit import Fit, summary_of
+from tetra_drake.analysis.fit import Fit
 from tetra_drake.figures.residuals import residuals
 from tetra_drake.figures.style import save_findings
 from tetra_drake.files import write_whole
@@ -23,7 +23,15 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         "correlations": fit.correlations.reset_index(names="key"),
         "residuals": fit.residuals,
     }
-    figure, summary = residuals(fit), summary_of(fit)
+    summary = {
+        "misfit": fit.misfit,
+        "start_misfit": fit.start_misfit,
+        "clock_offsets_s": fit.clock_offsets,
+        "warnings": fit.warnings,
+        "evaluations": fit.evaluations,
+        "wall_time_s": fit.wall_time,
+    }
+    figure = residuals(fit)
     written = save_findings(figure, folder, "residuals.figure", tables=tables, summary=summary)
     write_whole(folder / PAGE, _page(fit))
     return [PAGE, SCENARIO, *written]
