@@ -27,8 +27,8 @@ from tetra_drake.simd.lanes import FieldArray
 from tetra_drake.simd.packed import Packed
 
 FIRST = SurfaceGrid._fields.index("first")
-"""Column of Ground.grid with the index of the first height. It differs between lanes, because one
-table has the heights of all lanes."""
+"""Column of Ground.grid with the index of the first height. It differs between robots, because one
+table has the heights of all robots."""
 
 
 _BODY_STEPS = 100_000
@@ -53,8 +53,7 @@ class LaneEngine:
         if readings is None:
             readings = Readings.empty(robot.structure, 0)
         self._kind, self._bodies = first.kind, len(robot.structure.bodies)
-        self._heights = np.zeros((1 + places, robot.ground.heights.size))
-        self._heights[0] = robot.ground.heights
+        self._heights = np.zeros((places, robot.ground.heights.size))
         self._constants, constants = _constants_in_lanes(first.constants, self._heights, width)
         self._lanes, states = in_lanes(first.start, width)
         self._log = allocate(loop.Log, first.log_sizes | {"lanes": width, "places": places})
@@ -63,7 +62,6 @@ class LaneEngine:
         """Index of the tally among the numbers of a robot's state."""
         sizes = {
             "places": places,
-            "models": 1 + places,
             "lanes": width,
             "numbers": (tables.step.end.address - tables.clock.address) // (8 * width),
             "constants": len(constants),
@@ -71,14 +69,13 @@ class LaneEngine:
             "signals": robot.structure.signals,
         }
         self._places = allocate(Places, sizes)
-        self._places.models[0] = constants[:, 0]
         memory = Memory(states, constants)
         self._parts = Packed(
             (self._constants, self._lanes, self._log, memory, self._places, readings, first.live)
         )
         self._advance = machine_code(advance, self._parts, 0)
         self._prepared: list[Prepared | None] = [None] * places
-        self._wall_times = np.zeros(places)
+        self._wall_times, self._tried = np.zeros(places), np.zeros(places)
         self._running = self._lanes.clock.array[loop.STATUS]
         self._running[:] = loop.IDLE
 
@@ -107,8 +104,17 @@ class LaneEngine:
 
     def load(self, place: int, prepared: Prepared) -> None:
         """Puts a robot at its start. Raises InputError if the gait does not fit its scenario."""
-        self._load_model(place, prepared)
-        log, start = self._log, prepared.start
+        log, start, heights = self._log, prepared.start, prepared.robot.ground.heights
+        constants, network = self._places.constants[place], self._constants.network
+        constants[:] = numbers_of(prepared.constants)
+        grid = views(prepared.constants, constants).robot.ground.grid
+        grid[FIRST] = place * self._heights.shape[1]
+        self._heights[place, : heights.size] = heights
+        # The kernel has one range of inhibiting neurons for all lanes.
+        network.first.array[:] = np.minimum(network.first.array, prepared.constants.network.first)
+        network.beyond.array[:] = np.maximum(
+            network.beyond.array, prepared.constants.network.beyond
+        )
         turns, commanded = prepared.turns, prepared.robot.commanded
         log.times[place] = log.marks[place] = math.inf
         log.times[place, : len(prepared.times)] = prepared.times
@@ -129,21 +135,6 @@ class LaneEngine:
         if not self._places.marks.size:
             self._wait([place])
 
-    def _load_model(self, place: int, prepared: Prepared) -> None:
-        """Writes the constants of a robot, unless they are those of the first robot."""
-        given, heights = numbers_of(prepared.constants), prepared.robot.ground.heights
-        network, first = self._constants.network, prepared.constants.network
-        # The kernel has one range of inhibiting neurons for all lanes.
-        network.first.array[:] = np.minimum(network.first.array, first.first)
-        network.beyond.array[:] = np.maximum(network.beyond.array, first.beyond)
-        places, model = self._places, 1 + place
-        places.model[place] = model
-        places.in_lane[places.in_lane == model] = -1
-        places.models[model] = given
-        grid = views(prepared.constants, places.models[model]).robot.ground.grid
-        grid[FIRST] = model * self._heights.shape[1]
-        self._heights[model, : heights.size] = heights
-
     def _wait(self, places: Sequence[int] | np.ndarray) -> None:
         """Appends places to those whose robots wait for a lane."""
         waiting, queue = self._places.waiting, self._places.queue
@@ -153,14 +144,14 @@ class LaneEngine:
         queue[:] = 0, count
 
     def stop(self, place: int) -> float:
-        """Removes the robot from a place, finished or not. Returns its wall time in s."""
+        """Empties a place, whether its robot has ended or not. Returns its wall time in s."""
         self._running[self._log.place == place] = loop.IDLE
         self._prepared[place] = None
         return float(self._wall_times[place])
 
     def advance(self, body_steps: int) -> list[int]:
         """Simulates until a robot ends, or for about `body_steps` iterations times bodies. Returns
-        the places of robots that have ended; result() empties a place. Other Python threads run
+        the places of robots that have ended; stop() empties a place. Other Python threads run
         meanwhile."""
         started = time.perf_counter()
         self._advance(self._parts, max(1, body_steps // (ROUND * self._bodies)))
@@ -171,7 +162,10 @@ class LaneEngine:
     def advance_to_pause(self, signals: np.ndarray, marks: np.ndarray) -> None:
         """Simulates a control period of the robots with marks; see Stepper.advance()."""
         self._places.signals[:], self._places.marks[:] = signals, marks
-        self._wait(np.flatnonzero(np.isfinite(marks[:, 0])))
+        work = self._places.states[:, loop.TRIED] - self._tried
+        self._tried += work
+        longest_first = np.argsort(-work, kind="stable")  # so that the lanes end together
+        self._wait(longest_first[np.isfinite(marks[longest_first, 0])])
         self.advance(_BODY_STEPS)
         while (self._running == loop.RUNNING).any():
             self.advance(_BODY_STEPS)
@@ -182,17 +176,17 @@ class LaneEngine:
         if prepared is None or status <= loop.DONE:
             return None
         ended = float(self._places.states[place, loop.TIME])
-        return _failure(status, time=ended, scenario=prepared.robot.scenario)
+        failure = _failure(status, time=ended, scenario=prepared.robot.scenario)
+        failure.wall_time = float(self._wall_times[place])
+        return failure
 
     def result(self, place: int) -> SimulationResult:
-        """The result of the robot in a place, at the end of its motion; the place becomes idle.
-        Raises Diverged or StepBudgetExceeded if the simulation failed."""
+        """The result of the robot in a place, at the end of its motion. Raises Diverged or
+        StepBudgetExceeded if the simulation failed."""
         prepared, failure = self._prepared[place], self.failure(place)
         if prepared is None:
             raise ValueError(f"place {place} is idle")
-        wall_time = self.stop(place)
         if failure is not None:
-            failure.wall_time = wall_time
             raise failure
         state = self._places.states[place].copy()
         return make_result(
@@ -206,7 +200,7 @@ class LaneEngine:
                 steps=int(state[loop.TAKEN]),
                 derivative_evaluations=loop.EVALUATIONS * int(state[loop.TRIED]),
             ),
-            wall_time=wall_time,
+            wall_time=float(self._wall_times[place]),
             record=prepared.record,
         )
 

@@ -36,12 +36,8 @@ class Places(NamedTuple):
 
     states: Annotated[Table, "places", "numbers"]
     """The numbers of LaneState before `step.end`."""
-    models: Annotated[Table, "models", "constants"]
-    """The numbers of Constants for robots that differ."""
-    model: Annotated[Table, "places", int]
-    """Row in `models` of each robot."""
-    in_lane: Annotated[Table, "lanes", int]
-    """Row in `models` of the constants in each lane; -1 if it must be loaded again."""
+    constants: Annotated[Table, "places", "constants"]
+    """The numbers of Constants."""
     waiting: Annotated[Table, "places", int]
     """Places of the robots that wait for a lane, in their order."""
     queue: Annotated[Table, 2, int]
@@ -131,11 +127,8 @@ def take(
     log.place[lane] = place
     for i in range(places.states.shape[1]):
         memory.states[i, lane] = places.states[place, i]
-    model = places.model[place]
-    if places.in_lane[lane] != model:
-        for i in range(places.models.shape[1]):
-            memory.constants[i, lane] = places.models[model, i]
-        places.in_lane[lane] = model
+    for i in range(places.constants.shape[1]):
+        memory.constants[i, lane] = places.constants[place, i]
     searched = by_lane(lanes.forces.near_struts.p_WN)
     for node in range(searched.shape[0]):
         searched[node, 0, lane] = math.inf  # the near struts are those of another robot
