@@ -39,9 +39,7 @@ of the operating system."""
 class LaneEngine:
     """Simulates similar robots (see accepts()) in a number of lanes."""
 
-    def __init__(
-        self, first: Prepared, *, width: int, readings: Readings | None = None
-    ) -> None:
+    def __init__(self, first: Prepared, *, width: int, readings: Readings | None = None) -> None:
         """An engine with `width` lanes for robots like `first`. Compiles its kernel if necessary.
 
         There are as many places for robots as lanes. With `readings`, robots are simulated in

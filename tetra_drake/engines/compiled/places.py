@@ -120,9 +120,7 @@ def exchange(parts: Parts) -> None:
 
 
 @inlined
-def take(
-    lanes: LaneState, log: Log, memory: Memory, places: Places, lane: int, place: int
-) -> None:
+def take(lanes: LaneState, log: Log, memory: Memory, places: Places, lane: int, place: int) -> None:
     """Copies a robot from its place to a lane."""
     log.place[lane] = place
     for i in range(places.states.shape[1]):
