@@ -129,7 +129,7 @@ def take(lanes: LaneState, log: Log, memory: Memory, places: Places, lane: int, 
         memory.constants[i, lane] = places.constants[place, i]
     searched = by_lane(lanes.forces.near_struts.p_WN)
     for node in range(searched.shape[0]):
-        searched[node, 0, lane] = math.inf  # the near struts are those of another robot
+        searched[node, 0, lane] = math.inf  # so that near struts are searched
 
 
 @inlined
