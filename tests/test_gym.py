@@ -77,6 +77,14 @@ def test_the_rewards_of_an_episode_are_the_fitness(short, objective):
     assert (dense.size > 5) == (objective != "cost_of_transport")
 
 
+def test_the_reward_of_rolling_is_known_within_an_episode(short):
+    env = TensegrityEnv(short.with_sections(objective={"rolled": 2.0}), control_period=1e-3)
+    rewards = episode(env, seed=3)[1]
+    fitness = env._episodes.simulation.result().fitness
+    assert sum(rewards) == pytest.approx(fitness, rel=1e-9)
+    assert sum(rewards[:-1]) == pytest.approx(fitness, rel=0.05)
+
+
 def test_a_robot_that_fails_ends_its_episode_with_nothing(short):
     env = TensegrityEnv(short.with_changes({"cpg.gain": "4e9 N"}))
     _, rewards, terminated, truncated = episode(env, seed=0)

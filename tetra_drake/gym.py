@@ -18,11 +18,12 @@ typical amplitude of the network's signals. Positive signals shorten the cable. 
 setpoint of this signal, see Simulation: 0 is its setpoint at the start.
 
 Reward: the increase of the fitness, which the scenario's `objective` defines. Within an episode it
-is the part of the metrics that follow from positions. The last reward adds the other metrics, so
-the sum of an episode's rewards is the fitness of the walk. If the robot fails, the last reward
-makes the sum 0.
+is the part of `rolled` and of the metrics that follow from positions. The last reward adds the
+other metrics, so the sum of an episode's rewards is the fitness of the walk. If the robot fails,
+the last reward makes the sum 0.
 
-An episode ends (terminated) if the robot fails, and (truncated) at `simulation.duration`. With
+The time between actions is `simulation.control_period`, or the argument `control_period`. An
+episode ends (terminated) if the robot fails, and (truncated) at `simulation.duration`. With
 `disturbances` in the scenario, each episode has a draw of its own.
 """
 
@@ -36,10 +37,10 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from tetra_drake.engines.simulation import CONTROL_PERIOD, Simulation, action_groups
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.metrics import pose_fitness, poses_of
-from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import AMPLITUDE, Robot
 from tetra_drake.scenario.load import GivenScenario
 from tetra_drake.scenario.scenario import Scenario
@@ -58,7 +59,7 @@ class _Episodes:
         scenario: GivenScenario,
         *,
         count: int,
-        control_period: float,
+        control_period: float | None,
         grouped: bool,
         workers: int | None,
     ) -> None:
@@ -67,15 +68,21 @@ class _Episodes:
         )
         self._scenario: Scenario = self.simulation.scenario
         robot = self.simulation.robot
-        names, self._groups = action_groups(self._scenario, robot, grouped=grouped)
+        self._groups = np.arange(robot.driven.size)  # the action of each driven cable
+        if grouped:
+            groups = self._scenario.robot.blueprint().groups
+            of_cable = {cable: i for i, group in enumerate(groups) for cable in group}
+            self._groups = np.array([of_cable[cable] for cable in robot.driven.tolist()])
         self._cables, self._weight = Robot.of(self._scenario).starting_cables(), robot.weight
         start = self.simulation.state
         self._start_lengths = start.lengths[:1]
         size = self._observe(start).shape[1]
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
-        self.action_space = spaces.Box(-1.0, 1.0, (len(names),), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (self._groups.max() + 1,), np.float32)
         # Positions p_WN (N, nodes, 3) at the start and at `simulation.steady_from`.
         self._start, self._steady = start.p_WN, start.p_WN.copy()
+        # Time, pitch rate, and angle by which it has rolled, of each robot (N,).
+        self._time, self._rate, self._rolled = np.zeros(count), np.zeros(count), np.zeros(count)
         self._offsets, self._rewarded = np.zeros(count), np.zeros(count)
 
     def reset(self, seed: int, places: np.ndarray) -> np.ndarray:
@@ -83,8 +90,9 @@ class _Episodes:
         readings = self.simulation.reset(seed=seed, indices=places)
         for place in places.tolist():
             self._start[place] = self._steady[place] = readings.p_WN[place]
-            self._offsets[place] = self._pose_fitness(readings, place)
+            self._time[place] = self._rate[place] = self._rolled[place] = 0.0
             self._rewarded[place] = 0.0
+            self._offsets[place] = self._fitness(readings, place)
         return self._observe(readings)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -92,12 +100,13 @@ class _Episodes:
         terminated and truncated."""
         simulation = self.simulation
         readings = simulation.step(self._setpoints(actions))
+        self._roll(readings)
         early = readings.time <= self._scenario.simulation.steady_from
         self._steady[early] = readings.p_WN[early]
         terminated = np.array([failure is not None for failure in simulation.failures])
         truncated = simulation.ended & ~terminated
         places = range(simulation.count)
-        fitness = np.array([self._pose_fitness(readings, place) for place in places], dtype=float)
+        fitness = np.array([self._fitness(readings, place) for place in places], dtype=float)
         fitness -= self._offsets
         for place in np.flatnonzero(truncated).tolist():
             try:
@@ -109,12 +118,20 @@ class _Episodes:
         self._rewarded = fitness
         return self._observe(readings), rewards, terminated, truncated
 
-    def _pose_fitness(self, readings: Readings, place: int) -> float:
-        """The part of the fitness up to now that follows from positions."""
+    def _fitness(self, readings: Readings, place: int) -> float:
+        """The fitness up to now, without the metrics that are known only at the end."""
         scenario, structure = self._scenario, self.simulation.robot.structure
         nodes = np.stack([self._start[place], self._steady[place], readings.p_WN[place]])
         steady_time = scenario.simulation.duration - scenario.simulation.steady_from
-        return pose_fitness(poses_of(structure, nodes, steady_time), scenario.objective)
+        fitness = pose_fitness(poses_of(structure, nodes, steady_time), scenario.objective)
+        return fitness + scenario.objective.get("rolled", 0.0) * self._rolled[place]
+
+    def _roll(self, readings: Readings) -> None:
+        """Adds a control period to the angles by which the robots have rolled."""
+        if "rolled" in self._scenario.objective:
+            rate = pitch_rates(readings, self.simulation.robot.structure)
+            self._rolled += 0.5 * (readings.time - self._time) * (self._rate + rate)
+            self._time, self._rate = readings.time, rate
 
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators for actions of the environment."""
@@ -138,8 +155,7 @@ class _Episodes:
             readings.w_WB,
         )
         count = self.simulation.count
-        # The state of a robot that has failed may not be finite.
-        return np.hstack([np.nan_to_num(part.reshape(count, -1)) for part in parts])
+        return np.hstack([part.reshape(count, -1) for part in parts])
 
 
 class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -147,14 +163,14 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def __init__(
         self,
-        scenario: GivenScenario = "coulomb",
+        scenario: GivenScenario,
         *,
-        control_period: float = CONTROL_PERIOD,
+        control_period: float | None = None,
         grouped: bool = False,
     ) -> None:
         """Args:
             scenario: a scenario, its name or file, or a run.
-            control_period: time (s) between actions.
+            control_period: time (s) between actions; by default the scenario's.
             grouped: an action for each oscillator, otherwise for each driven cable.
 
         Raises:
@@ -189,10 +205,10 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
     def __init__(
         self,
-        num_envs: int = 1,
-        scenario: GivenScenario = "coulomb",
+        num_envs: int,
+        scenario: GivenScenario,
         *,
-        control_period: float = CONTROL_PERIOD,
+        control_period: float | None = None,
         grouped: bool = False,
         workers: int | None = None,
     ) -> None:
@@ -236,8 +252,10 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._episodes.reset(int(self.np_random.integers(2**31)), places)
 
 
-gymnasium.register(
-    WALK,
-    entry_point="tetra_drake.gym:TensegrityEnv",
-    vector_entry_point="tetra_drake.gym:TensegrityVectorEnv",
-)
+for _name, _scenario in {WALK: "coulomb"}.items():
+    gymnasium.register(
+        _name,
+        entry_point="tetra_drake.gym:TensegrityEnv",
+        vector_entry_point="tetra_drake.gym:TensegrityVectorEnv",
+        kwargs={"scenario": _scenario},
+    )

@@ -39,7 +39,7 @@ def test_a_script_writes_its_pictures(script, options, files, tmp_path):
 CHECKOUT = Path(__file__).parents[2]
 TUTORIALS = CHECKOUT / "diagrams" / "tutorials"
 NAMES = sorted(file.stem for file in TUTORIALS.glob("*.py"))
-LONGEST = 50  # lines
+LONGEST = 53  # lines
 
 
 def test_there_are_twelve_each_short_and_with_its_picture():

@@ -132,15 +132,6 @@ def test_seeds_repeat_disturbed_robots_bit_for_bit(short):
     assert np.array_equal(simulation.reset().p_WN[0], plain)
 
 
-def test_actions_of_oscillators_are_shared_by_their_cables(short):
-    grouped, single = Simulation(short, grouped=True), Simulation(short)
-    actions = drawn_actions(grouped)
-    assert grouped.action_names == ("T1-T2", "T2-T3", "T3-T4", "T4-T5")
-    spread = np.repeat(actions, 2, axis=2)
-    for ours, theirs in zip(go(grouped, actions)[-1], go(single, spread)[-1], strict=True):
-        assert np.array_equal(ours, theirs)
-
-
 def test_the_last_period_ends_with_the_simulation(short):
     simulation = Simulation(short.with_changes({"simulation.duration": "0.25 s"}))
     times = [float(readings.time[0]) for readings in go(simulation, np.zeros((13, 1, 8)))]
@@ -155,8 +146,7 @@ def test_wrong_input_is_told_in_a_line(short, refused):
         two.step("fast")
     actions = np.zeros((2, 8))
     actions[1, 4] = math.nan
-    name = two.action_names[4]
-    with refused("Simulation", f"actions[1], {name}", "nan"):
+    with refused("Simulation", f"actions[1], {two.robot.structure.oscillators[4]}", "nan"):
         two.step(actions)
     with refused("Simulation", "result", "robot 1 is at 0 s"):
         two.result(1)

@@ -12,12 +12,11 @@ from pydrake.systems.framework import Context, Diagram
 from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import Engine
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.sampler import Sample, Sampler, drives_of, motion_of
+from tetra_drake.engines.sampler import Sampler, drives_of, frame_of
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
-from tetra_drake.results.trajectory import make_dataset
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
@@ -129,7 +128,7 @@ class _DiagramWalk:
             begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
             self._observer.add(now, bodies, begun, drives)
         if viewer is not None and viewer.wants(now):
-            viewer.show(make_dataset(robot, motion_of(self._diagram, [Sample.of(context)])))
+            viewer.show(frame_of(robot, self._diagram, context))
 
 
 class _ControlledWalk(_DiagramWalk):

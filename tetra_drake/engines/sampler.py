@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
 from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.kinematics import interpolate_state
-from tetra_drake.results.trajectory import Motion
+from tetra_drake.results.trajectory import Motion, make_dataset
+from tetra_drake.robot.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class Sample(NamedTuple):
@@ -101,6 +105,11 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
         modes=np.array(modes_then),
         drives=np.array(drives_then),
     )
+
+
+def frame_of(robot: Robot, diagram: Diagram, context: Context) -> xarray.Dataset:
+    """A trajectory of one sample: a robot's diagram in a context."""
+    return make_dataset(robot, motion_of(diagram, [Sample.of(context)]))
 
 
 def drives_of(diagram: Diagram) -> Callable[[Context], np.ndarray]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation, Viewer
 from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
-from tetra_drake.engines.simulation import CONTROL_PERIOD, Controller, simulate_controlled
+from tetra_drake.engines.simulation import Controller, simulate_controlled
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
@@ -24,7 +24,7 @@ def simulate(
     *,
     command: Command | None = None,
     controller: Controller | None = None,
-    control_period: float = CONTROL_PERIOD,
+    control_period: float | None = None,
     record: bool = False,
     viewer: Viewer | None = None,
     steering: SteeringSignal | float | None = None,
@@ -44,7 +44,8 @@ def simulate(
         command: a command in place of a gait; see load_command().
         controller: a function in place of a gait, from the time (s) and the readings of the robot
             (see robot.readings.Readings) to an action for each driven cable (see Simulation).
-        control_period: time (s) between actions of the controller.
+        control_period: time (s) between actions of the controller; by default
+            `simulation.control_period`.
         record: records the trajectory.
         viewer: observer that shows the robot during the simulation.
         steering: the turn, -1 to 1, in place of the gait's turn; or a function from time (s) to the

@@ -29,9 +29,6 @@ from tetra_drake.scenario.scenario import Scenario
 Controller = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of one robot to its actions (actions,)."""
 
-CONTROL_PERIOD = 0.02
-"""Default time (s) between actions."""
-
 
 class Simulation:
     """Robots side by side that are advanced by control periods.
@@ -42,8 +39,9 @@ class Simulation:
         ...     readings = simulation.step(simulation.rest + 3.0 * readings.rates[:, driven])
         >>> inches = [simulation.result(place).metrics.distance_in for place in range(4)]
 
-    An action is a setpoint of an actuator, by the kind of `actuation`: a force (N) of !Force, a
-    free length (m) of a !Winch, a tension (N) of a !TensionMotor. It is held for a control period.
+    Each driven cable has an action: the setpoint of its actuator, by the kind of `actuation`. It is
+    a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. It is
+    held for a control period.
     Like a sample of a command, it takes effect within one `cpg.listing_step`. There is no network
     and no start-up time. Steps with the samples of a command give the motion of
     simulate(command=...), if each sample differs from the one before.
@@ -54,8 +52,7 @@ class Simulation:
         scenario: GivenScenario,
         *,
         count: int = 1,
-        control_period: float = CONTROL_PERIOD,
-        grouped: bool = False,
+        control_period: float | None = None,
         record: bool = False,
         viewer: Viewer | None = None,
         workers: int | None = None,
@@ -66,9 +63,8 @@ class Simulation:
         Args:
             scenario: a scenario, its name or file, or a run.
             count: number N of robots.
-            control_period: time (s) between actions, a multiple of `cpg.listing_step`.
-            grouped: an action for each oscillator, whose cables share it; otherwise an action for
-                each driven cable.
+            control_period: time (s) between actions, a multiple of `cpg.listing_step`; by default
+                `simulation.control_period`.
             record: records the trajectories, for result().
             viewer: observer that shows the robot, if the engine can be watched.
             workers: number of threads; one per core by default.
@@ -78,7 +74,6 @@ class Simulation:
             InputError: if an argument does not fit the scenario.
         """
         self.scenario = scenario = given_scenario(scenario)
-        self.control_period = control_period
         self.robot: Robot = controlled_robot(scenario)
         """The robot without disturbances. Its structure has the names of nodes and cables."""
         workers = available_cores() if workers is None else workers
@@ -86,9 +81,7 @@ class Simulation:
         _check_whole("workers", workers, least=1)
         if viewer is not None:
             check_can_be_watched(scenario)
-        self.action_names, self._shared = action_groups(scenario, self.robot, grouped=grouped)
-        """Names of the actions: driven cables or oscillators."""
-        self._listing_steps = _listing_steps(control_period, scenario.cpg.listing_step)
+        self._listing_steps = _listing_steps(control_period, scenario)
         self._gait = Gait(name=name, weights=(), tau_a=1.0, tau_b=1.0)
         self._record, self._viewer = record, viewer
         first = self._gait_simulation(self.robot)
@@ -101,9 +94,8 @@ class Simulation:
         self.failures: list[SimulationFailure | None] = [None] * count
         """Failure of each robot (N,): Diverged or StepBudgetExceeded; None if there is none. Its
         readings are the last ones, and its actions have no effect, until it is reset."""
-        self.rest: np.ndarray = np.empty((count, len(self.action_names)))
+        self.rest: np.ndarray = np.empty(shape)
         """Actions (N, actions) with which the robots start; they rest."""
-        self._results: dict[int, SimulationResult] = {}
         self.reset()
 
     @property
@@ -185,22 +177,15 @@ class Simulation:
             time = float(self._stepper.readings.time[place])
             problem = f"robot {place} is at {time:g} s; its result exists at the end"
             raise InputError("Simulation", "result", problem)
-        if place not in self._results:
-            result = self._stepper.result(place)
-            self._results[place] = dataclasses.replace(result, scenario=self.scenario)
-        return self._results[place]
+        return dataclasses.replace(self._stepper.result(place), scenario=self.scenario)
 
     def _put(self, place: int, robot: Robot) -> None:
         """Puts a robot at its start."""
         cables = robot.starting_cables()
         for values, given in zip(self._law, cables.law, strict=True):
             values[place] = given
-        setpoints = robot.scenario.actuation.commands(cables)
-        for action in range(len(self.action_names)):
-            self.rest[place, action] = setpoints[self._shared == action].mean()
-        self._robots[place], self.failures[place] = robot, None
-        self._steps[place] = 0
-        self._results.pop(place, None)
+        self.rest[place] = robot.scenario.actuation.commands(cables)
+        self._robots[place], self.failures[place], self._steps[place] = robot, None, 0
         self._stepper.readings.put(place, first_readings(robot))
 
     def _gait_simulation(self, robot: Robot) -> GaitSimulation:
@@ -223,9 +208,9 @@ class Simulation:
             robot = int(bad.argmax())
             action = int((~np.isfinite(given[robot])).argmax())
             problem = f"found {given[robot, action]}, expected a number"
-            key = f"actions[{robot}], {self.action_names[action]}"
+            key = f"actions[{robot}], {self.robot.structure.oscillators[action]}"
             raise InputError("Simulation", key, problem)
-        signals: np.ndarray = self.scenario.actuation.signals(given[:, self._shared], self._law)
+        signals: np.ndarray = self.scenario.actuation.signals(given, self._law)
         return signals
 
     def _time_after(self, steps: np.ndarray) -> np.ndarray:
@@ -263,7 +248,7 @@ def simulate_controlled(
     scenario: Scenario,
     controller: Controller,
     *,
-    control_period: float,
+    control_period: float | None,
     record: bool,
     viewer: Viewer | None,
 ) -> SimulationResult:
@@ -282,25 +267,18 @@ def simulate_controlled(
     return simulation.result()
 
 
-def action_groups(
-    scenario: Scenario, robot: Robot, *, grouped: bool
-) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names of the actions, and the index of the action of each driven cable."""
-    if not grouped:
-        return robot.structure.oscillators, np.arange(robot.driven.size)
-    blueprint = scenario.robot.blueprint()
-    of_cable = {cable: i for i, group in enumerate(blueprint.groups) for cable in group}
-    return blueprint.oscillators, np.array([of_cable[cable] for cable in robot.driven.tolist()])
-
-
-def _listing_steps(period: float, step: float) -> int:
-    """Number of steps of the listing in a control period (s). Raises InputError unless it is a
-    whole number."""
+def _listing_steps(period: float | None, scenario: Scenario) -> int:
+    """Number of steps of the listing in a control period (s), by default the scenario's. Raises
+    InputError unless it is a whole number."""
+    source, key, step = "Simulation", "control_period", scenario.cpg.listing_step
+    if period is None:
+        period = scenario.simulation.control_period
+        source, key = f"scenario {scenario.name}", "simulation.control_period"
     is_number = isinstance(period, numbers.Real) and math.isfinite(period)
     steps = round(period / step) if is_number else 0
     if steps < 1 or abs(period - steps * step) > 1e-6 * step:
         expected = f"a multiple of cpg.listing_step, {step:g} s"
-        raise InputError("Simulation", "control_period", f"found {period!r}, expected {expected}")
+        raise InputError(source, key, f"found {period!r}, expected {expected}")
     return steps
 
 

@@ -82,7 +82,8 @@ class SerialStepper(Stepper):
                     walk.advance_to(time)
             except SimulationFailure as failure:
                 self._failures[place] = failure
-            self.readings.put(place, walk.readings())
+            else:
+                self.readings.put(place, walk.readings())
 
     def failed(self) -> np.ndarray:
         return np.array([place in self._failures for place in range(len(self.readings.time))])

@@ -11,6 +11,8 @@ from tetra_drake.physics.forces import Forces, forces_along
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.simd.allocation import allocate
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Table
 
 
 class Readings(NamedTuple):
@@ -133,3 +135,21 @@ def readings_at(
         cable_forces=cables[0],
         ground_forces=ground[0] if ground_forces is None else ground_forces,
     )
+
+
+def pitch_rates(readings: Readings, structure: Structure) -> np.ndarray:
+    """Angular velocities (N,) about the world's y axis of robots as a whole; see
+    kinematics.pitch_rate()."""
+    rates = np.empty(len(readings.time))
+    write_pitch_rates(readings.p_WN, readings.v_WN, structure.first_node[-1], rates)
+    return rates
+
+
+@compiled
+def write_pitch_rates(p_WN: Table, v_WN: Table, moving: int, rates: Table) -> None:
+    """Writes the pitch rates (N,) of robots, from positions and velocities (N, nodes, 3)."""
+    nodes = np.empty((moving, kinematics.NODE_COLUMNS))
+    for robot in range(rates.size):
+        nodes[:, kinematics.P_WN : kinematics.P_WN + 3] = p_WN[robot, :moving]
+        nodes[:, kinematics.V_WN : kinematics.V_WN + 3] = v_WN[robot, :moving]
+        rates[robot] = kinematics.pitch_rate(nodes, moving)

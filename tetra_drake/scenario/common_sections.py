@@ -111,6 +111,8 @@ class SimulationSection(Section):
     """Largest number of evaluations of the derivatives in one simulation."""
     sample_period: Time = Field(gt=0)
     """Time between samples of a recorded trajectory."""
+    control_period: Time = Field(default=0.02, gt=0)
+    """Time between actions of a controller. See td.Simulation."""
 
     @model_validator(mode="after")
     def _check(self) -> SimulationSection:

@@ -87,17 +87,18 @@ def endings(walks: list[Prepared], width: int) -> list[Ending]:
     widest = max(walks, key=lambda walk: walk.robot.ground.heights.size)
     engine = LaneEngine(widest, width=width)
     waiting, found = list(enumerate(walks)), dict[int, Ending]()
-    in_lane = dict[int, int]()
-    while waiting or in_lane:
-        for lane in engine.idle[: len(waiting)]:
-            in_lane[lane], walk = waiting.pop(0)
-            engine.load(lane, walk)
-        for lane in engine.advance(1000):
+    in_place = dict[int, int]()
+    while waiting or in_place:
+        for place in engine.idle[: len(waiting)]:
+            in_place[place], walk = waiting.pop(0)
+            engine.load(place, walk)
+        for place in engine.advance(1000):
             try:
-                outcome = engine.result(lane)
+                outcome = engine.result(place)
             except SimulationFailure as failure:
                 outcome = failure
-            found[in_lane.pop(lane)] = outcome, engine.motion(lane)
+            found[in_place.pop(place)] = outcome, engine.motion(place)
+            engine.stop(place)
     return [found[i] for i in range(len(walks))]
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.compiled import control_periods, loop
+from tetra_drake.engines.compiled import loop
+from tetra_drake.engines.compiled.lane_tables import in_lanes, numbers_of, views
+from tetra_drake.engines.compiled.places import LAST, NEXT, ROUND, Memory, Places, advance
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE
@@ -23,12 +23,12 @@ from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import machine_code
-from tetra_drake.simd.lanes import FieldArray, lane_table
+from tetra_drake.simd.lanes import FieldArray
 from tetra_drake.simd.packed import Packed
 
 FIRST = SurfaceGrid._fields.index("first")
-"""Column of Ground.grid with the index of the first height. It differs between lanes, because one
-table has the heights of all lanes."""
+"""Column of Ground.grid with the index of the first height. It differs between robots, because one
+table has the heights of all robots."""
 
 
 _BODY_STEPS = 100_000
@@ -37,24 +37,50 @@ of the operating system."""
 
 
 class LaneEngine:
-    """Simulates similar gaits (see accepts()) in a number of lanes."""
+    """Simulates similar robots (see accepts()) in a number of lanes."""
 
-    def __init__(self, first: Prepared, *, width: int) -> None:
-        """An engine with `width` lanes for gaits like `first`. Compiles its kernel if necessary."""
-        self._first, self._kind = first, first.kind
-        self._bodies = len(first.robot.structure.bodies)
-        self._heights = np.zeros((width, first.robot.ground.heights.size))
-        self._constants = _constants_in_lanes(first.constants, self._heights)
-        self._lanes = in_lanes(first.start, width)
-        self._log = allocate(loop.Log, first.log_sizes | {"lanes": width})
-        self._parts = Packed((self._constants, self._lanes, self._log, first.live))
-        self._advance = machine_code(loop.advance, self._parts, 0)
-        self._in_lane: list[Prepared | None] = [None] * width
-        self._wall_times = np.zeros(width)
-        self._status = self._lanes.clock.array[loop.STATUS]
-        for lane in range(width):  # idle lanes compute, too, and need valid numbers
-            self.load(lane, first)
-            self.stop(lane)
+    def __init__(self, first: Prepared, *, width: int, readings: Readings | None = None) -> None:
+        """An engine with `width` lanes for robots like `first`. Compiles its kernel if necessary.
+
+        There are as many places for robots as lanes. With `readings`, robots are simulated in
+        control periods, and there is a place for each row.
+        """
+        robot = first.robot
+        places = width if readings is None else len(readings.time)
+        paused = 0 if readings is None else places
+        if readings is None:
+            readings = Readings.empty(robot.structure, 0)
+        self._kind, self._bodies = first.kind, len(robot.structure.bodies)
+        self._heights = np.zeros((places, robot.ground.heights.size))
+        self._constants, constants = _constants_in_lanes(first.constants, self._heights, width)
+        self._lanes, states = in_lanes(first.start, width)
+        self._log = allocate(loop.Log, first.log_sizes | {"lanes": width, "places": places})
+        tables = self._lanes
+        self._tally = (tables.tally.begins.address - tables.clock.address) // (8 * width)
+        """Index of the tally among the numbers of a robot's state."""
+        sizes = {
+            "places": places,
+            "lanes": width,
+            "numbers": (tables.step.end.address - tables.clock.address) // (8 * width),
+            "constants": len(constants),
+            "paused": paused,
+            "signals": robot.structure.signals,
+        }
+        self._places = allocate(Places, sizes)
+        memory = Memory(states, constants)
+        self._parts = Packed(
+            (self._constants, self._lanes, self._log, memory, self._places, readings, first.live)
+        )
+        self._advance = machine_code(advance, self._parts, 0)
+        self._prepared: list[Prepared | None] = [None] * places
+        self._wall_times, self._tried = np.zeros(places), np.zeros(places)
+        self._running = self._lanes.clock.array[loop.STATUS]
+        self._running[:] = loop.IDLE
+
+    @property
+    def status(self) -> np.ndarray:
+        """Status of the robot in each place; see loop."""
+        return self._places.states[:, loop.STATUS]
 
     def accepts(self, prepared: Prepared) -> bool:
         """True if a gait fits this engine's tables: the same structure and kinds of laws as the
@@ -71,136 +97,121 @@ class LaneEngine:
 
     @property
     def idle(self) -> list[int]:
-        """Indices of the lanes without a gait."""
-        return [lane for lane, prepared in enumerate(self._in_lane) if prepared is None]
+        """The places without a robot."""
+        return [place for place, prepared in enumerate(self._prepared) if prepared is None]
 
-    def load(self, lane: int, prepared: Prepared) -> None:
-        """Starts a gait in a lane. Raises InputError if the gait does not fit its scenario."""
-        constants, start = prepared.constants, prepared.start
-        fill_lane(self._constants, constants, lane)
-        fill_lane(self._lanes, start, lane)
-        network, given = self._constants.network, constants.network
+    def load(self, place: int, prepared: Prepared) -> None:
+        """Puts a robot at its start. Raises InputError if the gait does not fit its scenario."""
+        log, start, heights = self._log, prepared.start, prepared.robot.ground.heights
+        constants, network = self._places.constants[place], self._constants.network
+        constants[:] = numbers_of(prepared.constants)
+        grid = views(prepared.constants, constants).robot.ground.grid
+        grid[FIRST] = place * self._heights.shape[1]
+        self._heights[place, : heights.size] = heights
         # The kernel has one range of inhibiting neurons for all lanes.
-        network.first.array[:] = np.minimum(network.first.array, given.first)
-        network.beyond.array[:] = np.maximum(network.beyond.array, given.beyond)
-        heights = prepared.robot.ground.heights
-        self._heights[lane, : heights.size] = heights
-        self._constants.robot.ground.grid.array[FIRST, lane] = lane * self._heights.shape[1]
-
-        log, clock = self._log, self._lanes.clock.array
+        network.first.array[:] = np.minimum(network.first.array, prepared.constants.network.first)
+        network.beyond.array[:] = np.maximum(
+            network.beyond.array, prepared.constants.network.beyond
+        )
         turns, commanded = prepared.turns, prepared.robot.commanded
-        log.times[lane] = log.marks[lane] = math.inf
-        log.times[lane, : len(prepared.times)] = prepared.times
-        log.marks[lane, : len(prepared.marks)] = prepared.marks
-        log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
-        log.states[lane, 0], log.modes[lane, 0] = start.step.state, start.modes
-        log.signals[lane, 0] = start.signals
-        log.recent[lane, : len(commanded)] = commanded
-        clock[loop.SAMPLES, lane] = len(commanded)
-        log.drives[lane, 0] = start.drives[:, DRIVE]
-        log.kept[lane], log.passed[lane] = 1, 0
+        log.times[place] = log.marks[place] = math.inf
+        log.times[place, : len(prepared.times)] = prepared.times
+        log.marks[place, : len(prepared.marks)] = prepared.marks
+        log.turns[place], log.turns[place, : len(turns)] = turns[-1], turns
+        log.states[place, 0], log.modes[place, 0] = start.step.state, start.modes
+        log.signals[place, 0] = start.signals
+        log.recent[place, : len(commanded)] = commanded
+        log.drives[place, 0] = start.drives[:, DRIVE]
+        log.kept[place], log.passed[place] = 1, 0
+        state = self._places.states[place]
+        state[:] = numbers_of(start)[: state.size]
         engine = prepared.robot.scenario.settings_of(Compiled)
-        self._status[lane] = loop.RUNNING
-        clock[loop.PLANNED, lane] = min(engine.look_ahead, engine.max_step)
-        clock[loop.MARK, lane], clock[loop.DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
-        self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
+        state[loop.STATUS], state[loop.SAMPLES] = loop.RUNNING, len(commanded)
+        state[loop.PLANNED] = min(engine.look_ahead, engine.max_step)
+        state[loop.MARK], state[loop.DUE] = log.marks[place, 0], log.times[place, 1]
+        self._prepared[place], self._wall_times[place] = prepared, 0.0
+        if not self._places.marks.size:
+            self._wait([place])
 
-    def stop(self, lane: int) -> float:
-        """Removes the gait from a lane, finished or not. Returns its wall time in s."""
-        self._in_lane[lane] = None
-        self._status[lane] = loop.IDLE
-        return float(self._wall_times[lane])
+    def _wait(self, places: Sequence[int] | np.ndarray) -> None:
+        """Appends places to those whose robots wait for a lane."""
+        waiting, queue = self._places.waiting, self._places.queue
+        left = waiting[queue[NEXT] : queue[LAST]].tolist()
+        count = len(left) + len(places)
+        waiting[:count] = [*left, *places]
+        queue[:] = 0, count
+
+    def stop(self, place: int) -> float:
+        """Empties a place, whether its robot has ended or not. Returns its wall time in s."""
+        self._running[self._log.place == place] = loop.IDLE
+        self._prepared[place] = None
+        return float(self._wall_times[place])
 
     def advance(self, body_steps: int) -> list[int]:
-        """Simulates until a gait ends, or for about `body_steps` iterations times bodies. Returns
-        the lanes with finished gaits; result() empties a lane. Other Python threads run
+        """Simulates until a robot ends, or for about `body_steps` iterations times bodies. Returns
+        the places of robots that have ended; stop() empties a place. Other Python threads run
         meanwhile."""
-        self._simulate(body_steps)
-        busy = [lane for lane, prepared in enumerate(self._in_lane) if prepared is not None]
-        return [lane for lane in busy if self._status[lane] != loop.RUNNING]
-
-    @functools.cached_property
-    def _hold(self) -> Callable[..., None]:
-        table = np.zeros((1, 1))
-        return machine_code(control_periods.hold, self._parts, table, table)
-
-    @functools.cached_property
-    def _read(self) -> Callable[..., None]:
-        none = Packed(Readings.empty(self._first.robot.structure, 0))
-        return machine_code(control_periods.read, self._parts, none)
-
-    def hold(self, signals: np.ndarray, marks: np.ndarray) -> None:
-        """Appends a sample to the command of each lane, and sets the next marks; see
-        control_periods.hold()."""
-        contiguous = np.ascontiguousarray  # the machine code does not check its arguments
-        self._hold(self._parts, contiguous(signals), contiguous(marks))
-
-    def run(self) -> None:
-        """Simulates until all lanes have reached their last mark or failed."""
-        while (self._status == loop.RUNNING).any():
-            self._simulate(_BODY_STEPS)
-
-    def _simulate(self, body_steps: int) -> None:
-        """Simulates until a gait ends, or for about `body_steps` iterations times bodies."""
         started = time.perf_counter()
-        self._advance(self._parts, max(1, body_steps // (loop.ROUND * self._bodies)))
-        busy = len(self._in_lane) - self._in_lane.count(None)
-        self._wall_times += (time.perf_counter() - started) / max(busy, 1)
+        self._advance(self._parts, max(1, body_steps // (ROUND * self._bodies)))
+        busy = [place for place, prepared in enumerate(self._prepared) if prepared is not None]
+        self._wall_times += (time.perf_counter() - started) / max(len(busy), 1)
+        return [place for place in busy if self.status[place] != loop.RUNNING]
 
-    def read(self, readings: Packed[Readings]) -> None:
-        """Writes the readings of the first lanes, a row for each; see control_periods.read()."""
-        self._read(self._parts, readings)
+    def advance_to_pause(self, signals: np.ndarray, marks: np.ndarray) -> None:
+        """Simulates a control period of the robots with marks; see Stepper.advance()."""
+        self._places.signals[:], self._places.marks[:] = signals, marks
+        work = self._places.states[:, loop.TRIED] - self._tried
+        self._tried += work
+        longest_first = np.argsort(-work, kind="stable")  # so that the lanes end together
+        self._wait(longest_first[np.isfinite(marks[longest_first, 0])])
+        self.advance(_BODY_STEPS)
+        while (self._running == loop.RUNNING).any():
+            self.advance(_BODY_STEPS)
 
-    @property
-    def failed(self) -> np.ndarray:
-        """True for each lane whose simulation has failed."""
-        failed: np.ndarray = self._status > loop.DONE
-        return failed
-
-    def failure(self, lane: int) -> SimulationFailure | None:
-        """The failure of the simulation in a lane; None if it goes on or is finished."""
-        prepared, status = self._in_lane[lane], int(self._status[lane])
-        if prepared is None or status in (loop.RUNNING, loop.DONE):
+    def failure(self, place: int) -> SimulationFailure | None:
+        """The failure of the robot in a place; None if it goes on or has reached its end."""
+        prepared, status = self._prepared[place], int(self.status[place])
+        if prepared is None or status <= loop.DONE:
             return None
-        ended = float(self._lanes.clock.array[loop.TIME, lane])
-        return _failure(status, time=ended, scenario=prepared.robot.scenario)
+        ended = float(self._places.states[place, loop.TIME])
+        failure = _failure(status, time=ended, scenario=prepared.robot.scenario)
+        failure.wall_time = float(self._wall_times[place])
+        return failure
 
-    def result(self, lane: int) -> SimulationResult:
-        """The result of the finished simulation in a lane; the lane becomes idle. Raises Diverged
-        or StepBudgetExceeded if the simulation failed."""
-        prepared, failure = self._in_lane[lane], self.failure(lane)
+    def result(self, place: int) -> SimulationResult:
+        """The result of the robot in a place, at the end of its motion. Raises Diverged or
+        StepBudgetExceeded if the simulation failed."""
+        prepared, failure = self._prepared[place], self.failure(place)
         if prepared is None:
-            raise ValueError(f"lane {lane} is idle")
-        wall_time = self.stop(lane)
-        clock = self._lanes.clock.array[:, lane]
+            raise ValueError(f"place {place} is idle")
         if failure is not None:
-            failure.wall_time = wall_time
             raise failure
+        state = self._places.states[place].copy()
         return make_result(
             prepared.robot,
             prepared.gait,
-            self.motion(lane),
-            totals=of_lane(self._lanes.tally, lane),
+            self.motion(place),
+            totals=views(prepared.start.tally, state[self._tally :]),
             work=IntegratorWork(
                 scheme="ros2",
                 accuracy=prepared.robot.scenario.settings_of(Compiled).tolerance,
-                steps=int(clock[loop.TAKEN]),
-                derivative_evaluations=loop.EVALUATIONS * int(clock[loop.TRIED]),
+                steps=int(state[loop.TAKEN]),
+                derivative_evaluations=loop.EVALUATIONS * int(state[loop.TRIED]),
             ),
-            wall_time=wall_time,
+            wall_time=float(self._wall_times[place]),
             record=prepared.record,
         )
 
-    def motion(self, lane: int) -> Motion:
-        """Samples of the latest simulation in a lane, up to now."""
+    def motion(self, place: int) -> Motion:
+        """Samples of the latest simulation in a place, up to now."""
         log = self._log
-        kept = slice(log.kept[lane])
+        kept = slice(log.kept[place])
         return Motion(
-            times=log.times[lane, kept].copy(),
-            states=log.states[lane, kept].copy(),
-            signals=log.signals[lane, kept].copy(),
-            modes=log.modes[lane, kept].copy(),
-            drives=log.drives[lane, kept].copy(),
+            times=log.times[place, kept].copy(),
+            states=log.states[place, kept].copy(),
+            signals=log.signals[place, kept].copy(),
+            modes=log.modes[place, kept].copy(),
+            drives=log.drives[place, kept].copy(),
         )
 
 
@@ -234,40 +245,13 @@ def processor_features() -> str:
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
-def _constants_in_lanes(constants: loop.Constants, heights: np.ndarray) -> loop.Constants:
-    """Tables in lanes for constants like the given ones. `heights` has a row per lane."""
-    width = len(heights)
-    lanes = in_lanes(constants, width)
+def _constants_in_lanes(
+    constants: loop.Constants, heights: np.ndarray, width: int
+) -> tuple[loop.Constants, np.ndarray]:
+    """Tables in lanes for constants like the given ones, and their memory (numbers, lanes)."""
+    lanes, memory = in_lanes(constants, width)
     # A field of any size: one compiled kernel serves robots of any size.
-    inhibition = lane_table(constants.network.inhibition.shape, width, any_size=True)
+    inhibition = FieldArray(lanes.network.inhibition.array, width, any_size=True)
     ground = lanes.robot.ground._replace(heights=FieldArray(heights.ravel()))
     robot, network = lanes.robot._replace(ground=ground), lanes.network
-    return lanes._replace(robot=robot, network=network._replace(inhibition=inhibition))
-
-
-def in_lanes(values: Any, width: int) -> Any:
-    """NamedTuples with a table in lanes (zeros) for each array of real numbers. Arrays of indices
-    are shared by all lanes. Other values stay as they are."""
-    if isinstance(values, tuple):
-        return type(values)(*(in_lanes(value, width) for value in values))
-    if not isinstance(values, np.ndarray):
-        return values
-    if values.dtype == np.int64:
-        return FieldArray(values.copy())
-    return lane_table(values.shape, width)
-
-
-def fill_lane(tables: Any, values: Any, lane: int) -> None:
-    """Copies the real numbers of NamedTuples to one lane of tables from in_lanes()."""
-    if isinstance(values, tuple):
-        for table, value in zip(tables, values, strict=True):
-            fill_lane(table, value, lane)
-    elif isinstance(values, np.ndarray) and values.dtype == np.float64:
-        tables.array[..., lane] = values
-
-
-def of_lane(tables: Any, lane: int) -> Any:
-    """A copy of the numbers in a lane of tables in NamedTuples."""
-    if isinstance(tables, tuple):
-        return type(tables)(*(of_lane(table, lane) for table in tables))
-    return tables.array[..., lane].copy()
+    return lanes._replace(robot=robot, network=network._replace(inhibition=inhibition)), memory

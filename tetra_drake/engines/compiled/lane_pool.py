@@ -136,7 +136,7 @@ class _Crew:
 
     def __init__(self, robots: _Robots) -> None:
         self.jobs: dict[int, _Job] = {}
-        """Jobs by index of the lane."""
+        """Jobs by place."""
         self._robots = robots
         self._engine: LaneEngine | None = None
         self._engines: dict[int, LaneEngine] = {}
@@ -157,13 +157,13 @@ class _Crew:
             engine = self._engine if self.jobs else self._engine_for(prepared, lanes_for(among))
             if engine is None or not engine.accepts(prepared):
                 return False
-            self._engine, lane = engine, engine.idle[0]
-            engine.load(lane, prepared)
+            self._engine, place = engine, engine.idle[0]
+            engine.load(place, prepared)
         except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
             return True
         job.deadline = time.perf_counter() + job.time_budget
-        self.jobs[lane] = job
+        self.jobs[place] = job
         return True
 
     def _simulation(self, job: _Job) -> GaitSimulation:
@@ -176,19 +176,20 @@ class _Crew:
         engine = self._engine
         if engine is None or not self.jobs:
             return
-        for lane in engine.advance(_BODY_STEPS):
-            future = self.jobs.pop(lane).future
+        for place in engine.advance(_BODY_STEPS):
+            future = self.jobs.pop(place).future
             try:
-                result = engine.result(lane)
+                result = engine.result(place)
             except Exception as failure:  # the simulation may have diverged
                 future.set_exception(failure)
             else:
                 future.set_result(result)
+            engine.stop(place)
         now = time.perf_counter()
-        for lane in [lane for lane, job in self.jobs.items() if now > job.deadline]:
-            job = self.jobs.pop(lane)
+        for place in [place for place, job in self.jobs.items() if now > job.deadline]:
+            job = self.jobs.pop(place)
             error = TimeBudgetExceeded(f"not done after {job.time_budget:g} s")
-            error.wall_time = engine.stop(lane)
+            error.wall_time = engine.stop(place)
             job.future.set_exception(error)
 
     def give_up(self, error: Exception) -> None:

@@ -12,9 +12,8 @@ method, so both together are of order 2.
 
 from __future__ import annotations
 
-import functools
 import math
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -28,10 +27,9 @@ from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.tally import Tally, observe, update_clearance
-from tetra_drake.simd.compiling import compiled, inlined, merged
+from tetra_drake.physics.tally import Tally, observe
+from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, by_lane, maximum, minimum, select
-from tetra_drake.simd.packed import Packed, unpacked
 
 Array = np.ndarray
 
@@ -47,10 +45,6 @@ AIM_FACTOR = 1.02
 covers the error of the prediction, and the setting `look_ahead` is added."""
 EVALUATIONS = 3
 """Number of force evaluations per attempted step."""
-ROUND = 32
-"""Iterations (about 40 ms of motion) between two computations of the clearance. They find the least
-clearance to within 0.1 mm."""
-
 STATUS, TIME, PLANNED, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN = range(11)
 """Rows of `clock`. Times and lengths of steps are in s.
 
@@ -96,81 +90,60 @@ class Constants(NamedTuple):
 
 
 class LaneState(NamedTuple):
-    """State of the simulations, in lanes, with scratch memory."""
+    """State of the simulations, in lanes, with scratch memory.
+
+    The numbers before `step.end` are the state of a simulation; see places.Places.
+    """
 
     clock: Annotated[Table, CLOCK_ROWS]
-    scratch: Annotated[Table, SCRATCH_ROWS]
-    """Numbers that are computed for all lanes and then read lane by lane."""
-    step: Step
-    forces: Forces
     modes: Annotated[Table, "contacts", contact.MODE_COLUMNS]
-    acceleration: Annotated[Table, "6 * bodies"]
     signals: Annotated[Table, "signals"]
     """Signals at the lane's time."""
-    end_signals: Annotated[Table, "signals"]
-    """Signals at the end of the lane's step."""
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
     """Drives at the lane's time."""
-    end_drives: Annotated[Table, "drives"]
-    """Drives at the end of the lane's step."""
     neurons: Annotated[Table, "2 * signals", oscillator.NEURON_COLUMNS]
-    output: Annotated[Table, "signals"]
-    """Latest outputs of the oscillators."""
     tonic: Annotated[Table, "2 * signals"]
     """Inputs of the neurons without feedback."""
+    tally: Tally
+    step: Step
+    scratch: Annotated[Table, SCRATCH_ROWS]
+    """Numbers that are computed for all lanes and then read lane by lane."""
+    forces: Forces
+    acceleration: Annotated[Table, "6 * bodies"]
+    end_signals: Annotated[Table, "signals"]
+    """Signals at the end of the lane's step."""
+    end_drives: Annotated[Table, "drives"]
+    """Drives at the end of the lane's step."""
+    output: Annotated[Table, "signals"]
+    """Latest outputs of the oscillators."""
     inputs: Annotated[Table, "2 * signals"]
     """Inputs of the neurons with feedback."""
-    tally: Tally
 
 
 class Log(NamedTuple):
-    """Schedule and recorded samples of each simulation; a row per lane."""
+    """Schedule and recorded samples of each simulation; a row per place."""
 
-    marks: Annotated[Table, "lanes", "marks"]
+    place: Annotated[Table, "lanes", int]
+    """Place of the simulation in each lane."""
+    marks: Annotated[Table, "places", "marks"]
     """Times (s) at which a step must end, ascending; infinite after the last."""
-    passed: Annotated[Table, "lanes", int]
+    passed: Annotated[Table, "places", int]
     """Number of marks that have passed."""
-    times: Annotated[Table, "lanes", "times"]
+    times: Annotated[Table, "places", "times"]
     """Times (s) of the samples, ascending; infinite after the last."""
-    kept: Annotated[Table, "lanes", int]
+    kept: Annotated[Table, "places", int]
     """Number of recorded samples."""
-    states: Annotated[Table, "lanes", "samples", "13 * bodies"]
-    modes: Annotated[Table, "lanes", "samples", "contacts", contact.MODE_COLUMNS]
+    states: Annotated[Table, "places", "samples", "13 * bodies"]
+    modes: Annotated[Table, "places", "samples", "contacts", contact.MODE_COLUMNS]
     """Modes during the step that contains the sample."""
-    signals: Annotated[Table, "lanes", "samples", "signals"]
+    signals: Annotated[Table, "places", "samples", "signals"]
     """Signals in N."""
-    drives: Annotated[Table, "lanes", "samples", "drives"]
-    recent: Annotated[Table, "lanes", "recent", "signals"]
+    drives: Annotated[Table, "places", "samples", "drives"]
+    recent: Annotated[Table, "places", "recent", "signals"]
     """Ring buffer of the listing's signals; see row_of()."""
-    turns: Annotated[Table, "lanes", "turns"]
+    turns: Annotated[Table, "places", "turns"]
     """Turns at multiples of `period`, linear in between. The last turn holds for ever. A single
     turn is in `tonic` from the start."""
-
-
-Parts: TypeAlias = Packed[tuple[Constants, LaneState, Log, bool]]
-"""The simulations in lanes, packed for kernels that Python calls often. The last part is True if
-the network is live."""
-
-
-@functools.partial(compiled, nogil=True)
-def advance(parts: Parts, rounds: int) -> None:
-    """Runs rounds until a simulation has ended, at most `rounds`. A simulation has ended at its
-    last mark, or failed. The last round is cut short if no simulation is left.
-
-    A simulation starts at the beginning of a round, so its numbers do not depend on its neighbours.
-    """
-    constants, lanes, log, live = unpacked(parts)
-    for _ in range(rounds):
-        ended = False
-        for _ in range(ROUND):
-            ended |= iterate(constants, lanes, log, live)
-            if ended and not any_lane(lanes.clock[STATUS] == RUNNING):
-                break
-        robot, state = constants.robot, lanes.step.state
-        move_robot(robot, state, lanes.forces)
-        update_clearance(lanes.tally, robot, state, lanes.forces.nodes)
-        if ended:
-            return
 
 
 @merged
@@ -241,7 +214,7 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
         drive(constants, lanes)
         return
     run_ahead(constants, lanes, log, clock[END])
-    for lane in range(log.kept.size):
+    for lane in range(log.place.size):
         end = by_lane(clock)[END, lane]
         interpolate(constants, lanes, log, lane, end, by_lane(lanes.end_signals))
 
@@ -348,11 +321,12 @@ def keep_outputs(constants: Constants, lanes: LaneState, log: Log) -> None:
     """Writes the next sample of the signals, N, in each lane whose network took a step."""
     clock, scratch = by_lane(lanes.clock), by_lane(lanes.scratch)
     gain, output = by_lane(constants.gain), by_lane(lanes.output)
-    for lane in range(log.kept.size):
+    for lane in range(log.place.size):
         if scratch[NETWORK_STEPS, lane] != 0.0:
+            place = log.place[lane]
             row = row_of(int(clock[SAMPLES, lane]), log)
             for k in range(lanes.output.size):
-                log.recent[lane, row, k] = gain[0, lane] * output[k, lane]
+                log.recent[place, row, k] = gain[0, lane] * output[k, lane]
 
 
 @inlined
@@ -374,10 +348,11 @@ def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> Non
         return
     lanes.scratch[TURN_INDEX] = sample
     scratch, sides, tonic = by_lane(lanes.scratch), by_lane(constants.sides), by_lane(lanes.tonic)
-    for lane in range(log.kept.size):
+    for lane in range(log.place.size):
         position, external = scratch[TURN_INDEX, lane], by_lane(constants.external_input)[0, lane]
         i = max(0, min(int(position), turns - 2))
-        before, after = log.turns[lane, i], log.turns[lane, i + 1]
+        place = log.place[lane]
+        before, after = log.turns[place, i], log.turns[place, i + 1]
         turn = before + (min(position, turns - 1.0) - i) * (after - before)
         for k in range(lanes.tonic.size):
             tonic[k, lane] = oscillator.steered_input(external, turn, sides[k, lane])
@@ -405,8 +380,9 @@ def interpolate(
     last = int(by_lane(constants.samples)[0, lane]) - 1
     i = int(position)
     row, next_row = row_of(min(i, last), log), row_of(min(i + 1, last), log)
+    place = log.place[lane]
     for k in range(signals.shape[0]):
-        before, after = log.recent[lane, row, k], log.recent[lane, next_row, k]
+        before, after = log.recent[place, row, k], log.recent[place, next_row, k]
         signals[k, lane] = before + (position - i) * (after - before)
 
 
@@ -422,11 +398,12 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
     simulation is finished."""
     clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
     oscillator.oscillator_output(lanes.neurons, lanes.output)
-    for lane in range(log.kept.size):
+    for lane in range(log.place.size):
         if clock[STATUS, lane] != RUNNING or clock[TIME, lane] < clock[MARK, lane]:
             continue
-        log.passed[lane] += 1
-        clock[MARK, lane] = log.marks[lane, log.passed[lane]]
+        place = log.place[lane]
+        log.passed[place] += 1
+        clock[MARK, lane] = log.marks[place, log.passed[place]]
         if clock[MARK, lane] == math.inf:
             clock[STATUS, lane] = DONE
             done = True
@@ -445,31 +422,32 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
 def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
     """Records the samples within the step, in lanes that accept the step."""
     clock, modes, accepted = by_lane(lanes.clock), by_lane(lanes.modes), by_lane(lanes.scratch)
-    signals = np.empty((lanes.signals.size, log.kept.size))
-    for lane in range(log.kept.size):
+    signals = np.empty((lanes.signals.size, log.place.size))
+    for lane in range(log.place.size):
+        place = log.place[lane]
         while accepted[ACCEPTED, lane] != 0.0 and clock[DUE, lane] <= clock[END, lane]:
-            i, due, step = log.kept[lane], clock[DUE, lane], clock[STEP, lane]
+            i, due, step = log.kept[place], clock[DUE, lane], clock[STEP, lane]
             part = 1.0 if due == clock[END, lane] else (due - clock[TIME, lane]) / step
             before = column(by_lane(lanes.step.state), lane)
             after = column(by_lane(lanes.step.end), lane)
             state = interpolate_state(before, after, step, part)
             for k in range(state.size):
-                log.states[lane, i, k] = state[k]
+                log.states[place, i, k] = state[k]
             for k in range(modes.shape[0]):
                 for c in range(contact.MODE_COLUMNS):
-                    log.modes[lane, i, k, c] = modes[k, c, lane]
+                    log.modes[place, i, k, c] = modes[k, c, lane]
             if not live:
                 interpolate(constants, lanes, log, lane, due, signals)
             for k in range(signals.shape[0]):
                 first, last = by_lane(lanes.signals)[k, lane], by_lane(lanes.end_signals)[k, lane]
                 between = first + part * (last - first)
-                log.signals[lane, i, k] = between if live else signals[k, lane]
+                log.signals[place, i, k] = between if live else signals[k, lane]
             drives, end_drives = by_lane(lanes.drives), by_lane(lanes.end_drives)
             for k in range(lanes.drives.shape[0]):
                 first, last = drives[k, actuator.DRIVE, lane], end_drives[k, lane]
-                log.drives[lane, i, k] = first + part * (last - first)
-            log.kept[lane] = i + 1
-            clock[DUE, lane] = log.times[lane, i + 1]
+                log.drives[place, i, k] = first + part * (last - first)
+            log.kept[place] = i + 1
+            clock[DUE, lane] = log.times[place, i + 1]
 
 
 @inlined

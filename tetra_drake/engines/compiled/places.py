@@ -1,0 +1,177 @@
+"""Robots in places: they take turns in the lanes of the simulation loop.
+
+A lane simulates a robot until its last mark, or its failure. Then the robot goes back to its place,
+and the lane takes the next one that waits. So no lane waits for the slowest.
+
+In control periods, the last mark is a pause. A robot that waits has the sample of a command for the
+next period, and its marks. When it pauses, its readings are written.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Annotated, NamedTuple, TypeAlias
+
+from tetra_drake.engines.compiled import loop
+from tetra_drake.engines.compiled.loop import Constants, LaneState, Log
+from tetra_drake.physics import cable, contact, kinematics
+from tetra_drake.physics.forces import move_robot
+from tetra_drake.physics.tally import update_clearance
+from tetra_drake.robot.readings import Readings
+from tetra_drake.simd.compiling import compiled, inlined
+from tetra_drake.simd.lanes import Table, any_lane, by_lane, floor, select
+from tetra_drake.simd.packed import Packed, unpacked
+
+ROUND = 32
+"""Steps of a robot (about 40 ms of motion) between two computations of the clearance. They find the
+least clearance to within 0.1 mm."""
+
+NEXT, LAST = range(2)
+"""Entries of `queue`: index of the next robot in `waiting`, and number of robots there."""
+
+
+class Places(NamedTuple):
+    """Robots in places; a row per place."""
+
+    states: Annotated[Table, "places", "numbers"]
+    """The numbers of LaneState before `step.end`."""
+    constants: Annotated[Table, "places", "constants"]
+    """The numbers of Constants."""
+    waiting: Annotated[Table, "places", int]
+    """Places of the robots that wait for a lane, in their order."""
+    queue: Annotated[Table, 2, int]
+    signals: Annotated[Table, "paused", "signals"]
+    """Samples in N of a command, from the robot's time on. Empty without control periods."""
+    marks: Annotated[Table, "paused", 4]
+    """Times (s) at which a step must end until the next pause, ascending; infinite after it."""
+
+
+class Memory(NamedTuple):
+    """The numbers (numbers, lanes) of tables in lanes."""
+
+    states: Table
+    constants: Table
+
+
+Parts: TypeAlias = Packed[tuple[Constants, LaneState, Log, Memory, Places, Readings, bool]]
+"""The simulations, packed for kernels that Python calls often. The last part is True if the network
+is live."""
+
+
+@functools.partial(compiled, nogil=True)
+def advance(parts: Parts, rounds: int) -> None:
+    """Simulates until a robot has ended and no robot waits, at most `rounds`. A robot has ended at
+    its last mark, or failed. The last round is cut short if no robot is left.
+
+    The robots that wait at first begin together with a round, so that their clearances are due
+    together.
+    """
+    constants, lanes, log, _, places, _, live = unpacked(parts)
+    exchange(parts)
+    for _ in range(rounds):
+        ended = False
+        for _ in range(ROUND):
+            has_ended = loop.iterate(constants, lanes, log, live)
+            measure_clearance(constants, lanes)
+            if has_ended:
+                ended = True
+                exchange(parts)
+                if not any_lane(lanes.clock[loop.STATUS] == loop.RUNNING):
+                    return
+        if ended and places.queue[NEXT] == places.queue[LAST]:
+            return
+
+
+@inlined
+def measure_clearance(constants: Constants, lanes: LaneState) -> None:
+    """Updates the clearance of robots after each ROUND steps, and at the end of their motion."""
+    clock, robot, state = lanes.clock, constants.robot, lanes.step.state
+    rounds = clock[loop.TRIED] * (1.0 / ROUND)
+    is_due = (clock[loop.STATUS] == loop.RUNNING) & (rounds == floor(rounds))
+    is_due |= (clock[loop.STATUS] == loop.DONE) & (clock[loop.DUE] == math.inf)
+    if not any_lane(is_due):
+        return
+    before = lanes.tally.clearance[0]
+    move_robot(robot, state, lanes.forces)
+    update_clearance(lanes.tally, robot, state, lanes.forces.nodes)
+    lanes.tally.clearance[0] = select(is_due, lanes.tally.clearance[0], before)
+
+
+@functools.partial(compiled, nogil=True)
+def exchange(parts: Parts) -> None:
+    """Puts robots that have ended back to their places, and robots that wait in idle lanes."""
+    constants, lanes, log, memory, places, readings, _ = unpacked(parts)
+    clock, queue = by_lane(lanes.clock), places.queue
+    for lane in range(log.place.size):
+        if clock[loop.STATUS, lane] == loop.RUNNING:
+            continue
+        if clock[loop.STATUS, lane] != loop.IDLE:
+            if places.marks.shape[0] > 0 and clock[loop.STATUS, lane] == loop.DONE:
+                read(lanes, lane, log.place[lane], readings)
+            for i in range(places.states.shape[1]):
+                places.states[log.place[lane], i] = memory.states[i, lane]
+            clock[loop.STATUS, lane] = loop.IDLE
+        if queue[NEXT] < queue[LAST]:
+            take(lanes, log, memory, places, lane, places.waiting[queue[NEXT]])
+            queue[NEXT] += 1
+            if places.marks.shape[0] > 0:
+                hold(constants, lanes, log, lane, places)
+
+
+@inlined
+def take(lanes: LaneState, log: Log, memory: Memory, places: Places, lane: int, place: int) -> None:
+    """Copies a robot from its place to a lane."""
+    log.place[lane] = place
+    for i in range(places.states.shape[1]):
+        memory.states[i, lane] = places.states[place, i]
+    for i in range(places.constants.shape[1]):
+        memory.constants[i, lane] = places.constants[place, i]
+    searched = by_lane(lanes.forces.near_struts.p_WN)
+    for node in range(searched.shape[0]):
+        searched[node, 0, lane] = math.inf  # so that near struts are searched
+
+
+@inlined
+def hold(constants: Constants, lanes: LaneState, log: Log, lane: int, places: Places) -> None:
+    """Appends the sample of the robot in a lane to its command, and sets its marks.
+
+    The robot is at a multiple of the listing's step. The signals change within a step, which begins
+    now; the signals of a whole command change in the same way.
+    """
+    place, clock, held = log.place[lane], by_lane(lanes.clock), by_lane(lanes.signals)
+    now = int(clock[loop.TIME, lane] / by_lane(constants.period)[0, lane] + 0.5)
+    for k in range(held.shape[0]):
+        log.recent[place, loop.row_of(now - 1, log), k] = held[k, lane]
+        log.recent[place, loop.row_of(now, log), k] = held[k, lane]
+        log.recent[place, loop.row_of(now + 1, log), k] = places.signals[place, k]
+    by_lane(constants.samples)[0, lane] = clock[loop.SAMPLES, lane] = now + 2.0
+    for i in range(places.marks.shape[1]):
+        log.marks[place, i] = places.marks[place, i]
+    log.passed[place] = 0
+    clock[loop.MARK, lane] = places.marks[place, 0]
+    clock[loop.STATUS, lane] = loop.RUNNING
+
+
+@inlined
+def read(lanes: LaneState, lane: int, place: int, to: Readings) -> None:
+    """Writes the readings of the robot in a lane to the row of its place."""
+    state, nodes = by_lane(lanes.step.state), by_lane(lanes.forces.nodes)
+    cables, loads = by_lane(lanes.forces.cable_forces), by_lane(lanes.forces.ground_forces)
+    bodies = to.q_WB.shape[1]
+    to.time[place] = by_lane(lanes.clock)[loop.TIME, lane]
+    for i in range(to.lengths.shape[1]):
+        to.lengths[place, i] = cables[i, cable.LENGTH, lane]
+        to.rates[place, i] = cables[i, cable.RATE, lane]
+        to.tensions[place, i] = cables[i, cable.TENSION, lane]
+    for i in range(to.normal_forces.shape[1]):
+        to.normal_forces[place, i] = loads[i, contact.NORMAL, lane]
+    for body in range(bodies):
+        for k in range(4):
+            to.q_WB[place, body, k] = state[7 * body + k, lane]
+        for k in range(3):
+            to.w_WB[place, body, k] = state[7 * bodies + 6 * body + k, lane]
+    for node in range(to.p_WN.shape[1]):
+        for k in range(3):
+            to.p_WN[place, node, k] = nodes[node, kinematics.P_WN + k, lane]
+            to.v_WN[place, node, k] = nodes[node, kinematics.V_WN + k, lane]
