@@ -188,7 +188,8 @@ def _Add(
     if earlier is not None:
         before = earlier[0].get_output_port(earlier[1])
         builder.Disconnect(before, port)
-        builder.AddNamedSystem(f"forces_with_{name}", adder)
+        is_first = not builder.HasSubsystemNamed("forces")
+        builder.AddNamedSystem("forces" if is_first else f"forces_with_{name}", adder)
         builder.Connect(before, adder.get_input_port(0))
         builder.Connect(source, adder.get_input_port(1))
         source = adder.get_output_port()
