@@ -21,7 +21,7 @@ _KIND = StructureFile.tag
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that occur only in files of NTRT."""
 SCENARIO_KEYS = {"base", "robot"}
-"""Keys of which every scenario's file has one, and a structure's file none."""
+"""Every scenario's file has one of these keys, and no structure's file has any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:

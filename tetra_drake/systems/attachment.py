@@ -11,14 +11,16 @@ from collections.abc import Iterable
 from typing import NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.common.value import AbstractValue
+from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     ExternallyAppliedSpatialForce,
     ExternallyAppliedSpatialForceMultiplexer,
     MultibodyPlant,
 )
-from pydrake.multibody.tree import BodyIndex, Frame, FrameIndex, RigidBody
+from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, FrameIndex, RigidBody
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -136,6 +138,12 @@ def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
     applied.body_index = BodyIndex(body - WORLD)
     applied.F_Bq_W = SpatialForce(force)
     return applied
+
+
+def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:
+    """Adds a frame at a place p (3,) in m in another frame to a plant that is not finalized."""
+    offset = RigidTransform(np.asarray(p, dtype=float))
+    return plant.AddFrame(FixedOffsetFrame(name, parent, offset))
 
 
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:

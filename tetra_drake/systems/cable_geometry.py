@@ -36,7 +36,7 @@ class CableGeometry(LeafSystem):
     | geometry_pose |             | SI   | FramePoseVector of all pieces, for the scene |
 
     A shape in a SceneGraph keeps its length. So a cable consists of pieces that slide along each
-    other like those of a telescope.
+    other as a telescope's do.
     """
 
     def __init__(self, *, lengths: np.ndarray, frames: list[list[FrameId]]) -> None:
