@@ -107,7 +107,7 @@ ResultOrGait = Annotated[Path, Option(metavar="RESULT_DIR|GAIT|RUN_DIR", type=Pa
 _SCENARIO = f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file"
 _GAIT = "a gait file (JSON), or a folder written by `evolve` for its best gait"
 _SEED = "a random gait of this seed instead (default: one that walks)"
-_STRUCTURE = f"a structure file, or one of {', '.join(shipped_structures())}"
+_STRUCTURE = f"a structure file, one of {', '.join(shipped_structures())}, or a scenario"
 _COMMAND = "a file of actuator commands (CSV) instead, as `export` writes"
 _ENGINE = "the Drake diagram, the same laws compiled, or MuJoCo (default: the scenario's)"
 
@@ -117,7 +117,7 @@ GaitFile = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="g
 GaitSeed = Annotated[Seed, Option(_SEED, group="gait")]
 CommandFile = Annotated[File, Option(_COMMAND, group="gait")]
 EngineName = Annotated[str, Option(_ENGINE, choices=tuple(ENGINES))]
-StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE")]
+StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
 
 
 def _simulate(
@@ -482,32 +482,39 @@ def _structure(
     unit: Unit | None = None,
     out: File | None = None,
     mjcf: File | None = None,
+    sdf: File | None = None,
 ) -> None:
     """Analyse a structure and its equilibrium.
 
-    Reads a structure file, or one of NTRT, and computes its equilibrium on flat ground without
-    actuation. Prints bodies, cables, states of self-stress, infinitesimal mechanisms, natural
-    frequencies, tensions and heights.
+    Reads a structure file, one of NTRT, or the robot of a scenario, and computes its equilibrium
+    on flat ground without actuation. Prints bodies, cables, states of self-stress, infinitesimal
+    mechanisms, natural frequencies, tensions and heights.
 
     Args:
         unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
         out: write an HTML page that shows the structure in equilibrium
-        mjcf: write a model for MuJoCo, with its tendons
+        mjcf: write a model for MuJoCo, with tendons, motors and the key frame `rest`
+        sdf: write a model in SDFormat: bodies, and nodes as frames, without cables
 
     Example: tetra-drake structure six_bar --out six_bar.html
     """
     from tetra_drake.analysis.equilibrium import study_equilibrium
-    from tetra_drake.engines.mujoco import make_mjcf
+    from tetra_drake.engines.mjcf import make_mjcf
     from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
+    from tetra_drake.robot.sdf import make_sdf
 
     study = study_equilibrium(robot_of_file(source, unit=unit))
-    text = structure_text(study)
+    text, robot = structure_text(study), study.robot
+    rest = robot.equilibrium.state
     if out:
         save_structure_page(study, out)
         text += f"\nto see the structure, open in a browser: {out}"
     if mjcf:
-        write_whole(mjcf, make_mjcf(study.robot))
+        write_whole(mjcf, make_mjcf(robot, rest=rest))
         text += f"\nwrote {mjcf}"
+    if sdf:
+        write_whole(sdf, make_sdf(robot.structure, rest, name=robot.scenario.name))
+        text += f"\nwrote {sdf}"
     print(text)
 
 

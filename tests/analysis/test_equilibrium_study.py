@@ -5,7 +5,7 @@ import math
 import pytest
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
-from tetra_drake.engines.mujoco import make_mjcf
+from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.robot_structure import StructureFile

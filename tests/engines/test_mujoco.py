@@ -8,6 +8,7 @@ import pytest
 import xarray
 from helpers.bars import CROSSED, RADIUS, STIFFNESS, loose_bars
 
+from tetra_drake.engines import mjcf
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
@@ -71,7 +72,7 @@ def test_steps_count_against_the_budget_of_evaluations(short):
 def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path, monkeypatch):
     # With implicitfast the robot jumps for ever, but nothing overflows; Euler's state does.
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(engine, "INTEGRATOR", integrator)
+    monkeypatch.setattr(mjcf, "INTEGRATOR", integrator)
     steps = {"engine.step": "4e-3 s"}
     unstable = short.with_changes({"simulation.duration": "3.0 s", **steps})
     with pytest.raises(Diverged) as caught:

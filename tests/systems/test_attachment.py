@@ -12,7 +12,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import (
-    FixedOffsetFrame,
     Frame,
     LinearSpringDamper,
     RevoluteJoint,
@@ -31,16 +30,12 @@ from tetra_drake.scenario.common_sections import GroundSection
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Flat
-from tetra_drake.systems import AddCables, AddGroundContact, Cable
+from tetra_drake.systems import AddCables, AddFrame, AddGroundContact, Cable
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 MASS, LENGTH, GRAVITY = 0.5, 0.4, 9.81  # of a uniform rod on a hinge at the origin
 LAW = CableLaw(stiffness=60.0, damping=8.0, free_length=0.0)
 LEFT, RIGHT = np.array([-0.2, 0.0, 0.5]), np.array([0.6, 0.0, 0.3])  # anchors of two tendons
-
-
-def add_point(plant: MultibodyPlant, name: str, parent: Frame, p: np.ndarray) -> Frame:
-    return plant.AddFrame(FixedOffsetFrame(name, parent, RigidTransform(np.array(p))))
 
 
 def hinged_rod(builder: DiagramBuilder) -> tuple[MultibodyPlant, Frame]:
@@ -50,7 +45,7 @@ def hinged_rod(builder: DiagramBuilder) -> tuple[MultibodyPlant, Frame]:
     rod = plant.AddRigidBody("rod", inertia)
     hinge = RevoluteJoint("hinge", plant.world_frame(), rod.body_frame(), [0.0, -1.0, 0.0])
     plant.AddJoint(hinge)
-    tip = add_point(plant, "tip", rod.body_frame(), [LENGTH, 0.0, 0.0])
+    tip = AddFrame(plant, "tip", rod.body_frame(), [LENGTH, 0.0, 0.0])
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -GRAVITY])
     return plant, tip
 
@@ -59,7 +54,7 @@ def tendons(plant: MultibodyPlant, tip: Frame, law: CableLaw = LAW) -> list[Cabl
     """Tendons from the world to the free end. The plant must not be finalized."""
     anchors = {"left": LEFT, "right": RIGHT}
     return [
-        Cable(name, add_point(plant, name, plant.world_frame(), place), tip, law)
+        Cable(name, AddFrame(plant, name, plant.world_frame(), place), tip, law)
         for name, place in anchors.items()
     ]
 
@@ -103,7 +98,7 @@ def test_tendons_of_an_arm_of_drakes_are_its_linear_spring_dampers():
             (plant.GetFrameByName("upper_link"), [0.0, 0.02, -0.7]),
             (plant.GetFrameByName("lower_link"), [0.0, 0.0, -1.0]),
         ]
-        frames = [add_point(plant, f"end {i}", *end) for i, end in enumerate(ends)]
+        frames = [AddFrame(plant, f"end {i}", *end) for i, end in enumerate(ends)]
         law = CableLaw(stiffness=40.0, damping=1.5, free_length=0.1)
         pairs = {"upper": frames[:2], "lower": frames[1:], "both": [frames[0], frames[2]]}
         attach(builder, plant, [Cable(name, a, b, law) for name, (a, b) in pairs.items()])

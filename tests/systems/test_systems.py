@@ -28,7 +28,7 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 def test_has_the_blocks_of_the_thesis_and_nothing_to_show_or_log(robot, gait):
     names = {system.get_name() for system in MakeTensegrityDiagram(robot, gait).GetSystems()}
-    assert names == {"cpg", "start_up", "cables", "ground", "forces_with_ground", "plant"}
+    assert names == {"cpg", "start_up", "cables", "ground", "forces", "plant"}
 
 
 def test_exports_what_a_user_plots(robot, gait):

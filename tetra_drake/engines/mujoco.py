@@ -20,34 +20,31 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
-from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
+from tetra_drake.engines.mjcf import INTEGRATOR, check_mjcf, make_mjcf
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import Actuator, actuator_force, has_drive
 from tetra_drake.physics.cable import PASSIVE, Cables, cable_tension, law_of
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NormalForce
-from tetra_drake.physics.inertia import XX
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.compiling import compiled
@@ -56,20 +53,9 @@ Array = np.ndarray
 
 INSTALL = 'pip install "mujoco>=3.13"'
 
-_IMPRATIO = 1000.0
-"""MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo a
-slipping node gets a part, 1 / impratio, of the force that would hold it as normal force. With the
-default 1, nodes are thrown up and chatter."""
-_IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
-"""Impedance of contacts. It adds inertia to a contact: the body's mass along the ground, which
-keeps friction stable in long steps, and 1 / _IMPRATIO of the mass along the normal."""
-_POINT = 1e-8  # radius (m) of the spheres that touch the floor; larger ones spin thin bars
-_ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
 _FLOOR = 0  # index of the floor's geom
 _STRETCH = 5000  # steps between two checks of stability
 _OBSERVED = 8  # steps from one observation to the next; 1 ms with the default step
-INTEGRATOR = "implicitfast"
-"""Name of MuJoCo's integrator."""
 MAX_SPEED = 1.0
 """Largest speed of a body (m/s) of a robot that starts on the ground; less than in other engines.
 With too long a step a robot is thrown about, sometimes far forward. A walking robot stays below
@@ -88,11 +74,7 @@ class MujocoEngine(Engine):
         if scenario.cpg.feedback:
             problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
             raise InputError(scenario.name, "cpg.feedback", problem)
-        if scenario.terrain.plane_slope is None:
-            kind = type(scenario.terrain).__name__
-            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline, or !Nothing"
-            raise InputError(scenario.name, "terrain", problem)
-        scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
+        check_mjcf(scenario)
 
     def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         robot, gait, steering = simulation.robot, simulation.gait, simulation.steering
@@ -121,27 +103,6 @@ def installed() -> bool:
     except ImportError:
         return False
     return True
-
-
-def make_mjcf(robot: Robot) -> str:
-    """The robot and its ground in MuJoCo's XML format, with one motor per driven cable. If the
-    actuators have drives, tendons have no law, and a motor for each cable exerts its tension."""
-    scenario = robot.scenario
-    model = Element("mujoco", model=scenario.name)
-    steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
-    _add(model, "compiler", inertiafromgeom="false")
-    contact = {"cone": "elliptic", "impratio": _IMPRATIO}
-    _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
-    world = _add(model, "worldbody")
-    if scenario.terrain.is_ground:
-        _add_floor(world, robot)
-    _add_fixed_nodes(world, robot.structure)
-    _add_bodies(model, world, robot)
-    if robot.model.strut_contact.acts:
-        _add_strut_contacts(model, robot)
-    _add_cables(model, robot)
-    _add_pushes(model, world, robot.structure)
-    return tostring(model, encoding="unicode")
 
 
 class _Simulator:
@@ -438,151 +399,6 @@ def pull_cables(
         tensions[i] = driven.tension
         drives[drive] += step * driven.rate
         drive += 1
-
-
-def _add_floor(world: Element, robot: Robot) -> None:
-    """Adds the floor: a plane, the first geom."""
-    slope = robot.scenario.terrain.plane_slope or 0.0
-    pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
-    quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
-    _add(world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE)
-
-
-def _add_fixed_nodes(world: Element, structure: Structure) -> None:
-    """Adds a site of the world for each fixed node."""
-    for node in range(structure.first_node[-1], len(structure.node_names)):
-        _add(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
-
-
-def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
-    """Adds the bodies: a site at each node, a small sphere at each contact node, and struts."""
-    structure, bodies = robot.structure, robot.model.bodies
-    pairs = _add(model, "contact")
-    for i, body_name in enumerate(structure.bodies):
-        pos, quat = structure.p_WB[i], structure.q_WB[i]
-        body = _add(world, "body", name=body_name, pos=pos, quat=quat)
-        _add(body, "freejoint")
-        mass, inertia = bodies.mass[i], bodies.inertia[i]
-        is_bar = structure.first_node[i + 1] - structure.first_node[i] == 2
-        if is_bar:
-            # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
-            # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
-            # above the nodes by half the depth, so friction would soon spin a thin bar.
-            across = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())[-1]
-            moments = {"diaginertia": 3 * [across]}
-        elif structure.isotropic:
-            moments = {"diaginertia": 3 * [inertia[XX]]}
-        else:
-            moments = {"fullinertia": inertia}
-        _add(body, "inertial", pos="0 0 0", mass=mass, **moments)
-        contact = _contact(robot, mass)
-        for node in range(structure.first_node[i], structure.first_node[i + 1]):
-            name, p_BN = structure.node_names[node], structure.p_BN[node]
-            _add(body, "site", name=name, pos=p_BN)
-            if node in structure.contacts:
-                _add(body, "geom", name=name, pos=p_BN, size=_POINT, **_ALONE)
-                _add(pairs, "pair", geom1="floor", geom2=name, **contact)
-        for strut in np.flatnonzero(structure.carriers[structure.struts[:, 0]] == i):
-            ends = structure.p_BN[structure.struts[strut]]
-            size = structure.strut_radius[strut]
-            geom = {"name": f"strut {strut}", "type": "capsule", "fromto": ends, "size": size}
-            _add(body, "geom", **geom, **_ALONE)
-
-
-def _contact(robot: Robot, mass: float) -> dict:
-    """Contact settings for the floor and a body of this mass (kg)."""
-    ground = robot.scenario.ground
-    cone = robot.scenario.friction.cone(robot.scenario.name)
-    borne = robot.weight / _feet(robot)
-    rest_damping = ground.damping * borne / ground.stiffness
-    # MuJoCo's numbers are per mass, divided by 1 - impedance, and for friction multiplied by
-    # impratio. Negative numbers mean stiffness and damping.
-    per_mass = -(1.0 - _IMPEDANCE) / mass
-    return {
-        "condim": "3",
-        "friction": [cone.coefficient, cone.coefficient, 0, 0, 0],
-        "solref": [ground.stiffness * per_mass, rest_damping * per_mass],
-        "solreffriction": [ground.stiffness * per_mass, cone.damping * per_mass / _IMPRATIO],
-        "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
-    }
-
-
-def _add_strut_contacts(model: Element, robot: Robot) -> None:
-    """Adds the contact of all struts of different bodies, without friction."""
-    normal = NormalForce(*robot.model.strut_contact.normal)
-    rest_damping = normal.damping * robot.weight / normal.stiffness
-    bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
-    pairs = _add(model, "contact")
-    for i, j in itertools.combinations(range(len(bodies)), 2):
-        if bodies[i] == bodies[j]:
-            continue
-        per_mass = (1.0 / robot.structure.mass[bodies[[i, j]]]).sum()
-        scale = -(1.0 - _IMPEDANCE) * per_mass
-        contact = {
-            "condim": "1",
-            "solref": [normal.stiffness * scale, rest_damping * scale],
-            "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
-        }
-        _add(pairs, "pair", geom1=f"strut {i}", geom2=f"strut {j}", **contact)
-
-
-def _feet(robot: Robot) -> int:
-    """Number of nodes that bear the weight: from the blueprint, or in equilibrium."""
-    return robot.structure.feet or max(1, robot.equilibrium.feet)
-
-
-def _add_cables(model: Element, robot: Robot) -> None:
-    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if the
-    actuators have drives."""
-    structure, has_drives = robot.structure, has_drive(robot.model.actuator)
-    tendons, actuators = _add(model, "tendon"), _add(model, "actuator")
-    for name, cable in zip(structure.cable_names, structure.cables, strict=True):
-        law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
-        least = 0.0 if structure.slack else cable["free_length"]
-        springlength = [least, cable["free_length"]]  # the spring exerts no force in between
-        own = {} if has_drives else {"springlength": springlength, **law}
-        tendon = _add(tendons, "spatial", name=name, **own)
-        for node in (cable["node_a"], cable["node_b"]):
-            _add(tendon, "site", site=structure.node_names[node])
-        if (
-            has_drives or cable["signal"] != PASSIVE
-        ):  # a motor's force lengthens its tendon, ours shortens it
-            _add(actuators, "motor", name=name, tendon=name, gear="-1")
-
-
-def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
-    """Adds an actuator for each axis of an anchor, a spring with damping, and for each component of
-    a load, a constant force."""
-    actuators, anchors, loads = _add(model, "actuator"), structure.anchors, structure.loads
-    laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
-    for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
-        _add_push(actuators, world, f"anchor {structure.node_names[node]}", place, of_axes)
-    for node, force in zip(loads.nodes, loads.forces, strict=True):
-        of_axes = np.outer(force, [1.0, 0.0, 0.0])
-        _add_push(actuators, world, f"load {structure.node_names[node]}", np.zeros(3), of_axes)
-
-
-def _add_push(actuators: Element, world: Element, name: str, place: Array, laws: Array) -> None:
-    """Adds an actuator along each axis of the world that pushes the node after the blank of `name`.
-
-    The three numbers of each law are a constant force, and the force per displacement from `place`
-    and per velocity.
-    """
-    _add(world, "site", name=name, pos=place)
-    ends = {"site": name.partition(" ")[2], "refsite": name}
-    for axis, gear, law in zip("xyz", np.eye(3, 6), laws, strict=True):
-        if law.any():
-            force = {"gear": gear, "gainprm": "0", "biastype": "affine", "biasprm": law}
-            _add(actuators, "general", name=f"{name} {axis}", **ends, **force)
-
-
-def _add(parent: Element, tag: str, **attributes: Any) -> Element:
-    """Adds an XML element. Attributes are texts, numbers or arrays of numbers."""
-    text = {
-        name: value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
-        for name, value in attributes.items()
-    }
-    return SubElement(parent, tag, text)
 
 
 ENGINE = MujocoEngine()

@@ -13,9 +13,11 @@ from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot, undisturbed_structure
+from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.scenario.structure_files import names_scenario, read_structure
+from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.visualization.replay import save_replay
 
 if TYPE_CHECKING:
@@ -31,14 +33,21 @@ _SURROUNDINGS = "prism"
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
-    """The robot of a structure file on flat ground with Coulomb friction, for MuJoCo.
+    """The robot of a structure or of a scenario on flat ground, with forces as actuators, for
+    MuJoCo. A structure gets Coulomb friction.
 
     A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in some of
     NTRT's; in equilibrium they touch. Raises InputError that names file and key.
     """
-    structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
-    surroundings = load_scenario(_SURROUNDINGS).with_changes({"friction.stiffness": "0 N/m"})
-    scenario = surroundings.with_sections(name=name, robot=structure, engine=Mujoco())
+    if names_scenario(name_or_file):
+        given = load_scenario(name_or_file)
+        ground = Flat() if given.terrain.is_ground else given.terrain
+        given = given.with_sections(terrain=ground, actuation=Force())
+    else:
+        structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
+        given = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
+    friction = given.friction.without_bristles()
+    scenario = given.with_sections(friction=friction, engine=Mujoco())
     return Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
 
 

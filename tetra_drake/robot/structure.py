@@ -31,7 +31,8 @@ from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import WORLD, Blueprint
 
 STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
-"""Colours of struts and spheres in a SceneGraph."""
+PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0)
+"""Colours of struts, spheres and cables in Drake's SceneGraph and in files for simulators."""
 SKIN = 0.05
 """Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
 pairs are near; with a smaller one, near pairs are searched more often."""

@@ -44,6 +44,10 @@ class FrictionKind(Section):
         """The law in the form that the kernels need."""
         raise NotImplementedError
 
+    def without_bristles(self) -> FrictionKind:
+        """The same kind as MuJoCo knows it, whose nodes creep in stick."""
+        return self
+
     @property
     def text(self) -> str:
         """Description of the law for pages."""
@@ -123,6 +127,9 @@ class Coulomb(FrictionKind):
         if self.kinetic > self.static:
             refuse("kinetic", f"found {self.kinetic}, expected at most static, {self.static}")
         return self
+
+    def without_bristles(self) -> FrictionKind:
+        return self.model_copy(update={"stiffness": 0.0})
 
     def law(self) -> FrictionLaw:
         from tetra_drake.physics.friction import CoulombConstants, FrictionLaw

@@ -12,7 +12,7 @@ from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
 from tetra_drake.scenario.refusals import TAG, described, no_such
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.section import Tree, keys_of
-from tetra_drake.scenario.shipped import STRUCTURES, shipped_structures
+from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
 from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import read_mapping
 
@@ -20,6 +20,8 @@ _KIND = StructureFile.tag
 
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that occur only in files of NTRT."""
+SCENARIO_KEYS = {"base", "robot"}
+"""Every scenario's file has one of these keys, and no structure's file has any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
@@ -34,6 +36,16 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
         raise InputError(name_or_file, "", problem)
     content = _tree_of_file(file, unit, source=file, key="unit")
     return StructureFile.from_tree(content | ({"unit": unit} if unit else {}), file)
+
+
+def names_scenario(name_or_file: str | Path) -> bool:
+    """True for a shipped scenario that is no shipped structure too, and for a scenario's file."""
+    name = str(name_or_file)
+    if name in shipped_structures() or not os.path.isfile(name):
+        return name in shipped_scenarios() and name not in shipped_structures()
+    keys = [*keys_of(StructureFile), *keys_of(NtrtFile), *SCENARIO_KEYS]
+    content = read_mapping(Path(name), "structure file", keys=keys, most=MOST_BYTES)
+    return not SCENARIO_KEYS.isdisjoint(content)
 
 
 def structure_file(name: str, folder: Path) -> Path:

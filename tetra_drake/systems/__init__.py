@@ -1,7 +1,7 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
 
 from tetra_drake.systems.actuators import Actuators
-from tetra_drake.systems.attachment import Attach
+from tetra_drake.systems.attachment import AddFrame, Attach
 from tetra_drake.systems.cable_network import AddCables, Cable, CableNetwork
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import AddGroundContact, GroundContact
@@ -14,6 +14,7 @@ from tetra_drake.systems.steering import Steering
 __all__ = [
     "Actuators",
     "AddCables",
+    "AddFrame",
     "AddGroundContact",
     "Anchors",
     "Attach",

@@ -11,14 +11,16 @@ from collections.abc import Iterable
 from typing import NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.common.value import AbstractValue
+from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     ExternallyAppliedSpatialForce,
     ExternallyAppliedSpatialForceMultiplexer,
     MultibodyPlant,
 )
-from pydrake.multibody.tree import BodyIndex, Frame, FrameIndex, RigidBody
+from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, FrameIndex, RigidBody
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -138,6 +140,12 @@ def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
     return applied
 
 
+def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:
+    """Adds a frame at a place p (3,) in m in another frame to a plant that is not finalized."""
+    offset = RigidTransform(np.asarray(p, dtype=float))
+    return plant.AddFrame(FixedOffsetFrame(name, parent, offset))
+
+
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:
     """Connects a system with the ports `state` and `generalized_force` to a plant.
 
@@ -188,7 +196,8 @@ def _Add(
     if earlier is not None:
         before = earlier[0].get_output_port(earlier[1])
         builder.Disconnect(before, port)
-        builder.AddNamedSystem(f"forces_with_{name}", adder)
+        is_first = not builder.HasSubsystemNamed("forces")
+        builder.AddNamedSystem("forces" if is_first else f"forces_with_{name}", adder)
         builder.Connect(before, adder.get_input_port(0))
         builder.Connect(source, adder.get_input_port(1))
         source = adder.get_output_port()

@@ -18,12 +18,13 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
 
+from tetra_drake.robot.structure import PASSIVE_COLOUR
+
 PIECES, SHARE = 4, 0.4
 """Number of the pieces of a shown cable, and their length as a share of the cable's at the start:
 the pieces cover any length from SHARE to PIECES * SHARE times this."""
 SLENDERNESS = 100.0
 """Length of the shortest cable divided by the shown radius of all."""
-COLOUR = 0.0, 0.62, 0.45, 1.0
 
 
 class CableGeometry(LeafSystem):
@@ -35,7 +36,7 @@ class CableGeometry(LeafSystem):
     | geometry_pose |             | SI   | FramePoseVector of all pieces, for the scene |
 
     A shape in a SceneGraph keeps its length. So a cable consists of pieces that slide along each
-    other like those of a telescope.
+    other as a telescope's do.
     """
 
     def __init__(self, *, lengths: np.ndarray, frames: list[list[FrameId]]) -> None:
@@ -71,7 +72,7 @@ def AddCableGeometry(
     """Shows cables in a SceneGraph. `ends` is a port of CableNetwork, `lengths` has the length (m)
     of each cable by its name at the start."""
     source = scene_graph.RegisterSource(ends.get_system().get_name())
-    properties = MakePhongIllustrationProperties(COLOUR)
+    properties = MakePhongIllustrationProperties(PASSIVE_COLOUR)
     radius = min(lengths.values()) / SLENDERNESS
     frames: list[list[FrameId]] = []
     for name, length in lengths.items():

@@ -1,0 +1,90 @@
+"""Models for other simulators, as these read them: masses, inertia, nodes and forces at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from tetra_drake.analysis.equilibrium import EquilibriumStudy, study_equilibrium
+from tetra_drake.engines.mjcf import make_mjcf
+from tetra_drake.physics.cable import CableLaw
+from tetra_drake.report.structure_page import robot_of_file
+from tetra_drake.robot.sdf import make_sdf
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.systems import AddCables, Cable
+
+ROBOTS = ["thesis", "motors", "rough", "prism", "six_bar", "mast", "pair"]
+
+
+@pytest.fixture(params=ROBOTS)
+def study(request: pytest.FixtureRequest) -> EquilibriumStudy:
+    return study_equilibrium(robot_of_file(request.param))
+
+
+def test_mujoco_has_the_robot_at_rest_in_its_key_frame(study):
+    mujoco = pytest.importorskip("mujoco")
+    robot, structure = study.robot, study.robot.structure
+    text = make_mjcf(robot, rest=robot.equilibrium.state)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("rest").id)
+    mujoco.mj_forward(model, data)
+    assert model.body_mass[1:] == pytest.approx(structure.mass)
+    assert "\n    <body name=" in text  # indented
+    greatest = [np.linalg.eigvalsh(full(unit))[-1] for unit in structure.unit_inertia]
+    assert model.body_inertia[1:].max(axis=1) == pytest.approx(structure.mass * greatest)
+    sites = [data.site(name).xpos for name in structure.node_names]
+    np.testing.assert_allclose(sites, study.nodes[["x", "y", "z"]], atol=1e-9)
+    stretch = data.ten_length - model.tendon_lengthspring[:, 1]
+    tensions = np.maximum(model.tendon_stiffness * stretch, 0.0)
+    np.testing.assert_allclose(tensions, study.cables["tension"], rtol=1e-6, atol=1e-9)
+    # Forces are in balance: what is left is far below gravity.
+    assert np.abs(data.qacc.reshape(-1, 6)[:, :3]).max() < 0.01 * robot.scenario.robot.gravity
+
+
+def test_motors_have_the_names_of_the_groups(study):
+    mujoco = pytest.importorskip("mujoco")
+    model, structure = mujoco.MjModel.from_xml_string(make_mjcf(study.robot)), study.robot.structure
+    names = [model.actuator(i).name for i in range(model.nu)]
+    assert len(names) == len(set(names)) == sum(map(len, structure.groups))
+    for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
+        its = [name for name in names if name == oscillator or name.startswith(f"{oscillator} ")]
+        tendons = {model.tendon(model.actuator(name).trnid[0]).name for name in its}
+        assert tendons == {structure.cable_names[cable] for cable in group}
+
+
+def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(study):
+    structure, state = study.robot.structure, study.robot.equilibrium.state
+    builder = DiagramBuilder()
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    text = make_sdf(structure, state, name=study.robot.scenario.name)
+    Parser(plant).AddModelsFromString(text, "sdf")
+    nodes = [plant.GetFrameByName(f"node {name}") for name in structure.node_names]
+    plant.Finalize()
+    bodies = [plant.GetBodyByName(name) for name in structure.bodies]
+    assert [body.default_mass() for body in bodies] == pytest.approx(structure.mass)
+    inertia = [body.default_unit_inertia().CopyToFullMatrix3() for body in bodies]
+    np.testing.assert_allclose(inertia, list(map(full, structure.unit_inertia)), atol=1e-15)
+    context = plant.CreateDefaultContext()
+    p_WN = [node.CalcPoseInWorld(context).translation() for node in nodes]
+    np.testing.assert_allclose(p_WN, node_positions(structure, state), atol=1e-9)
+    cables = [
+        Cable(name, nodes[a], nodes[b], CableLaw(**law))
+        for name, (a, b), law in zip(
+            structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True
+        )
+    ]
+    network = AddCables(builder, plant, cables=cables, slack=structure.slack)
+    diagram = builder.Build()
+    here = network.GetMyContextFromRoot(diagram.CreateDefaultContext())
+    tensions = network.GetOutputPort("tensions").Eval(here)
+    np.testing.assert_allclose(tensions, study.cables["tension"], rtol=1e-6, atol=1e-9)
+
+
+def full(unit: np.ndarray) -> np.ndarray:
+    """Matrix (3, 3) of the six numbers of a unit inertia."""
+    xx, yy, zz, xy, xz, yz = unit
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

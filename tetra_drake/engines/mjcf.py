@@ -1,0 +1,249 @@
+"""Model of a robot and its ground for MuJoCo, in MuJoCo's XML format MJCF.
+
+Bodies, cables, actuation and gravity are the same as in the other engines; for the ground see
+engines.mujoco.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from pydrake.multibody.tree import RotationalInertia
+
+from tetra_drake.errors import InputError
+from tetra_drake.physics.actuator import has_drive
+from tetra_drake.physics.contact import NormalForce
+from tetra_drake.physics.inertia import XX
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import (
+    ACTUATED_COLOUR,
+    NODE_COLOUR,
+    PASSIVE_COLOUR,
+    STRUT_COLOUR,
+    Structure,
+)
+from tetra_drake.robot.xml_elements import add_element, xml_text
+from tetra_drake.scenario.engine_kinds import Mujoco
+from tetra_drake.scenario.scenario import Scenario
+
+Array = np.ndarray
+
+INTEGRATOR = "implicitfast"
+"""Name of MuJoCo's integrator."""
+_IMPRATIO = 1000.0
+"""MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo a
+slipping node gets a part, 1 / impratio, of the force that would hold it as normal force. With the
+default 1, nodes are thrown up and chatter."""
+_IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
+"""Impedance of contacts. It adds inertia to a contact: the body's mass along the ground, which
+keeps friction stable in long steps, and 1 / _IMPRATIO of the mass along the normal."""
+_POINT = 1e-8  # radius (m) of the spheres that touch the floor; larger ones spin thin bars
+_ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
+
+
+def check_mjcf(scenario: Scenario) -> None:
+    """Raises InputError, naming the key, if MuJoCo does not know the terrain or the friction."""
+    if scenario.terrain.plane_slope is None:
+        kind = type(scenario.terrain).__name__
+        problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline, or !Nothing"
+        raise InputError(scenario.name, "terrain", problem)
+    scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
+
+
+def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
+    """Model of a robot with a tendon for each cable and a motor for each driven one. If the
+    actuators have drives, tendons have no law, and a motor for each cable exerts its tension.
+
+    Motors are in the order of their cables; for their names see motor_names(). With a state
+    (13 bodies,) at `rest`, there is a key frame of this name, and nodes are shown. Raises
+    InputError if MuJoCo does not know the terrain or the friction.
+    """
+    scenario = robot.scenario
+    check_mjcf(scenario)
+    model = Element("mujoco", model=scenario.name)
+    steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
+    add_element(model, "compiler", inertiafromgeom="false")
+    contact = {"cone": "elliptic", "impratio": _IMPRATIO}
+    add_element(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
+    world = add_element(model, "worldbody")
+    if scenario.terrain.is_ground:
+        _add_floor(world, robot)
+    _add_fixed_nodes(world, robot.structure)
+    _add_bodies(model, world, robot)
+    if rest is not None:
+        _add_key_frame(model, robot.structure, rest)
+        _show_nodes(world, robot.structure)
+    if robot.model.strut_contact.acts:
+        _add_strut_contacts(model, robot)
+    _add_cables(model, robot)
+    _add_pushes(model, world, robot.structure)
+    return xml_text(model)
+
+
+def _add_floor(world: Element, robot: Robot) -> None:
+    """Adds the floor: a plane, the first geom."""
+    slope = robot.scenario.terrain.plane_slope or 0.0
+    pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
+    quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
+    add_element(
+        world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE
+    )
+
+
+def _add_fixed_nodes(world: Element, structure: Structure) -> None:
+    """Adds a site of the world for each fixed node."""
+    for node in range(structure.first_node[-1], len(structure.node_names)):
+        add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
+
+
+def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
+    """Adds the bodies: a site at each node, a small sphere at each contact node, and struts."""
+    structure, bodies = robot.structure, robot.model.bodies
+    pairs = add_element(model, "contact")
+    for i, body_name in enumerate(structure.bodies):
+        pos, quat = structure.p_WB[i], structure.q_WB[i]
+        body = add_element(world, "body", name=body_name, pos=pos, quat=quat)
+        add_element(body, "freejoint")
+        mass, inertia = bodies.mass[i], bodies.inertia[i]
+        is_bar = structure.first_node[i + 1] - structure.first_node[i] == 2
+        if is_bar:
+            # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
+            # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
+            # above the nodes by half the depth, so friction would soon spin a thin bar.
+            across = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())[-1]
+            moments = {"diaginertia": 3 * [across]}
+        elif structure.isotropic:
+            moments = {"diaginertia": 3 * [inertia[XX]]}
+        else:
+            moments = {"fullinertia": inertia}
+        add_element(body, "inertial", pos="0 0 0", mass=mass, **moments)
+        contact = _contact(robot, mass)
+        for node in range(structure.first_node[i], structure.first_node[i + 1]):
+            name, p_BN = structure.node_names[node], structure.p_BN[node]
+            add_element(body, "site", name=name, pos=p_BN)
+            if node in structure.contacts:
+                add_element(body, "geom", name=name, pos=p_BN, size=_POINT, **_ALONE)
+                add_element(pairs, "pair", geom1="floor", geom2=name, **contact)
+        for strut in np.flatnonzero(structure.carriers[structure.struts[:, 0]] == i):
+            ends = structure.p_BN[structure.struts[strut]]
+            size = structure.strut_radius[strut]
+            geom = {"name": f"strut {strut}", "type": "capsule", "fromto": ends, "size": size}
+            add_element(body, "geom", **geom, rgba=STRUT_COLOUR, **_ALONE)
+
+
+def _add_key_frame(model: Element, structure: Structure, state: Array) -> None:
+    """Adds the key frame "rest" with the poses of a state."""
+    poses = state[: 7 * len(structure.bodies)].reshape(-1, 7)
+    qpos = np.hstack([poses[:, 4:], poses[:, :4]])
+    add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
+
+
+def _show_nodes(world: Element, structure: Structure) -> None:
+    """Adds a sphere to look at for each node of a body, at least as thick as the thinnest strut."""
+    radii = structure.node_radius.clip(min=structure.strut_radius.min())
+    for i, body in enumerate(world.findall("body")):
+        for node in range(structure.first_node[i], structure.first_node[i + 1]):
+            shape = {"pos": structure.p_BN[node], "size": radii[node], "rgba": NODE_COLOUR}
+            add_element(body, "geom", **shape, **_ALONE)
+
+
+def _contact(robot: Robot, mass: float) -> dict:
+    """Contact settings for the floor and a body of this mass (kg)."""
+    ground = robot.scenario.ground
+    cone = robot.scenario.friction.cone(robot.scenario.name)
+    borne = robot.weight / _feet(robot)
+    rest_damping = ground.damping * borne / ground.stiffness
+    # MuJoCo's numbers are per mass, divided by 1 - impedance, and for friction multiplied by
+    # impratio. Negative numbers mean stiffness and damping.
+    per_mass = -(1.0 - _IMPEDANCE) / mass
+    return {
+        "condim": "3",
+        "friction": [cone.coefficient, cone.coefficient, 0, 0, 0],
+        "solref": [ground.stiffness * per_mass, rest_damping * per_mass],
+        "solreffriction": [ground.stiffness * per_mass, cone.damping * per_mass / _IMPRATIO],
+        "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
+    }
+
+
+def _add_strut_contacts(model: Element, robot: Robot) -> None:
+    """Adds the contact of all struts of different bodies, without friction."""
+    normal = NormalForce(*robot.model.strut_contact.normal)
+    rest_damping = normal.damping * robot.weight / normal.stiffness
+    bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
+    pairs = add_element(model, "contact")
+    for i, j in itertools.combinations(range(len(bodies)), 2):
+        if bodies[i] == bodies[j]:
+            continue
+        per_mass = (1.0 / robot.structure.mass[bodies[[i, j]]]).sum()
+        scale = -(1.0 - _IMPEDANCE) * per_mass
+        contact = {
+            "condim": "1",
+            "solref": [normal.stiffness * scale, rest_damping * scale],
+            "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
+        }
+        add_element(pairs, "pair", geom1=f"strut {i}", geom2=f"strut {j}", **contact)
+
+
+def _feet(robot: Robot) -> int:
+    """Number of nodes that bear the weight: from the blueprint, or in equilibrium."""
+    return robot.structure.feet or max(1, robot.equilibrium.feet)
+
+
+def _add_cables(model: Element, robot: Robot) -> None:
+    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if the
+    actuators have drives."""
+    structure, has_drives = robot.structure, has_drive(robot.model.actuator)
+    tendons, actuators = add_element(model, "tendon"), add_element(model, "actuator")
+    width, motors = structure.strut_radius.min() / 2, motor_names(structure)
+    for name, cable in zip(structure.cable_names, structure.cables, strict=True):
+        law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
+        least = 0.0 if structure.slack else cable["free_length"]
+        springlength = [least, cable["free_length"]]  # the spring exerts no force in between
+        colour = ACTUATED_COLOUR if name in motors else PASSIVE_COLOUR
+        own = {} if has_drives else {"springlength": springlength, **law}
+        tendon = add_element(tendons, "spatial", name=name, width=width, rgba=colour, **own)
+        for node in (cable["node_a"], cable["node_b"]):
+            add_element(tendon, "site", site=structure.node_names[node])
+        if has_drives or name in motors:
+            motor = motors.get(name, name)
+            # A motor's force lengthens its tendon, ours shortens it.
+            add_element(actuators, "motor", name=motor, tendon=name, gear="-1")
+
+
+def motor_names(structure: Structure) -> dict[str, str]:
+    """Names of the motors by their cables: the oscillator, and the cable too if the oscillator
+    drives several."""
+    names = {}
+    for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
+        for cable in (structure.cable_names[i] for i in group):
+            names[cable] = oscillator if len(group) == 1 else f"{oscillator} {cable}"
+    return names
+
+
+def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
+    """Adds an actuator for each axis of an anchor, a spring with damping, and for each component of
+    a load, a constant force."""
+    actuators, anchors, loads = add_element(model, "actuator"), structure.anchors, structure.loads
+    laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
+    for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
+        _add_push(actuators, world, f"anchor {structure.node_names[node]}", place, of_axes)
+    for node, force in zip(loads.nodes, loads.forces, strict=True):
+        of_axes = np.outer(force, [1.0, 0.0, 0.0])
+        _add_push(actuators, world, f"load {structure.node_names[node]}", np.zeros(3), of_axes)
+
+
+def _add_push(actuators: Element, world: Element, name: str, place: Array, laws: Array) -> None:
+    """Adds an actuator along each axis of the world that pushes the node after the blank of `name`.
+
+    The three numbers of each law are a constant force, and the force per displacement from `place`
+    and per velocity.
+    """
+    add_element(world, "site", name=name, pos=place)
+    ends = {"site": name.partition(" ")[2], "refsite": name}
+    for axis, gear, law in zip("xyz", np.eye(3, 6), laws, strict=True):
+        if law.any():
+            force = {"gear": gear, "gainprm": "0", "biastype": "affine", "biasprm": law}
+            add_element(actuators, "general", name=f"{name} {axis}", **ends, **force)

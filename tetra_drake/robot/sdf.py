@@ -1,0 +1,89 @@
+"""Model of a structure in SDFormat, without its cables, which SDFormat does not know.
+
+Each body is a link, with a frame "node NAME" for each node: the ends of cables, for AddCables().
+Fixed nodes are frames of the link "fixed nodes", which is welded to the world.
+"""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from tetra_drake.robot.bodies import strut_pose
+from tetra_drake.robot.structure import NODE_COLOUR, STRUT_COLOUR, Structure
+from tetra_drake.robot.xml_elements import add_element, xml_text
+from tetra_drake.scenario.blueprint import WORLD
+
+FIXED = "fixed nodes"
+"""Name of the link of the fixed nodes."""
+
+
+def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
+    """Model of the bodies of a structure, at the poses of a state (13 bodies,)."""
+    root = Element("sdf", version="1.9")
+    model = add_element(root, "model", name=name)
+    poses = state[: 7 * len(structure.bodies)].reshape(-1, 7)
+    for body, pose in enumerate(poses):
+        link = add_element(model, "link", name=structure.bodies[body])
+        _add_pose(link, RigidTransform(Quaternion(pose[:4] / np.linalg.norm(pose[:4])), pose[4:]))
+        _add_inertia(link, structure.mass[body], structure.unit_inertia[body])
+        _add_visuals(link, structure, body)
+    if (structure.carriers == WORLD).any():
+        add_element(model, "link", name=FIXED)
+        joint = add_element(model, "joint", name=FIXED + " weld", type="fixed")
+        add_element(joint, "parent", "world")
+        add_element(joint, "child", FIXED)
+    links = *structure.bodies, FIXED
+    for node, p_BN in enumerate(structure.p_BN):
+        link_name, frame = links[structure.carriers[node]], f"node {structure.node_names[node]}"
+        _add_pose(add_element(model, "frame", name=frame, attached_to=link_name), p_BN)
+    return xml_text(root)
+
+
+def _add_pose(parent: Element, pose: RigidTransform | np.ndarray) -> None:
+    """Adds a pose, or a position (3,) in m."""
+    X = pose if isinstance(pose, RigidTransform) else RigidTransform(pose)
+    angles = RollPitchYaw(X.rotation()).vector()
+    add_element(parent, "pose", np.concatenate([X.translation(), angles]))
+
+
+def _add_inertia(link: Element, mass: float, unit_inertia: np.ndarray) -> None:
+    """Adds the inertia of a body about its origin, its centre of mass."""
+    inertial = add_element(link, "inertial")
+    add_element(inertial, "mass", mass)
+    inertia = add_element(inertial, "inertia")
+    for axes, value in zip(("xx", "yy", "zz", "xy", "xz", "yz"), mass * unit_inertia, strict=True):
+        add_element(inertia, f"i{axes}", value)
+
+
+def _add_visuals(link: Element, structure: Structure, body: int) -> None:
+    """Adds the struts of a body, and its spheres."""
+    table, p_BN = structure.strut_table, structure.p_BN
+    for strut in range(table.first_strut[body], table.first_strut[body + 1]):
+        a, b = structure.struts[strut]
+        name = f"strut {structure.strut_name(strut)}"
+        shape = _add_visual(link, name, strut_pose(p_BN[a], p_BN[b]), "cylinder", STRUT_COLOUR)
+        add_element(shape, "radius", table.radius[strut])
+        add_element(shape, "length", table.length[strut])
+    for node in range(structure.first_node[body], structure.first_node[body + 1]):
+        if structure.node_radius[node]:
+            name = f"sphere {structure.node_names[node]}"
+            shape = _add_visual(link, name, p_BN[node], "sphere", NODE_COLOUR)
+            add_element(shape, "radius", structure.node_radius[node])
+
+
+def _add_visual(
+    link: Element,
+    name: str,
+    pose: RigidTransform | np.ndarray,
+    kind: str,
+    colour: tuple[float, ...],
+) -> Element:
+    """Adds a visual shape, and returns the shape's element."""
+    visual = add_element(link, "visual", name=name)
+    _add_pose(visual, pose)
+    add_element(add_element(visual, "material"), "diffuse", colour)
+    return add_element(add_element(visual, "geometry"), kind)
