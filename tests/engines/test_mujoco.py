@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 import xarray
-from helpers.actuations import LIMITED
 from helpers.bars import CROSSED, RADIUS, STIFFNESS, loose_bars
 
 from tetra_drake.engines import mujoco as engine
@@ -164,8 +163,6 @@ def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
         ("friction.backward", 0.5),
         ("friction.lateral", 2.0),
         ("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2)),
-        ("actuation", LIMITED["winch"]),
-        ("actuation", LIMITED["motor"]),
     ],
 )
 def test_what_mujoco_cannot_simulate_is_refused(short, key, value, monkeypatch, refused):

@@ -3,6 +3,9 @@
 Bodies, cables, actuation and gravity are the same as in the other engines. The ground differs: it
 is MuJoCo's soft contact with a friction cone.
 
+- Actuators with drives (winches and tension motors): each cable's tension is computed by the law of
+  the other engines, from MuJoCo's lengths at the beginning of each step. Otherwise cables are
+  MuJoCo's own tendons.
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
   grows with depth. Both agree at the depth of a robot in equilibrium.
 - Contact of struts: capsules with the scenario's stiffness. The damping is constant, too.
@@ -34,7 +37,8 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.actuator import Actuator, actuator_force, has_drive
+from tetra_drake.physics.cable import PASSIVE, Cables, cable_tension, law_of
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NormalForce
 from tetra_drake.physics.inertia import XX
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
@@ -46,6 +50,7 @@ from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.simd.compiling import compiled
 
 Array = np.ndarray
 
@@ -62,7 +67,6 @@ _POINT = 1e-8  # radius (m) of the spheres that touch the floor; larger ones spi
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
 _FLOOR = 0  # index of the floor's geom
 _STRETCH = 5000  # steps between two checks of stability
-_NO_DRIVES = np.zeros(0)  # the actuators have no states
 _OBSERVED = 8  # steps from one observation to the next; 1 ms with the default step
 INTEGRATOR = "implicitfast"
 """Name of MuJoCo's integrator."""
@@ -88,7 +92,6 @@ class MujocoEngine(Engine):
             kind = type(scenario.terrain).__name__
             problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline, or !Nothing"
             raise InputError(scenario.name, "terrain", problem)
-        scenario.actuation.check_mujoco(scenario.name)
         scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
     def simulate(self, simulation: GaitSimulation) -> SimulationResult:
@@ -121,7 +124,8 @@ def installed() -> bool:
 
 
 def make_mjcf(robot: Robot) -> str:
-    """The robot and its ground in MuJoCo's XML format, with one motor per driven cable."""
+    """The robot and its ground in MuJoCo's XML format, with one motor per driven cable. If the
+    actuators have drives, tendons have no law, and a motor for each cable exerts its tension."""
     scenario = robot.scenario
     model = Element("mujoco", model=scenario.name)
     steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
@@ -135,7 +139,7 @@ def make_mjcf(robot: Robot) -> str:
     _add_bodies(model, world, robot)
     if robot.model.strut_contact.acts:
         _add_strut_contacts(model, robot)
-    _add_cables(model, robot.structure)
+    _add_cables(model, robot)
     _add_pushes(model, world, robot.structure)
     return tostring(model, encoding="unicode")
 
@@ -168,6 +172,8 @@ class _Simulator:
         self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(nodes)}
         driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # index of each motor's signal
+        self.has_drives = has_drive(robot.model.actuator)
+        """True if the actuators have states."""
         names = np.array(robot.structure.node_names)[robot.structure.contacts]
         self._contacts = [self._model.site(name).id for name in names]
 
@@ -184,6 +190,39 @@ class _Simulator:
         (states,), _ = rollout.rollout(self._model, [self._data], state, self._controls(signals))
         return states
 
+    def step_through(self, state: Array, signals: Array, drives: Array) -> tuple[Array, Array]:
+        """MuJoCo's states after each step from a state, as roll_out(), and the drives (steps,
+        drives) of the actuators. `drives` (drives,) are those at the state."""
+        mujoco, model, data = self._mujoco, self._model, self._data
+        kind, drives = mujoco.mjtState.mjSTATE_FULLPHYSICS, drives.copy()
+        states = np.empty((len(signals), state.size))
+        all_drives = np.empty((len(signals), drives.size))
+        mujoco.mj_setState(model, data, state, kind)
+        for k, row in enumerate(signals):
+            mujoco.mj_step1(model, data)
+            self._pull(data, row, drives, self._step)
+            mujoco.mj_step2(model, data)
+            mujoco.mj_getState(model, data, states[k], kind)
+            all_drives[k] = drives
+        return states, all_drives
+
+    def _pull(self, data: Any, signals: Array, drives: Array, step: float) -> None:
+        """Sets the tensions of all cables for signals (n,), and advances the drives by a step
+        (s)."""
+        robot = self._robot.model
+        tensions = data.ctrl[: robot.cables.signal.size]
+        pull_cables(
+            robot.cables,
+            robot.actuator,
+            robot.slack,
+            data.ten_length,
+            data.ten_velocity,
+            signals,
+            step,
+            drives,
+            tensions,
+        )
+
     def _controls(self, signals: Array) -> Array:
         """MuJoCo's controls (steps, actuators) for signals (steps, n). Anchors and loads have the
         control 0."""
@@ -192,20 +231,28 @@ class _Simulator:
         return controls
 
     def observe(
-        self, observer: Observer, states: Array, signals: Array, *, first: int, begin: int
+        self,
+        observer: Observer,
+        states: Array,
+        drives: Array,
+        signals: Array,
+        *,
+        first: int,
+        begin: int,
     ) -> None:
         """Passes states to an observer: every _OBSERVED-th one, and the state at the end of the
-        start-up. `states` are after step `first` and the following ones. `signals` begin at step
-        `begin`."""
+        start-up. `states` and `drives` are after step `first` and the following ones. `signals`
+        begin at step `begin`."""
         begins = round(self._robot.scenario.cpg.start_up / self._step)
         observed = np.arange(first + 1, first + len(states) + 1)
         rows = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
         if not rows.size:
             return
         steps: list[int] = observed[rows].tolist()
-        for step, state in zip(steps, self.body_states(states[rows]), strict=True):
+        moments = zip(steps, self.body_states(states[rows]), drives[rows], strict=True)
+        for step, state, of_step in moments:
             now = signals[min(step - begin, len(signals) - 1)]
-            observer.add(self._step * step, state, now, _NO_DRIVES)
+            observer.add(self._step * step, state, now, of_step)
 
     def check(self, states: Array, first: int) -> None:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
@@ -234,21 +281,24 @@ class _Simulator:
         parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
-    def motion(self, times: Array, states: Array, signals: Array) -> Motion:
-        """Motion from MuJoCo's states at `times` (s), with their signals."""
+    def motion(self, times: Array, states: Array, signals: Array, drives: Array) -> Motion:
+        """Motion from MuJoCo's states at `times` (s), with their signals and drives."""
         data = self._mujoco.MjData(self._model)
-        rows = zip(states, signals, strict=True)
+        rows = zip(states, signals, drives, strict=True)
         ground_forces = np.array([self._ground_forces(data, *row) for row in rows])
         modes = np.zeros((*ground_forces.shape[:2], MODE_COLUMNS))
         modes[:, :, CONTACT] = ground_forces[:, :, 2] > 0.0
-        drives = np.tile(_NO_DRIVES, (len(times), 1))
         return Motion(times, self.body_states(states), signals, modes, drives, ground_forces)
 
-    def _ground_forces(self, data: Any, state: Array, signals: Array) -> Array:
+    def _ground_forces(self, data: Any, state: Array, signals: Array, drives: Array) -> Array:
         """MuJoCo's contact forces on the nodes along t1, t2 and n (contacts, 3), in N."""
         mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        data.ctrl[:] = self._controls(signals[np.newaxis])[0]
+        if self.has_drives:
+            mujoco.mj_step1(model, data)
+            self._pull(data, signals, drives.copy(), 0.0)
+        else:
+            data.ctrl[:] = self._controls(signals[np.newaxis])[0]
         mujoco.mj_forward(model, data)
         forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
@@ -280,6 +330,8 @@ class _MujocoWalk:
         self._simulator, self._observer = _Simulator(robot), Observer(robot)
         self._state = self._simulator.start()
         self._kept = np.tile(self._state, (len(self.times), 1))
+        self._drives = robot.starting_drives()
+        self._drives_kept = np.tile(self._drives, (len(self.times), 1))
         self._done, self._held, self._wall_time = 0, self.signals[0], 0.0
 
     def hold(self, signals: Array) -> None:
@@ -299,25 +351,31 @@ class _MujocoWalk:
         if begin == 0 and len(signals):
             self.signals[0] = signals[0]
             start = simulator.body_states(self._kept[:1])[0]
-            self._observer.add(0.0, start, signals[0], _NO_DRIVES)
+            self._observer.add(0.0, start, signals[0], self._drives)
         with Rollout(nthread=0) as rollout:
             for first in range(0, len(signals), _STRETCH):
                 check_time()
                 some = signals[first : first + _STRETCH]
-                states = simulator.roll_out(rollout, self._state, some)
-                self._state, done = states[-1], self._done
+                if simulator.has_drives:
+                    states, drives = simulator.step_through(self._state, some, self._drives)
+                else:
+                    states = simulator.roll_out(rollout, self._state, some)
+                    drives = np.empty((len(states), 0))
+                self._state, self._drives, done = states[-1], drives[-1], self._done
                 here = (done < self._steps_kept) & (self._steps_kept <= done + len(states))
                 rows = self._steps_kept[here] - done - 1
                 self._kept[here], self.signals[here] = states[rows], some[rows]
-                simulator.observe(self._observer, states, signals, first=done, begin=begin)
+                self._drives_kept[here] = drives[rows]
+                simulator.observe(self._observer, states, drives, signals, first=done, begin=begin)
                 simulator.check(states, done)
                 self._done += len(states)
         self._wall_time += time.perf_counter() - started
 
     def readings(self) -> Readings:
         """The readings of the robot now."""
-        now, states, signals = np.array([self.step * self._done]), self._state, self._held
-        moment = self._simulator.motion(now, states[np.newaxis], signals[np.newaxis])
+        now, signals = np.array([self.step * self._done]), self._held
+        last = (self._state[np.newaxis], signals[np.newaxis], self._drives[np.newaxis])
+        moment = self._simulator.motion(now, *last)
         assert moment.ground_forces is not None
         return readings_at(
             self._simulation.robot,
@@ -325,21 +383,21 @@ class _MujocoWalk:
             state=moment.states[0],
             modes=moment.modes[0],
             signals=signals,
-            drives=_NO_DRIVES,
+            drives=self._drives,
             ground_forces=moment.ground_forces[0],
         )
 
     def result(self) -> SimulationResult:
         """The result, at the end. Raises SimulationFailure if a damped cable went slack."""
         robot, totals = self._simulation.robot, self._observer.totals()
-        is_damped = robot.structure.cables["damping"].any()
+        is_damped = robot.structure.cables["damping"].any() and not self._simulator.has_drives
         if robot.model.slack and is_damped and totals.tension.of_all[0] <= 0.0:
             reason = "a cable went slack, and the damper of MuJoCo's tendon would push"
             raise SimulationFailure(time=float(totals.time[0]), reason=reason)
         return make_result(
             robot,
             self._simulation.gait,
-            self._simulator.motion(self.times, self._kept, self.signals),
+            self._simulator.motion(self.times, self._kept, self.signals, self._drives_kept),
             totals=totals,
             work=IntegratorWork(
                 scheme=INTEGRATOR,
@@ -350,6 +408,37 @@ class _MujocoWalk:
             wall_time=self._wall_time,
             record=self._simulation.record,
         )
+
+
+@compiled
+def pull_cables(
+    cables: Cables,
+    actuator: Actuator,
+    slack: bool,
+    lengths: Array,
+    rates: Array,
+    signals: Array,
+    step: float,
+    drives: Array,
+    tensions: Array,
+) -> None:
+    """Writes the tensions (cables,) in N, and advances the drives (drives,) by a step (s).
+
+    `lengths` (cables,) in m and their `rates` are those of all cables, `signals` (n,) are in N.
+    With `slack`, passive cables do not push.
+    """
+    drive = 0
+    for i in range(tensions.size):
+        law, driver = law_of(cables, i), cables.signal[i]
+        if driver == PASSIVE:
+            tensions[i] = cable_tension(lengths[i], rates[i], 0.0, law)
+            if slack:
+                tensions[i] = max(tensions[i], 0.0)
+            continue
+        driven = actuator_force(actuator, drives[drive], lengths[i], rates[i], signals[driver], law)
+        tensions[i] = driven.tension
+        drives[drive] += step * driven.rate
+        drive += 1
 
 
 def _add_floor(world: Element, robot: Robot) -> None:
@@ -443,17 +532,22 @@ def _feet(robot: Robot) -> int:
     return robot.structure.feet or max(1, robot.equilibrium.feet)
 
 
-def _add_cables(model: Element, structure: Structure) -> None:
-    """Adds a tendon for each cable and a motor for each driven cable."""
+def _add_cables(model: Element, robot: Robot) -> None:
+    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if the
+    actuators have drives."""
+    structure, has_drives = robot.structure, has_drive(robot.model.actuator)
     tendons, actuators = _add(model, "tendon"), _add(model, "actuator")
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]
         springlength = [least, cable["free_length"]]  # the spring exerts no force in between
-        tendon = _add(tendons, "spatial", name=name, springlength=springlength, **law)
+        own = {} if has_drives else {"springlength": springlength, **law}
+        tendon = _add(tendons, "spatial", name=name, **own)
         for node in (cable["node_a"], cable["node_b"]):
             _add(tendon, "site", site=structure.node_names[node])
-        if cable["signal"] != PASSIVE:  # a motor's force lengthens its tendon, ours shortens it
+        if (
+            has_drives or cable["signal"] != PASSIVE
+        ):  # a motor's force lengthens its tendon, ours shortens it
             _add(actuators, "motor", name=name, tendon=name, gear="-1")
 
 

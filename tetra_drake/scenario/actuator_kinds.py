@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from tetra_drake.errors import InputError
 from tetra_drake.scenario import quantities
 from tetra_drake.scenario.metrics import LIMITS
 from tetra_drake.scenario.quantities import Length, Speed, Time
@@ -56,11 +55,6 @@ class ActuatorKind(Section):
         `free_length` (m) is the least commanded free length with these signals."""
         return ""
 
-    def check_mujoco(self, source: object) -> None:
-        """Raises InputError, naming `source` and key, if MuJoCo cannot simulate this kind."""
-        problem = f"found !{self.tag}, but mujoco knows forces on cables only: !Force"
-        raise InputError(source, "actuation", problem)
-
     def drives(self, cables: DrivenCables) -> Any:
         """States of the actuators (..., drives); see physics.actuator."""
         raise NotImplementedError
@@ -85,9 +79,6 @@ class Force(ActuatorKind):
         from tetra_drake.physics import actuator
 
         return actuator.Actuator.of(actuator.DIRECT)
-
-    def check_mujoco(self, source: object) -> None:
-        pass
 
     def drives(self, cables: DrivenCables) -> Any:
         return cables.signal[..., :0]
