@@ -73,7 +73,7 @@ INTEGRATOR = "implicitfast"
 MAX_SPEED = 1.0
 """Largest speed of a body (m/s) of a robot that starts on the ground; less than in other engines.
 With too long a step a robot is thrown about, sometimes far forward. A walking robot stays below
-0.2 m/s."""
+0.2 m/s. A robot that may roll over can be faster by the speed of a fall from its own height."""
 
 
 class MujocoEngine(Engine):
@@ -163,9 +163,8 @@ class _Simulator:
             raise InputError(robot.scenario.name, "robot", problem) from error
         self._data = mujoco.MjData(self._model)
         self._step = robot.scenario.settings_of(Mujoco).step
-        height = max(
-            0.0, node_positions(robot.structure, robot.structure.initial_state)[:, 2].min()
-        )
+        heights = node_positions(robot.structure, robot.structure.initial_state)[:, 2]
+        height = max(0.0, heights.min() if robot.structure.points_ahead else heights.max())
         fall = math.sqrt(2.0 * robot.scenario.robot.gravity * height)
         self._max_speed = MAX_SPEED + fall
         nodes = [robot.structure.node_names[node] for node in robot.structure.contacts]
