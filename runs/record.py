@@ -147,9 +147,6 @@ EXPERIMENTS = {
     ),
     "prism": Experiment("a prism of three struts", "prism", _STRUCTURE),
     "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE),
-    "rover": Experiment(
-        "a six-bar rover on winches, without feedback, ten trials", "rover", _by(CmaEs(), 10, 600)
-    ),
     "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE),
     "pair": Experiment("two nested tetrahedra", "pair", _STRUCTURE),
     "winch": Experiment("stiff cables on winches", "winch", _by(CmaEs(), 3, 1500), exported=True),

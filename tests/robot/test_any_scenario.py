@@ -36,7 +36,7 @@ ROW = {
 }
 STRUCTURE = {"robot.contacts": ["all"], "robot.actuated": [{}]}
 SCENARIOS = {"thesis": ROW, "turning": ROW, "winch": ROW, "feedback": ROW}
-SCENARIOS |= dict.fromkeys(("prism", "six_bar", "mast", "pair"), STRUCTURE)
+SCENARIOS |= dict.fromkeys(("prism", "six_bar", "rover", "mast", "pair"), STRUCTURE)
 """Shipped scenarios, with values of what is no number."""
 
 

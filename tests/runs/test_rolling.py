@@ -1,0 +1,49 @@
+"""The rover that rolls: the claims of its page."""
+
+import math
+
+import numpy as np
+import pytest
+import rolling
+
+from tetra_drake.engines.simulation import Simulation
+
+
+@pytest.fixture(scope="module")
+def best():
+    return rolling.best_of(rolling.load_policies())
+
+
+def test_the_best_policy_rolls_disturbed_rovers(best):
+    robots = Simulation(rolling.rover(), count=8)
+    rolled = rolling.roll(robots, np.tile(best["coefficients"], (8, 1)), seed=77)
+    assert sum(map(rolling.rolls, rolled)) >= 7
+    # One turn of a ball takes it on by less than the circle through its nodes.
+    radius = 0.5 * 0.6604 * math.sqrt(1.25)  # parallel rods are half a rod apart
+    ways = [metrics.distance / metrics.rolled for metrics in rolled if rolling.rolls(metrics)]
+    assert 0.4 * radius < min(ways) <= max(ways) < radius
+
+
+def test_a_rover_rolls_if_it_turns_twice_and_straight(best):
+    metrics = rolling.drive(best["coefficients"], "compiled").metrics
+    assert rolling.rolls(metrics) and not rolling.rolls(None)
+    turned = {"rolled": 4.1 * math.pi, "distance": 3.0, "lateral_drift": 0.5}
+    changed = metrics.__class__(**metrics.__dict__ | turned)
+    assert rolling.rolls(changed)
+    for name, value in {"rolled": 3.9 * math.pi, "lateral_drift": 0.7, "distance": -3.0}.items():
+        assert not rolling.rolls(metrics.__class__(**changed.__dict__ | {name: value})), name
+
+
+def test_a_policy_depends_on_the_shape_alone(best):
+    """It neither knows where the rover is nor how far it has rolled by whole periods."""
+    robots = Simulation(rolling.rover(), count=1)
+    policy = rolling.RollingPolicy.of(robots, np.array(best["coefficients"]))
+    readings = robots.state.rows(0)
+    moved = readings._replace(
+        p_WN=readings.p_WN + np.array([3.0, -2.0, 0.5]), time=readings.time + 5.0 * rolling.PERIOD
+    )
+    lengths = policy(readings)
+    assert np.ptp(lengths) > 0.01
+    np.testing.assert_allclose(policy(moved), lengths, atol=1e-9)
+    assert (lengths <= (1.0 + rolling.MOST) * policy.rest).all()
+    assert (lengths >= (1.0 - rolling.MOST) * policy.rest).all()
