@@ -8,6 +8,7 @@ import zlib
 import numpy as np
 import pytest
 from helpers.analytic import measures, optimise, small_scenario
+from threadpoolctl import threadpool_limits
 
 from tetra_drake.optimizers import cma_es, optimizer_of, quality_diversity
 from tetra_drake.optimizers.base import Evaluation
@@ -62,6 +63,17 @@ def test_the_generator_alone_decides_what_is_asked_for(kind):
     np.testing.assert_array_equal(first, same)
     assert not np.array_equal(same, other)
     assert str(np.random.get_state()) == before
+
+
+def test_digits_do_not_depend_on_the_threads_of_linear_algebra():
+    # Of a matrix with some 145 rows. This tells on a machine with two cores or more.
+    asked = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            batches, _ = run(CmaEs(sample=0), budget=400, **{"robot.tetrahedra": 10})
+        asked.append(np.concatenate(batches))
+    assert asked[0].shape[1] > 140
+    np.testing.assert_array_equal(*asked)
 
 
 @pytest.mark.parametrize("kind", ALL)

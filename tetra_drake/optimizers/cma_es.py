@@ -8,11 +8,13 @@ found.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
+from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import MIDDLE, Generational, Matrix, Ranges
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
@@ -60,6 +62,15 @@ class CmaEs(Generational[kinds.CmaEs]):
             _Search(population, self._ranges, self.generator, start)
             for start in points[: self._starts]
         ]
+
+    def ask(self) -> list[Vector]:
+        # With many parameters, digits depend on the number of threads of linear algebra.
+        with threadpool_limits(1, user_api="blas"):
+            return super().ask()
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
+        with threadpool_limits(1, user_api="blas"):
+            return super().tell(evaluations)
 
     def _draw(self) -> Matrix:
         return self._current.draw() if self._searches else self._random(self.settings.sample)
