@@ -227,8 +227,8 @@ def policy_table(policies: Sequence[dict[str, Any]]) -> Table:
 def lapse_figure(result: SimulationResult) -> Figure:
     """The rover from the side at six times of its first turn, and the way of its centre over the
     whole time."""
-    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
-    lapse, path = figure.subplots(2, 1, height_ratios=(2.0, 1.0))
+    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+    lapse, path = figure.subplots(2, 1, height_ratios=(3.0, 1.0))
     trajectory, structure = result.trajectory, result.robot.structure
     assert trajectory is not None
     nodes = trajectory.p_WN.values
@@ -252,8 +252,10 @@ def lapse_figure(result: SimulationResult) -> Figure:
 
 
 def evolve_networks() -> list[dict[str, float]]:
-    """Turns, way (m) and drift (m) of the fittest gait of each of TRIALS trials, in which CMA-ES
-    evolves a network of oscillators, an open loop, on the undisturbed rover."""
+    """Turns, way (m) and drift (m) of the fittest gait of each of TRIALS trials.
+
+    CMA-ES evolves networks of oscillators, open loops, on the undisturbed rover.
+    """
     changes = {"optimizer": CmaEs(), "evolution.trials": TRIALS}
     scenario = load_scenario("rover").with_changes(changes | {"evolution.evaluations": NETWORKS})
     resume = (SCRATCH / MANIFEST).exists()

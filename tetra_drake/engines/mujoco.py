@@ -423,8 +423,8 @@ def pull_cables(
 ) -> None:
     """Writes the tensions (cables,) in N, and advances the drives (drives,) by a step (s).
 
-    `lengths` (cables,) in m and their `rates` are those of all cables, `signals` (n,) are in N.
-    With `slack`, passive cables do not push.
+    `lengths` (cables,) are in m, their `rates` in m/s, `signals` (n,) in N. With `slack`, passive
+    cables do not push.
     """
     drive = 0
     for i in range(tensions.size):
