@@ -307,9 +307,9 @@ two turns and drift by at most 20 % of their way.**
 
 Each winch shortens its cable by a polynomial in x and z, the place of the cable's middle around the
 rover's centre, as seen from the ground. All 24 cables have the same polynomial of second degree,
-so it has eight coefficients, two of them with a clock of 2 s. The rover leans forward, whatever
-face it stands on, and falls over its front edge. A rover can know the places from the orientations
-of its rods and the lengths of its cables. It steers by nothing.
+so it has eight coefficients, two of them with a clock of 2 s. The rover keeps its shape in the
+world while it rolls through it, whatever face it stands on. It can know the places from the
+orientations of its rods and the lengths of its cables. It does not steer.
 
 CMA-ES evolves the coefficients: 24 generations of 16 policies, each on four disturbed robots for
 10 s; the fitness is the mean of the worse two. The draws of this table were not used in evolution.
@@ -326,21 +326,25 @@ each trial. It knows nothing of the ground.
 
 {networks}
 
-No network makes a turn in 20 s. Smaller signals (`cpg.gain` of 100 and 200 N) did not tip the
-rover at all; 600 N gave 0.94 turns. With feedback of length, load and pitch to the
-oscillators one trial of 600 gaits with 200 N gave 0.83 turns.
+No network makes a turn in 20 s. In single trials of another length and objective, smaller signals
+(`cpg.gain` of 100 and 200 N) did not tip the rover at all, 600 N gave 0.94 turns, and 200 N with
+feedback of length, load and pitch to the oscillators 0.83 turns.
 
 ## What disappointed
 
 - Evolution depends on luck: {lucky} of {trials} trials found a policy that rolls 90 % of the
-  disturbed robots. Others lean so far that the rover rests on its front.
-- Without the clock, a rover in ten or more came to rest between two faces.
-- The winches are at their greatest speed most of the time.
+  disturbed robots.
+- Without the clock, rovers come to rest: the best policies of two trials rolled 44 to 97 % of 32
+  disturbed robots.
+- A limit of the winches binds for {limited} of the time.
 """
 
 
-def page(policies: Sequence[dict[str, Any]], networks: Sequence[dict[str, float]]) -> str:
-    """The page about policies and networks."""
+def page(
+    policies: Sequence[dict[str, Any]], networks: Sequence[dict[str, float]], *, limited: float
+) -> str:
+    """The page about policies and networks. `limited` is the share of time at a limit of a winch
+    with the best policy."""
     best = best_of(policies)
     on = best["engines"]
     rolling = [each for each in policies if each["rolls"] >= 0.9 * each["draws"]]
@@ -355,6 +359,7 @@ def page(policies: Sequence[dict[str, Any]], networks: Sequence[dict[str, float]
         policies=policy_table(policies).markdown(),
         networks=network_table(networks).markdown(),
         lucky=len(rolling),
+        limited=share(limited),
         trials=len(policies),
     )
 
@@ -374,7 +379,8 @@ def main() -> None:
     save_figure(lapse_figure(result), HERE, "lapse", kinds=["svg"])
     result.save_replay(HERE / REPLAY, viewer=HERE.parent / VIEWER)
     take_pictures(HERE / REPLAY, HERE / FILM, HERE / PICTURE)
-    write_whole(HERE / "README.md", page(policies, evolve_networks()))
+    limited = result.metrics.actuator_limited
+    write_whole(HERE / "README.md", page(policies, evolve_networks(), limited=limited))
     print(HERE / "README.md")
 
 
