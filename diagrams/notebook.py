@@ -2,7 +2,7 @@
 
     python diagrams/notebook.py
 
-The cells are those of the scripts; in place of a picture in a file, a figure is shown. Needs the
+It has the cells of the scripts; in place of a picture in a file, a figure is shown. Needs the
 packages nbclient and ipykernel (`pip install -e '.[test]'`).
 """
 
