@@ -13,9 +13,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-import shutil
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +23,7 @@ from PIL import Image
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
+from tetra_drake.visualization.browser import do, launch_browser, wait_until_loaded
 from tetra_drake.visualization.scene import COLOURS
 
 if TYPE_CHECKING:
@@ -48,50 +48,6 @@ SUPERSAMPLING = 2
 START, END, STEP = 4.0, 10.0, 0.2  # first and last frame, and time between frames, in s
 FRAME_TIME = 100  # ms: twice as fast as the robot walks
 INSTANTS = 4  # of a still
-
-_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-_SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-
-
-def find_browser() -> str | None:
-    """Path of an installed Chromium or Chrome."""
-    return next((path for path in map(shutil.which, _NAMES) if path), None)
-
-
-@contextlib.contextmanager
-def launch_browser() -> Iterator[Browser]:
-    """A headless browser that draws WebGL without a graphics card.
-
-    Raises InputError if none is installed.
-    """
-    from playwright.sync_api import sync_playwright
-
-    path = find_browser()
-    if path is None:
-        raise InputError("browser", "", f"none is installed, expected one of {', '.join(_NAMES)}")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=_SOFTWARE_WEBGL)
-        with contextlib.closing(browser):
-            yield browser
-
-
-def wait_until_loaded(page: Page) -> None:
-    """Waits until a replay page can play."""
-    page.wait_for_function("window.film")
-
-
-def do(page: Page, call: str, *arguments: object) -> None:
-    """Calls a function of the page (see film.js), such as "show", and waits until the page is
-    drawn."""
-    page.evaluate(
-        """async ([call, given]) => {
-            film[call](...given);
-            const frame = () => new Promise(requestAnimationFrame);
-            await frame();
-            await frame();
-        }""",
-        [call, list(arguments)],
-    )
 
 
 def shot(page: Page) -> Image.Image:

@@ -30,6 +30,10 @@ class _Port(NamedTuple):
     name: str
 
 
+OUT = Path("out/diagrams")
+"""Folder for pictures. Those in the README are in the folder of this file."""
+
+
 def save_block_diagram(diagram: Diagram, path: Path) -> None:
     """Writes the block diagram of a diagram as SVG.
 

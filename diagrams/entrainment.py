@@ -26,10 +26,11 @@ leads, and it can follow a faster one.
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
-from block_diagram import save_block_diagram
+from block_diagram import OUT, save_block_diagram
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
@@ -155,7 +156,7 @@ def draw() -> Figure:
     return figure
 
 
-def main(out: Path = Path(__file__).parent) -> None:
+def main(out: Path = OUT) -> None:
     """Simulates the loops and writes the pictures."""
     save_block_diagram(make_diagram(ratio=1.0, feedback=FEEDBACK), out / "entrainment.svg")
     balanced = own_frequency()
@@ -165,4 +166,4 @@ def main(out: Path = Path(__file__).parent) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*[Path(folder) for folder in sys.argv[1:2]])

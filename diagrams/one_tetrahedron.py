@@ -16,7 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from live import SignalCurves
 from pydrake.common.eigen_geometry import Quaternion
+from pydrake.geometry import Meshcat
 from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
@@ -29,6 +31,7 @@ from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_no
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS, TOP
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems import AddGroundContact
+from tetra_drake.visualization.scene import add_robot
 
 BASE = BOTTOM_LEFT, BOTTOM_RIGHT, TOP
 LEADING, TRAILING = TOP, BOTTOM_LEFT
@@ -75,6 +78,8 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
         node_radius=row.node_radius[:nodes],
         node_density=row.node_density[:nodes],
         node_mass=row.node_mass[:nodes],
+        anchor_stiffness=row.anchor_stiffness[:nodes],
+        anchor_damping=row.anchor_damping[:nodes],
         payload=row.payload[:1],
         cable_names=(),
         cable_groups=(),
@@ -96,8 +101,9 @@ def start_axes(structure: Structure) -> np.ndarray:
     return RotationMatrix(Quaternion(structure.q_WB[0])).matrix().T
 
 
-def make_diagram(scenario: Scenario) -> Diagram:
-    """Diagram of the tetrahedron and the ground, with logs of their outputs."""
+def make_diagram(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Diagram:
+    """Diagram of the tetrahedron and the ground, with logs of their outputs. With `meshcat` it
+    shows the tetrahedron and the friction of its nodes."""
     tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
@@ -108,20 +114,36 @@ def make_diagram(scenario: Scenario) -> Diagram:
     base = [nodes[node] for node in BASE]
     ground = AddGroundContact(builder, plant, frames=base, ground=tetrahedron.ground, witness=True)
 
-    LogVectorOutput(plant.get_state_output_port(), builder).set_name("state_log")
+    state = plant.get_state_output_port()
+    LogVectorOutput(state, builder).set_name("state_log")
     for port in ("normal_forces", "friction_forces", "modes"):
         LogVectorOutput(ground.GetOutputPort(port), builder).set_name(f"{port}_log")
+    if meshcat:
+        add_robot(meshcat, tetrahedron.structure)
+        body = f"/robot/{tetrahedron.structure.bodies[0]}"
+        friction = ground.GetOutputPort("friction_forces")
+        curves = SignalCurves(meshcat, count=friction.size(), window=0.1, scale=2.0, body=body)
+        builder.AddNamedSystem("curves", curves)
+        builder.Connect(friction, curves.GetInputPort("signals"))
+        builder.Connect(state, curves.GetInputPort("state"))
     return builder.Build()
 
 
 def let_go(
-    scenario: Scenario, *, height: float, velocity: Sequence[float], duration: float
+    scenario: Scenario,
+    *,
+    height: float,
+    velocity: Sequence[float],
+    duration: float,
+    meshcat: Meshcat | None = None,
 ) -> Samples:
     """Simulates the tetrahedron. It starts with its base at `height` (m) above the ground, with a
-    `velocity` (3,) in m/s along t1, t2 and the ground's normal."""
+    `velocity` (3,) in m/s along t1, t2 and the ground's normal. With `meshcat` it is shown, a
+    hundred times slower."""
     tetrahedron = make_standing_tetrahedron(scenario).structure
-    diagram = make_diagram(scenario)
+    diagram = make_diagram(scenario, meshcat=meshcat)
     simulator = Simulator(diagram)
+    simulator.set_target_realtime_rate(0.01 if meshcat else 0.0)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_target_accuracy(1e-4)
     context = simulator.get_mutable_context()
     context.SetAccuracy(1e-4)  # localises contact and stiction changes to 1e-4 times 0.01 s

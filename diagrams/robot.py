@@ -24,7 +24,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from block_diagram import save_block_diagram
+from block_diagram import OUT, save_block_diagram
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.engines.sampler import Sampler
@@ -40,7 +40,7 @@ DIAGRAMS = Path(__file__).parent
 BEST_GAIT = DIAGRAMS.parent / "runs" / "thesis" / "trial_05" / "best_gait.json"
 
 
-def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = DIAGRAMS) -> None:
+def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = OUT) -> None:
     """Simulates the beginning of a gait and writes the pictures."""
     scenario = load_scenario("thesis")
     gait = load_gait(gait_file, scenario)

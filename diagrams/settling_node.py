@@ -13,10 +13,11 @@ gravity.
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
-from block_diagram import save_block_diagram
+from block_diagram import OUT, save_block_diagram
 from matplotlib.figure import Figure
 from one_tetrahedron import TRAILING, Samples, let_go, make_diagram
 
@@ -75,7 +76,7 @@ def draw(settling: Samples, bouncing: Samples) -> Figure:
     return figure
 
 
-def main(out: Path = Path(__file__).parent) -> None:
+def main(out: Path = OUT) -> None:
     """Simulates both impacts, prints their numbers and writes the pictures."""
     scenario = load_scenario("thesis")
     save_block_diagram(make_diagram(scenario), out / "one_tetrahedron.svg")
@@ -91,4 +92,4 @@ def main(out: Path = Path(__file__).parent) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*[Path(folder) for folder in sys.argv[1:2]])

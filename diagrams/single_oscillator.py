@@ -1,6 +1,6 @@
 """One Matsuoka oscillator: its signal for several weights and ratios of time constants.
 
-    python diagrams/single_oscillator.py
+    python diagrams/single_oscillator.py [--tau "0.2 s"] [--weights 1.2 1.5] [--live]
 
 An oscillator is a pair of neurons, extensor and flexor. They inhibit each other with the weight w
 (thesis Eq. 7). While both fire, their equations are linear. The differences d of the two u, and e
@@ -16,17 +16,22 @@ zero: the signal is a sine of frequency 1 / (2 pi tau_A). A smaller ratio tau_B 
 
 from __future__ import annotations
 
+import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from block_diagram import save_block_diagram
+from block_diagram import OUT, save_block_diagram
+from live import SignalCurves, open_meshcat
 from matplotlib.figure import Figure
+from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from tetra_drake.figures.style import common_style, make_figure, save_figure
+from tetra_drake.options import quantity
 from tetra_drake.physics.oscillator import Network
 from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.robot import initial_neurons
@@ -43,9 +48,15 @@ TRANSIENT = 5.0  # s
 
 
 def make_diagram(
-    scenario: Scenario, *, weight: float = WEIGHT, tau_a: float = TAU_A, ratio: float = RATIO
+    scenario: Scenario,
+    *,
+    weight: float = WEIGHT,
+    tau_a: float = TAU_A,
+    ratio: float = RATIO,
+    meshcat: Meshcat | None = None,
 ) -> Diagram:
-    """Diagram of a network with one oscillator, and a log of its signal."""
+    """Diagram of a network with one oscillator, and a log of its signal. With `meshcat` it shows
+    the signal."""
     cpg = scenario.cpg
     network = Network.of(
         [[0.0, weight], [weight, 0.0]],
@@ -62,14 +73,22 @@ def make_diagram(
     builder = DiagramBuilder()
     oscillator = builder.AddNamedSystem("oscillator", neurons)
     LogVectorOutput(oscillator.GetOutputPort("signals"), builder).set_name("log")
+    if meshcat:
+        curves = SignalCurves(meshcat, count=1, window=10.0, scale=0.05)
+        builder.AddNamedSystem("curves", curves)
+        builder.Connect(oscillator.GetOutputPort("signals"), curves.GetInputPort("signals"))
     diagram = builder.Build()
     diagram.set_name("single_oscillator")
     return diagram
 
 
-def simulate(diagram: Diagram, duration: float = 15.0) -> tuple[np.ndarray, np.ndarray]:
-    """Simulated signal: times (samples,) in s and signal (samples,) in N."""
+def simulate(
+    diagram: Diagram, duration: float = 15.0, *, rate: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Simulated signal: times (samples,) in s and signal (samples,) in N. A `rate` above 0 is the
+    greatest speed, as a multiple of real time."""
     simulator = Simulator(diagram)
+    simulator.set_target_realtime_rate(rate)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.01).set_target_accuracy(1e-6)
     simulator.AdvanceTo(duration)
     log = diagram.GetSubsystemByName("log").FindLog(simulator.get_context())
@@ -110,23 +129,42 @@ def draw(diagrams: dict[str, Diagram], title: str) -> Figure:
     return figure
 
 
-def main(out: Path = Path(__file__).parent) -> None:
-    """Simulates the oscillators and writes the pictures."""
+def main(
+    out: Path = OUT,
+    *,
+    tau: float = TAU_A,
+    weights: Sequence[float] = WEIGHTS,
+    ratios: Sequence[float] = RATIOS,
+    live: bool = False,
+) -> None:
+    """Simulates the oscillators and writes the pictures. `tau` is tau_A in s. With `live`, Meshcat
+    shows the first of `weights`."""
     scenario = load_scenario("thesis")
+    if live:
+        shown = make_diagram(scenario, weight=weights[0], tau_a=tau, meshcat=open_meshcat())
+        simulate(shown, 60.0, rate=1.0)
     save_block_diagram(make_diagram(scenario), out / "single_oscillator.svg")
 
-    diagrams = {f"$w = {w:g}$": make_diagram(scenario, weight=w) for w in WEIGHTS}
+    diagrams = {f"$w = {w:g}$": make_diagram(scenario, weight=w, tau_a=tau) for w in weights}
     figure = draw(diagrams, "Weight between the neurons of an oscillator (thesis Fig. 10)")
     save_figure(figure, out, "single_oscillator_weights", kinds=["svg"])
 
-    diagrams = {rf"$\tau_B = {r:g}\,\tau_A$": make_diagram(scenario, ratio=r) for r in RATIOS}
+    diagrams = {
+        rf"$\tau_B = {r:g}\,\tau_A$": make_diagram(scenario, ratio=r, tau_a=tau) for r in ratios
+    }
     figure = draw(diagrams, "Time constants of an oscillator (thesis Fig. 9)")
     save_figure(figure, out, "single_oscillator_time_constants", kinds=["svg"])
 
-    ours = linear_frequency(scenario)
-    print(f"tau_A = {TAU_A:g} s gives {ours:.3f} Hz; the thesis's {THESIS_FREQUENCY:g} Hz needs")
-    print(f"tau_A = {TAU_A * ours / THESIS_FREQUENCY:.3f} s")
+    ours = linear_frequency(scenario, tau_a=tau)
+    print(f"tau_A = {tau:g} s gives {ours:.3f} Hz; the thesis's {THESIS_FREQUENCY:g} Hz needs")
+    print(f"tau_A = {tau * ours / THESIS_FREQUENCY:.3f} s")
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tau", type=quantity("s"), default=TAU_A)
+    parser.add_argument("--weights", type=float, nargs="+", default=WEIGHTS)
+    parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS)
+    parser.add_argument("--live", action="store_true")
+    parser.add_argument("--out", type=Path, default=OUT)
+    main(**vars(parser.parse_args()))

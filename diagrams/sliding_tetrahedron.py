@@ -1,6 +1,6 @@
 """A tetrahedron sliding to rest: its nodes break free, slip, and stick again (thesis Figure 6).
 
-    python diagrams/sliding_tetrahedron.py
+    python diagrams/sliding_tetrahedron.py [--speed "20 in/s"] [--law "!Coulomb"] [--live]
 
 The diagram is made by one_tetrahedron.py. The tetrahedron starts at 30 in/s. Stiction brakes it to
 1 in/s within a millisecond and tips it. So its two trailing nodes lift off. The leading node
@@ -12,15 +12,19 @@ again. Below 23 in/s no node breaks free.
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 import numpy as np
+from block_diagram import OUT
+from live import open_meshcat
 from matplotlib.figure import Figure
 from one_tetrahedron import BASE, LEADING, TRAILING, Samples, let_go, weight
+from pydrake.geometry import Meshcat
 
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
+from tetra_drake.options import quantity
 from tetra_drake.results.measures import intervals
-from tetra_drake.scenario.friction_kinds import ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import NODES
 from tetra_drake.scenario.scenario import Scenario
@@ -29,11 +33,18 @@ from tetra_drake.scenario.units import INCH, POUND_FORCE
 INITIAL_SPEED = 30.0 * INCH  # m/s
 
 
-def slide(scenario: Scenario, *, speed: float = INITIAL_SPEED, duration: float = 0.1) -> Samples:
+def slide(
+    scenario: Scenario,
+    *,
+    speed: float = INITIAL_SPEED,
+    duration: float = 0.1,
+    meshcat: Meshcat | None = None,
+) -> Samples:
     """Simulates a start at a forward `speed` (m/s), at the height where the ground bears the
     weight."""
     depth = weight(scenario) / (len(BASE) * scenario.ground.stiffness)
-    return let_go(scenario, height=-depth, velocity=[speed, 0.0, 0.0], duration=duration)
+    velocity = [speed, 0.0, 0.0]
+    return let_go(scenario, height=-depth, velocity=velocity, duration=duration, meshcat=meshcat)
 
 
 def slips(motion: Samples, node: int) -> list[tuple[float, float]]:
@@ -52,7 +63,7 @@ def travel(motion: Samples, node: int) -> np.ndarray:
 
 
 @common_style()
-def draw(motion: Samples, *, stiction_range: float) -> Figure:
+def draw(motion: Samples, *, stiction_range: float | None) -> Figure:
     """Draws velocity, friction and displacement of two nodes: at the start, and until rest."""
     figure, axes = make_figure(width_in=8.0, height_in=6.5, rows=3, columns=2, sharex="col")
     milliseconds = 1e3 * motion.times
@@ -72,11 +83,12 @@ def draw(motion: Samples, *, stiction_range: float) -> Figure:
     for panel in axes[1]:
         panel.set_yscale("symlog", linthresh=1e-3)
         panel.set_yticks([-10.0, -0.1, -1e-3, 0.0, 1e-3, 0.1], minor=False)
-    limit = 1e3 * stiction_range / INCH
-    line = axes[2, 0].axhline(limit, color="black", linestyle=":", label="stiction range")
-    axes[2, 0].legend(handles=[line])
-    axes[2, 0].set_ylim(0.0, 2.0 * limit)
-    axes[0, 1].set_ylim(-2.0, 10.0)
+    if stiction_range is not None:
+        limit = 1e3 * stiction_range / INCH
+        line = axes[2, 0].axhline(limit, color="black", linestyle=":", label="stiction range")
+        axes[2, 0].legend(handles=[line])
+        axes[2, 0].set_ylim(0.0, 2.0 * limit)
+        axes[0, 1].set_ylim(-2.0, 10.0)
     for column, (title, end) in enumerate((("breaking free", 2.0), ("the whole motion", 80.0))):
         axes[0, column].set_title(title)
         axes[2, column].set(xlim=(0.0, end), xlabel="time (ms)")
@@ -86,12 +98,23 @@ def draw(motion: Samples, *, stiction_range: float) -> Figure:
     return figure
 
 
-def main(out: Path = Path(__file__).parent) -> None:
-    """Simulates the motion, prints when which node slips, and writes the pictures."""
-    scenario = load_scenario("thesis")
-    motion = slide(scenario)
-    assert isinstance(scenario.friction, ResetIntegrator)
-    figure = draw(motion, stiction_range=scenario.friction.stiction_range)
+def main(
+    out: Path = OUT,
+    *,
+    speed: float = INITIAL_SPEED,
+    slope: float = 0.0,
+    law: str = "!ResetIntegrator",
+    live: bool = False,
+) -> None:
+    """Simulates the motion, prints when which node slips, and writes the picture.
+
+    The tetrahedron starts uphill on a `slope` (rad), with a law of friction as in a scenario file.
+    With `live`, Meshcat shows it first.
+    """
+    ground = f"!Incline {{slope: {slope} rad}}" if slope else "!Flat"
+    scenario = load_scenario("thesis").with_changes({"friction": law, "terrain": ground})
+    motion = slide(scenario, speed=speed, meshcat=open_meshcat() if live else None)
+    figure = draw(motion, stiction_range=getattr(scenario.friction, "stiction_range", None))
     save_figure(figure, out, "sliding_tetrahedron_motion", kinds=["svg"])
     for node in BASE:
         for what, spans in (("slips", slips(motion, node)), ("flies", flights(motion, node))):
@@ -101,4 +124,10 @@ def main(out: Path = Path(__file__).parent) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--speed", type=quantity("m/s"), default=INITIAL_SPEED)
+    parser.add_argument("--slope", type=quantity("rad"), default=0.0)
+    parser.add_argument("--law", default="!ResetIntegrator")
+    parser.add_argument("--live", action="store_true")
+    parser.add_argument("--out", type=Path, default=OUT)
+    main(**vars(parser.parse_args()))

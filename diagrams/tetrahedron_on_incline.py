@@ -19,11 +19,13 @@ tan = mu / (1 + mu / sqrt(2)) with the static mu; 23 degrees here.
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from block_diagram import OUT
 from matplotlib.figure import Figure
 from one_tetrahedron import BASE, Samples, let_go, make_standing_tetrahedron, start_axes, weight
 
@@ -141,7 +143,7 @@ def draw(*, resting: Curves, moving: Curves) -> Figure:
     return figure
 
 
-def main(out: Path = Path(__file__).parent) -> None:
+def main(out: Path = OUT) -> None:
     """Simulates the motions, prints their numbers and writes the pictures."""
     gentle, soft, steep = on_incline(GENTLE), on_incline(GENTLE, stiffness=0.0), on_incline(STEEP)
     holding, creeping = simulate(gentle, duration=0.1), simulate(soft, duration=0.1)
@@ -176,4 +178,4 @@ def main(out: Path = Path(__file__).parent) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*[Path(folder) for folder in sys.argv[1:2]])

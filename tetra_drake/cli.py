@@ -6,6 +6,7 @@ import contextlib
 import os
 import shlex
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,11 +14,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tetra_drake import __version__
 from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import check_folder, write_whole
+from tetra_drake.files import check_file, check_folder, write_whole
 from tetra_drake.interrupts import heeding_interrupts
-from tetra_drake.options import BAD_INPUT, Command, Option, integer, quantity
+from tetra_drake.options import BAD_INPUT, Command, Option, integer, positive, quantity, size
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
-from tetra_drake.scenario.units import SYSTEMS, shown_in
+from tetra_drake.scenario.units import INCH, SYSTEMS, shown_in
 
 if TYPE_CHECKING:
     from tetra_drake.robot.gait import Gait
@@ -79,6 +80,7 @@ def make_parser() -> Command:
             _evolve,
             _export,
             _replay,
+            _video,
             _figures,
             _robustness,
             _compare,
@@ -98,7 +100,11 @@ Seed = Annotated[int, Option(metavar="N", type=integer(0))]
 Rate = Annotated[float, Option(metavar="RATE", type=quantity("Hz"))]
 Length = Annotated[float, Option(metavar="LENGTH", type=quantity("m"))]
 Unit = Annotated[str, Option(metavar="UNIT")]
+Size = Annotated[tuple[int, int], Option(metavar="WxH", type=size)]
+Number = Annotated[float, Option(metavar="X", type=positive)]
+View = Annotated[str, Option(choices=("free", "side", "front", "top"))]
 Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
+Labels = Annotated[list[str], Option(metavar="NAME", nargs="+")]
 Run = Annotated[Folder, Option(metavar="RUN")]
 GaitOrRun = Annotated[Path, Option(metavar="GAIT|RUN", type=Path)]
 RunOrResult = Annotated[Path, Option(metavar="RUN_DIR|RESULT_DIR", type=Path)]
@@ -163,7 +169,7 @@ def _simulate(
     if meshcat:
         from tetra_drake.visualization.live import open_view
 
-        view = open_view(chosen, say=lambda text: print(text, flush=True))
+        view = open_view(chosen, say=_say)
     result = simulate(chosen, chosen_gait, command=played, record=True, viewer=view)
     print(result_text(result))
     save_result_folder(out, result)
@@ -315,7 +321,54 @@ def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: 
     print(f"{title}\nto watch the robot, open in a browser: {out}")
 
 
-def _figures(source: RunOrResult, *, out: Folder | None = None) -> None:
+def _video(
+    source: ResultOrGait,
+    *,
+    scenario: ScenarioName | None = None,
+    size: Size = (1920, 1080),
+    fps: Number = 30.0,
+    view: View = "free",
+    speed: Number = 1.0,
+    out: File,
+) -> None:
+    """Write a video of a gait, for talks.
+
+    Draws the frames of the replay page in a headless browser, without texts; the camera follows the
+    robot. It needs Chromium or Chrome, and the Python packages playwright and imageio-ffmpeg. A
+    frame takes about a second without a graphics card.
+
+    Args:
+        source: a folder written by `simulate`, a gait file, or a folder written by `evolve`
+        scenario: (default: the scenario of its run, or thesis; for gait files only)
+        size: (default: 1920x1080)
+        fps: frames per second (default: %(default)s)
+        view: (default: %(default)s)
+        speed: speed as a multiple of the robot's (default: %(default)s)
+        out: the file to write, .mp4 or .gif
+
+    Example: tetra-drake video runs/champion --out talk.mp4 --view side
+    """
+    from tetra_drake.report.replay_page import write_replay
+    from tetra_drake.visualization.video import check_video, make_video
+
+    check_video(out)
+    check_file(out)
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder, "replay.html")
+        title = write_replay(source, page, scenario=scenario, warn=_warn)
+        make_video(page, out, size=size, fps=fps, view=view, speed=speed, say=_say)
+    print(f"{title}\nwrote {out}")
+
+
+def _figures(
+    source: RunOrResult,
+    *,
+    width: Length = 7.0 * INCH,
+    font: Number = 9.0,
+    title: bool = True,
+    pdf: bool = False,
+    out: Folder | None = None,
+) -> None:
     """Draw the figures of a run or a simulation.
 
     Draws figures as SVG and PNG into figures/ in the given folder. A run of `evolve` need not be
@@ -324,13 +377,19 @@ def _figures(source: RunOrResult, *, out: Folder | None = None) -> None:
 
     Args:
         source: a folder written by `evolve` or by `simulate`
+        width: width of the figures, such as '3.4 in' for a column (default: 7 in)
+        font: size of the letters in points (default: %(default)s)
+        title: draw without titles
+        pdf: also write PDF files
         out: draw into this folder instead, without changes to the source
 
     Example: tetra-drake figures runs/thesis --out figures
     """
+    from tetra_drake.figures.style import Look
     from tetra_drake.report.run_page import write_figures
 
-    written = write_figures(source, out)
+    look = Look(width_in=width / INCH, font_size=font, title=title)
+    written = write_figures(source, out, look=look, kinds=_kinds(pdf))
     print(f"wrote {', '.join(str(path) for path in written)}")
 
 
@@ -375,32 +434,60 @@ def _robustness(
         print(f"wrote {', '.join(save_judgement(judgement, out))} to {out}/")
 
 
-def _compare(runs: list[Run], *, reach: Length | None = None, out: Folder | None = None) -> None:
+def _compare(
+    runs: list[Run],
+    *,
+    labels: Labels | None = None,
+    scenarios: bool = False,
+    reach: Length | None = None,
+    width: Length = 7.0 * INCH,
+    font: Number = 9.0,
+    title: bool = True,
+    pdf: bool = False,
+    out: Folder | None = None,
+) -> None:
     """Compare how well runs search.
 
     Compares the best fitness of each trial at the same number of simulations. An evaluation is
     one simulation, or one for each draw of disturbances. Prints interquartile means with bootstrap
-    intervals, simulations until a trial reaches a distance, and time. With --out it writes
+    intervals, the probability that a trial of one run ends fitter than a trial of another,
+    simulations until a trial reaches a distance, and time. With --out it writes
     trials.csv, curves.csv, summary.json and the figure comparison.
 
     Args:
         runs: folders written by `evolve`, finished or not, all with the same objective
+        labels: names of the runs in tables and figures, one for each (default: of the folders)
+        scenarios: compare the runs of each scenario, by its name; equal labels stand for one method
+        width: width of the figure (default: 7 in)
+        font: size of the figure's letters in points (default: %(default)s)
+        title: draw without title
+        pdf: also write a PDF file
         reach: also count simulations until a trial walks this distance, such as '14.34 in'
         out: write tables (CSV, JSON) and the figure into this folder
 
     Example: tetra-drake compare runs/thesis runs/cma-es --reach "14.34 in"
     """
-    from tetra_drake.analysis.comparison import compare
-    from tetra_drake.report.analysis_text import comparison_text
+    from tetra_drake.analysis.comparison import compare, compare_scenarios, improvement_over
+    from tetra_drake.report.analysis_text import comparison_text, improvement_text
 
     if out:
         check_folder(out)
-    compared = compare(runs, reach=reach)
-    print(comparison_text(compared))
-    if out:
-        from tetra_drake.figures.comparison import save_comparison
+    if scenarios:
+        by_scenario = compare_scenarios(runs, reach=reach, labels=labels)
+    else:
+        by_scenario = {"": compare(runs, reach=reach, labels=labels)}
+    for name, compared in by_scenario.items():
+        print(f"\nScenario {name}:\n" if name else "", comparison_text(compared), sep="")
+        if out:
+            from tetra_drake.figures.comparison import save_comparison
+            from tetra_drake.figures.style import Look
 
-        print(f"wrote {', '.join(save_comparison(compared, out))} to {out}/")
+            look = Look(width_in=width / INCH, font_size=font, title=title)
+            written = save_comparison(compared, out / name, look=look, kinds=_kinds(pdf))
+            print(f"wrote {', '.join(written)} to {out / name}/")
+    if scenarios:
+        means = improvement_over(by_scenario.values())
+        print(f"\nMean over {len(by_scenario)} scenarios:\n\n{improvement_text(means)}")
 
 
 def _fit(
@@ -440,7 +527,7 @@ def _fit(
             given.parameters,
             search=search,
             out=out,
-            say=lambda text: print(text, flush=True),
+            say=_say,
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None
@@ -518,6 +605,11 @@ def _structure(
     print(text)
 
 
+def _kinds(pdf: bool) -> list[str]:
+    """Kinds of the files of a figure."""
+    return ["svg", "png", "pdf"] if pdf else ["svg", "png"]
+
+
 def _engine_change(engine: str | None) -> dict[str, Any]:
     """The change of the scenario by --engine."""
     return {"engine": f"!{engine.capitalize()}"} if engine else {}
@@ -536,6 +628,10 @@ def _chosen_gait(
         return chosen, seeded_gait(chosen, WALKING_SEED if seed is None else seed)
     source = load_source(gait, scenario=scenario, warn=_warn)
     return source.scenario.with_changes(_engine_change(engine)), source.best
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
 
 
 def _warn(text: str) -> None:

@@ -27,6 +27,10 @@ class InputError(ValueError):
         origin = f"{_cut(self.source, _LONGEST_PATH)}: {key}".removesuffix(": ")
         super().__init__(_one_line(f"{origin}: {self.problem}"))
 
+    def _render_traceback_(self) -> list[str]:
+        """The error in IPython and notebooks: its message alone."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 def _shortened(problem: str) -> str:
     """The problem with long quotations cut. A quotation may be a whole file."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shlex
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
@@ -17,7 +18,7 @@ from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
 from tetra_drake.evolution.manifest import Manifest, Method, read_manifest
-from tetra_drake.evolution.progress import Progress
+from tetra_drake.evolution.progress import Display, Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
@@ -40,7 +41,7 @@ def evolve(
     optimizer: MakeOptimizer | None = None,
     objective: Objective | None = None,
     executor: MakeExecutor | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     reevaluate: bool = True,
     report: bool = True,
 ) -> Run:
@@ -68,7 +69,8 @@ def evolve(
             engine simulates the candidates of all trials together, like simulate_many(). The other
             engines simulate in worker processes. If worker processes cannot import the objective,
             for example in a notebook, gaits are simulated one by one.
-        progress: Display of the progress; none by default. See evolution.progress.
+        progress: True shows bars on a terminal, and lines in notebooks and files. A Progress (see
+            evolution.progress) is a display of your own.
         reevaluate: After the evolution, evaluates the best gaits on the Drake diagram if the engine
             is another, and simulates the gaits of a map on disturbed robots.
         report: After the evolution, writes report.html, replay.html, figures/ and, for a map,
@@ -81,8 +83,10 @@ def evolve(
     check_guard()
     _check_counts(seed=(seed, 0), workers=(workers, 1))
     _check_functions(optimizer=optimizer, objective=objective, executor=executor)
-    if not isinstance(progress, Progress | None):
-        problem = f"found {progress!r}, expected an evolution.progress.Progress"
+    if progress is True:
+        progress = Display(sys.stdout)
+    if not isinstance(progress, Progress | None) and progress is not False:
+        problem = f"found {progress!r}, expected True or an evolution.progress.Progress"
         raise InputError("evolve", "progress", problem)
     if resume and overwrite:
         raise InputError("evolve", "overwrite", "excludes resume")

@@ -59,6 +59,12 @@ def percents(share: float, low: float, high: float) -> str:
     return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
+def heading_html(text: str) -> str:
+    """Lines of text as HTML above a table, the first in bold."""
+    first, *others = html.escape(text).splitlines()
+    return "<br>".join([f"<b>{first}</b>", *others])
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of texts with headings."""

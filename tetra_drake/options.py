@@ -12,8 +12,10 @@ under `Args:` in the function's docstring.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import functools
 import inspect
+import math
 import re
 import typing
 from collections.abc import Callable, Sequence
@@ -114,6 +116,23 @@ def integer(least: int) -> Callable[[str], int]:
         raise argparse.ArgumentTypeError(problem)
 
     return read
+
+
+def size(text: str) -> tuple[int, int]:
+    """Width and height in pixels from a text, such as "1920x1080". Both are even."""
+    found = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text)
+    if found is None or int(found[1]) % 2 or int(found[2]) % 2:
+        problem = f"found '{text}', expected two even numbers, such as 1920x1080"
+        raise argparse.ArgumentTypeError(problem)
+    return int(found[1]), int(found[2])
+
+
+def positive(text: str) -> float:
+    """A positive number."""
+    with contextlib.suppress(ValueError):
+        if 0.0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"found '{text}', expected a number above 0")
 
 
 def quantity(unit: str) -> Callable[[str], float]:

@@ -19,4 +19,4 @@ outer = result.trajectory.tension.sel(cable_group="outer", time=slice(5.0, None)
 print("greatest tension of an outer cable:", f"{outer.max().item():.2f} N")
 
 # %% Feet on the ground, signals of the oscillators and speed of the robot over time.
-gait_diagram(result).savefig(Path(__file__).with_suffix(".png"), dpi=120)
+gait_diagram(result).savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -28,4 +28,4 @@ diagram = td.simulate(scenario.with_changes({"engine": "!Drake"}), run.best_gait
 print(f"the best on the diagram: {diagram.metrics.distance_in:.2f} in")
 
 # %% Fitness over the evaluations of each trial.
-fitness_of_trials(run).savefig(Path(__file__).with_suffix(".png"), dpi=120)
+fitness_of_trials(run).savefig(f"{Path(__file__).stem}.png", dpi=120)

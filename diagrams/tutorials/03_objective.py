@@ -35,4 +35,4 @@ for name, objective in {"distance": None, "distance and power": far_and_frugal}.
     axes.plot(power, run.evaluations.distance_in, ".", label=f"evolved for {name}")
 axes.set(xlabel="mean power of an actuator (mW)", ylabel="distance in 8 s (in)")
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -28,4 +28,4 @@ run = td.evolve(scenario, "out/four_struts", overwrite=True, reevaluate=False, r
 result = td.simulate(scenario, run.best_gait(), record=True)
 print(result.metrics)
 result.save_replay("out/four_struts.html")
-gait_diagram(result).savefig(Path(__file__).with_suffix(".png"), dpi=120)
+gait_diagram(result).savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -30,5 +30,5 @@ for result in results:
     axes.plot(result.trajectory.time, inches, label=result.scenario.name)
 axes.set(xlabel="time (s)", ylabel="distance (in)")
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)
 results[-1].save_replay("out/rough.html")

@@ -34,4 +34,4 @@ for name, (scenario, gait) in gaits.items():
     axes.plot(np.arange(1, 21), inches, "o-", label=f"{name}: mean {inches.mean():.1f} in")
 axes.set(xlabel="terrain, sorted by distance", ylabel="distance in 15 s (in)", xticks=[1, 10, 20])
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -35,4 +35,4 @@ for name, result in {"forces": needs, "motors": driven}.items():
     axes.plot(tension.time, tension, label=name)
 axes.set(xlabel="time (s)", ylabel="tension (N)")
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

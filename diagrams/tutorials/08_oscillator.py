@@ -37,4 +37,4 @@ for name, sink, unit in (("torque", torque, "N m"), ("angle", motion, "rad")):
     axes.plot(log.sample_times(), log.data()[0], label=f"{name} ({unit})")
 axes.set(xlabel="time (s)")
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -30,4 +30,4 @@ for static, of_one in inches.groupby("static"):
     axes.plot(walks.outer_stiffness, middle, label=f"static friction {static:g}")
 axes.set(xlabel="stiffness of the outer cables (N/m)", ylabel="distance in 15 s (in)")
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

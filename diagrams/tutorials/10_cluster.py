@@ -30,7 +30,7 @@ def main() -> None:
             report=False,
         )
     print(run)
-    fitness_of_trials(run).savefig(Path(__file__).with_suffix(".png"), dpi=120)
+    fitness_of_trials(run).savefig(f"{Path(__file__).stem}.png", dpi=120)
 
 
 if __name__ == "__main__":

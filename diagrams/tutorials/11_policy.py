@@ -44,4 +44,4 @@ for name, inputs in {"clock alone": 2, "clock and senses": 2 + driven.size + 11}
     axes.plot(0.02 * np.arange(1, 1 + way.size), 100.0 * way, label=name)
 axes.set(xlabel="time (s)", ylabel="way (cm)")
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -7,7 +7,7 @@ import pandas
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 
-from tetra_drake.analysis.comparison import compare
+from tetra_drake.analysis.comparison import compare, compare_scenarios, improvement_over
 from tetra_drake.cli import main
 from tetra_drake.figures.comparison import comparison
 from tetra_drake.report.analysis_text import comparison_text
@@ -49,6 +49,28 @@ def test_the_best_so_far_over_trials_that_fail_and_end_at_different_times(run):
     assert (row["trials"], row["going_on"], row["cost"], row["wall_time"]) == (3, 0, 3.0, 0.5)
     assert (row["fitness"], row["fitness_mean"]) == pytest.approx((7.0, 16.0 / 3.0))
     assert row["distance"] == pytest.approx(7.0 / PER_DISTANCE * INCH)
+
+
+def test_the_probability_of_improvement_counts_pairs_of_trials(run):
+    """Of the pairs (3, 1), (3, 3), (2, 1), (2, 3), two are won, one is even, one is lost."""
+    paths = [run("a", trial(3.0), trial(2.0)), run("b", trial(1.0), trial(3.0))]
+    found = compare(paths, labels=["ours", "theirs"])
+    assert list(found.runs.index) == ["ours", "theirs"]
+    assert found.improvement.loc["ours", "theirs"] == 0.625
+    assert found.improvement.loc["theirs", "ours"] == 0.375
+    assert "0.62" in comparison_text(found)
+
+
+def test_runs_are_compared_within_their_scenarios(run, refused):
+    other = {"name": "other", "objective": {"speed": "2 s/in"}}
+    paths = [run("a", trial(3.0)), run("b", trial(1.0))]
+    paths += [run("c", trial(1.0), changes=other), run("d", trial(1.0), changes=other)]
+    found = compare_scenarios(paths, labels=["x", "y", "x", "y"])
+    shares = [compared.improvement.loc["x", "y"] for compared in found.values()]
+    assert len(found) == 2 and shares == [1.0, 0.5]
+    assert improvement_over(found.values()).loc["x", "y"] == 0.75
+    with refused("compare", "labels", "expected 4"):
+        compare_scenarios(paths, labels=["x"])
 
 
 def test_the_curve_of_a_run_that_goes_on_ends_with_its_first_trial(run):

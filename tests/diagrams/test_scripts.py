@@ -13,8 +13,11 @@ import single_oscillator
 import sliding_tetrahedron
 import tetrahedron_on_incline
 from PIL import Image
+from pydrake.geometry import MeshcatParams
 
 from tetra_drake.engines.compiled import lane_pool, lane_stepper
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.visualization.replay import quiet_meshcat
 
 
 @pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
@@ -25,6 +28,8 @@ from tetra_drake.engines.compiled import lane_pool, lane_stepper
         pytest.param(entrainment, {}, 2, marks=pytest.mark.slow),
         (settling_node, {}, 2),
         (sliding_tetrahedron, {}, 1),
+        (sliding_tetrahedron, {"speed": 0.5, "slope": 0.05, "law": "!Coulomb"}, 1),
+        (single_oscillator, {"tau": 0.2, "weights": [1.2], "ratios": [2.0]}, 3),
         (tetrahedron_on_incline, {}, 1),
         (robot, {"duration": 0.1}, 2),
     ],
@@ -34,6 +39,16 @@ def test_a_script_writes_its_pictures(script, options, files, tmp_path):
     written = {path.name for path in tmp_path.iterdir() if path.stat().st_size > 1000}
     assert len(written) == files
     assert written - {"robot.html"} <= {path.name for path in robot.DIAGRAMS.glob("*.svg")}
+
+
+def test_signals_and_bodies_are_shown_live():
+    meshcat, scenario = quiet_meshcat(MeshcatParams(host="localhost")), load_scenario("thesis")
+    sliding_tetrahedron.slide(scenario, duration=2e-3, meshcat=meshcat)
+    assert meshcat.HasPath("/signals/5") and meshcat.HasPath("/robot/T1")
+    shown = single_oscillator.make_diagram(scenario, meshcat=meshcat)
+    meshcat.Delete("/signals")
+    single_oscillator.simulate(shown, 0.2)
+    assert meshcat.HasPath("/signals/0") and not meshcat.HasPath("/signals/1")
 
 
 CHECKOUT = Path(__file__).parents[2]
@@ -62,5 +77,8 @@ def test_a_tutorial_runs_and_draws_its_picture(name, tmp_path, monkeypatch):
     text = re.sub(r"(?<=generations, most = )\d+", "1", re.sub(few, "53", text))
     (folder / f"{name}.py").write_text(text, "utf-8")
     runpy.run_path(str(folder / f"{name}.py"), run_name="__main__")
-    with Image.open(folder / f"{name}.png") as drawn, Image.open(TUTORIALS / f"{name}.png") as kept:
+    with (
+        Image.open(tmp_path / f"{name}.png") as drawn,
+        Image.open(TUTORIALS / f"{name}.png") as kept,
+    ):
         assert drawn.size == kept.size

@@ -69,7 +69,7 @@ def drawn_texts(monkeypatch):
     return drawn_texts
 
 
-@pytest.fixture(params=[None, (5.0, 8.0)], ids=["own page", "5 in wide"])
+@pytest.fixture(params=[None, "column", (5.0, 8.0)], ids=["own page", "column", "5 in wide"])
 def check(drawn_texts, request):
     """check(draw, *data): checks a figure on its own page, or on a given one."""
 
@@ -77,6 +77,9 @@ def check(drawn_texts, request):
         if request.param is None:
             figure = draw(*data)
             assert figure.get_figwidth() == Look.width_in and figure.get_figheight() <= 10.0
+        elif request.param == "column":
+            figure = draw(*data, width_in=3.4, font_size=7.0, title=False)
+            assert figure.get_figwidth() == 3.4 and not figure.get_suptitle()
         else:
             figure = Figure(figsize=request.param)
             assert draw(*data, figure=figure) is None

@@ -1,5 +1,6 @@
 """Figures for tests of what they are written into: drawn, but written in no time."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -12,8 +13,8 @@ REAL = "fitness_of_trials"
 _BLANK = '<svg xmlns="http://www.w3.org/2000/svg" width="200" height="100"><title>{}</title></svg>'
 
 
-def save_figure(figure: Figure, folder: Path, name: str) -> None:
-    """Writes one figure as SVG, a blank picture for any other."""
+def save_figure(figure: Figure, folder: Path, name: str, *, kinds: Sequence[str]) -> None:
+    """Writes one figure as SVG, a blank picture for any other, whatever the `kinds`."""
     if name == REAL:
         style.save_figure(figure, folder, name, kinds=["svg"])
     else:

@@ -6,6 +6,7 @@ import pytest
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
+from tetra_drake.scenario.units import shown_in
 
 
 @pytest.fixture(params=["gait_a", "gait_b", "single_oscillators"])
@@ -53,7 +54,8 @@ def test_the_csv_holds_what_the_cables_are_fed(robot, gait, tmp_path):
 
 def test_the_csv_has_the_unit_and_the_rate_that_are_asked_for(robot, gait, tmp_path):
     save_signals(tmp_path / "lbf.csv", robot, gait)
-    save_signals(tmp_path / "N.csv", robot, gait, unit="N", rate=30.0)
+    with shown_in("SI"):
+        save_signals(tmp_path / "N.csv", robot, gait, rate=30.0)
     lbf, newton = (
         np.loadtxt(tmp_path / name, delimiter=",", skiprows=7) for name in ("lbf.csv", "N.csv")
     )

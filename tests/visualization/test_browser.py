@@ -32,12 +32,19 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.units import INCH
+from tetra_drake.visualization.browser import (
+    do,
+    find_browser,
+    launch_browser,
+    wait_until_loaded,
+)
 from tetra_drake.visualization.replay import frame_samples, save_replay
 from tetra_drake.visualization.scene import COLOURS
+from tetra_drake.visualization.video import make_video
 
 if not os.environ.get("CI"):
     pytest.importorskip("playwright")
-    if animation.find_browser() is None:
+    if find_browser() is None:
         pytest.skip("neither Chromium nor Chrome is installed", allow_module_level=True)
 
 PATIENCE = 90_000  # ms
@@ -64,7 +71,7 @@ def replay(trajectory, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    with animation.launch_browser() as launched:
+    with launch_browser() as launched:
         yield launched
 
 
@@ -95,7 +102,7 @@ def page(browser, replay):
     """The replay page once it plays by itself; tests may stop and resize it."""
     with opened(browser, replay.as_uri()) as loaded:
         loaded.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
-        animation.do(loaded, "pause")
+        do(loaded, "pause")
         yield loaded
 
 
@@ -136,7 +143,7 @@ def test_the_page_has_its_title_and_real_speed(page):
 
 
 def test_cables_and_feet_on_the_ground_are_seen(page):
-    animation.do(page, "show", 2.0)
+    do(page, "show", 2.0)
     image = picture(page)
     for name in ("actuated", "passive", "stance"):
         assert len(pixels_of(image, name)) > 20
@@ -145,7 +152,7 @@ def test_cables_and_feet_on_the_ground_are_seen(page):
 def test_bodies_are_where_they_were_and_cables_between_them(page, trajectory):
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     for frame in (25, 60, -1):
-        animation.do(page, "show", float(frames["time"].values[frame]))
+        do(page, "show", float(frames["time"].values[frame]))
         shown = page.evaluate(
             "bodies => bodies.map(body => "
             "viewer.scene_tree.find(['robot', body]).object.position.toArray())",
@@ -166,20 +173,20 @@ def test_the_camera_follows_and_keeps_the_robot_large(page, trajectory):
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_function(f"viewer.renderer.domElement.width == {width}")
         for time in (0.0, 5.0):
-            animation.do(page, "show", time)
+            do(page, "show", time)
             extent = extents(page, trajectory["p_WN"].sel(time=time).values)
             assert 0.5 < extent.max() < 0.85, f"in a window of {width} to {height}"
 
 
 def test_a_camera_that_stands_lets_the_robot_walk_on(page, trajectory):
-    animation.do(page, "show", 0.0)
+    do(page, "show", 0.0)
     page.locator("#follow").uncheck()
     before = np.array(page.evaluate("viewer.camera.position.toArray()"))
-    animation.do(page, "show", 5.0)
+    do(page, "show", 5.0)
     # The orbit controls turn the position into angles and back, which rounds it.
     stands = page.evaluate("viewer.camera.position.toArray()")
     np.testing.assert_allclose(stands, before, atol=1e-9)
-    animation.do(page, "camera", {"times": [0.0, 5.0]})
+    do(page, "camera", {"times": [0.0, 5.0]})
     for time in (0.0, 5.0):
         assert extents(page, trajectory["p_WN"].sel(time=time).values).max() < 0.8
     page.locator("#follow").check()
@@ -193,7 +200,7 @@ def text(page, output):
 
 
 def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
-    animation.do(page, "show", 5.0)
+    do(page, "show", 5.0)
     x = trajectory["p_WN"].values[:, 0, 0] / INCH
     assert text(page, "clock") == "5.0 / 5.0 s"
     assert text(page, "reached") == f"walked {x[-1] - x[0]:.1f} in"
@@ -206,7 +213,7 @@ def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
 
 
 def test_keys_play_stop_and_move_in_time(page):
-    animation.do(page, "show", 2.0)
+    do(page, "show", 2.0)
     page.evaluate("document.activeElement.blur()")
     for key, time in (("ArrowRight", "2.1"), ("Shift+ArrowRight", "3.1"), ("ArrowLeft", "3.0")):
         page.keyboard.press(key)
@@ -227,7 +234,7 @@ def test_every_control_has_a_name(page):
 def test_on_a_phone_nothing_lies_over_the_robot(browser, replay):
     box = "id => document.getElementById(id).getBoundingClientRect().toJSON()"
     with opened(browser, replay.as_uri(), size=(400, 700)) as page:
-        animation.wait_until_loaded(page)
+        wait_until_loaded(page)
         for legend_is_open in (False, True):
             page.evaluate(f"document.getElementById('legend').open = {str(legend_is_open).lower()}")
             page.wait_for_timeout(200)
@@ -250,7 +257,7 @@ def test_a_still_hides_no_instant_by_another(browser, trajectory, tmp_path, spee
     robot = Robot.of(load_scenario("thesis"))
     save_replay(path, robot=robot, trajectory=trajectory.assign(moved), title="a: b")
     with opened(browser, path.as_uri(), size=(300, 200)) as page:
-        animation.wait_until_loaded(page)
+        wait_until_loaded(page)
         robots = "viewer.scene.children.filter(child => child.name == 'robot').length"
         assert page.evaluate(robots) == 1
         animation.still(page, [0.0, 2.5, 5.0])
@@ -258,6 +265,21 @@ def test_a_still_hides_no_instant_by_another(browser, trajectory, tmp_path, spee
         labels = page.locator("#labels span:visible").all_text_contents()
         assert labels[: len(shown)] == shown
         assert not page.locator("#bar, #heading, #legend").filter(visible=True).count()
+
+
+@pytest.mark.parametrize(("name", "view"), [("talk.mp4", "side"), ("talk.gif", "top")])
+def test_a_video_has_its_size_rate_and_speed(replay, tmp_path, name, view):
+    """The motion of 5 s takes 0.5 s at ten times its speed."""
+    reader = pytest.importorskip("imageio_ffmpeg").read_frames
+    make_video(replay, tmp_path / name, size=(320, 240), fps=10.0, view=view, speed=10.0)
+    about, *frames = reader(str(tmp_path / name))
+    assert about["size"] == (320, 240) and about["fps"] == pytest.approx(10.0)
+    assert len(frames) == 5 and frames[0] != frames[-1]
+
+
+def test_what_cannot_be_a_video_is_refused(replay, tmp_path, refused):
+    with refused(tmp_path / "talk.avi", "", ".mp4 or .gif"):
+        make_video(replay, tmp_path / "talk.avi")
 
 
 def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_path):
@@ -312,7 +334,7 @@ def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, m
             page.set_viewport_size({"width": width, "height": 800})
             assert page.evaluate("document.documentElement.scrollWidth") <= width
         page.locator(f"a[href='{replay.name}']").first.click()
-        animation.wait_until_loaded(page)
+        wait_until_loaded(page)
         assert page.evaluate("film.duration") == pytest.approx(0.3)
 
 

@@ -6,7 +6,7 @@ The cost is the number of simulations. An evaluation costs one simulation per dr
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,23 +68,32 @@ class Compared:
       `reach`
     - wall_time: mean time per evaluation, in s
     """
+    improvement: pandas.DataFrame
+    """Probability of improvement: that a trial of the row's run ends fitter than a trial of the
+    column's run, over all pairs of trials. Equal fitness counts one half."""
     notes: list[str]
     """Notes on differences of the scenarios outside the search, and on unfinished trials."""
 
 
-def compare(directories: Sequence[str | Path], *, reach: float | None = None) -> Compared:
+def compare(
+    directories: Sequence[str | Path],
+    *,
+    reach: float | None = None,
+    labels: Sequence[str] | None = None,
+) -> Compared:
     """Compares runs with the same objective, finished or not.
 
     Args:
         directories: folders of runs.
         reach: a distance (m); the result says at which cost it was reached.
+        labels: a name for each run; by default the names of the folders.
 
     Raises:
         InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
     """
     import pandas
 
-    runs = _labelled([load_run(directory) for directory in directories])
+    runs = _labelled([load_run(directory) for directory in directories], labels)
     notes = _differences(runs)
     searches = {label: _progress(run) for label, run in runs.items()}
     common = min(_end(progress) for progress in searches.values())
@@ -103,7 +112,13 @@ def compare(directories: Sequence[str | Path], *, reach: float | None = None) ->
             notes.append(f"{label}: {going_on} of {len(rows)} trials go on")
         if failed := int(np.isneginf(rows["fitness"]).sum()):
             notes.append(f"{label}: {failed} of {len(rows)} trials have no fitness")
+    ends = {label: _trials(table, common, reach)["fitness"] for label, table in searches.items()}
     return Compared(
+        improvement=pandas.DataFrame(
+            [[improvement(ours, theirs) for theirs in ends.values()] for ours in ends.values()],
+            index=list(ends),
+            columns=list(ends),
+        ),
         scenario=next(iter(runs.values())).scenario,
         common=common,
         reach=reach,
@@ -112,6 +127,44 @@ def compare(directories: Sequence[str | Path], *, reach: float | None = None) ->
         runs=pandas.DataFrame.from_dict(summaries, orient="index").rename_axis("run"),
         notes=notes,
     )
+
+
+def compare_scenarios(
+    directories: Sequence[str | Path],
+    *,
+    reach: float | None = None,
+    labels: Sequence[str] | None = None,
+) -> dict[str, Compared]:
+    """Compares the runs of each scenario, by the name of the scenario; see compare()."""
+    names = labels or [Path(directory).resolve().name for directory in directories]
+    _check_labels(names, len(directories))
+    groups: dict[str, list[tuple[str | Path, str]]] = {}
+    for directory, label in zip(directories, names, strict=True):
+        groups.setdefault(load_run(directory).scenario.name, []).append((directory, label))
+    return {
+        name: compare([run for run, _ in group], reach=reach, labels=[own for _, own in group])
+        for name, group in groups.items()
+    }
+
+
+def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> float:
+    """Probability of improvement: that a number of the first list exceeds one of the second. Equal
+    numbers count one half. From R. Agarwal et al., NeurIPS 2021 (rliable)."""
+    first, second = np.asarray(ours)[:, np.newaxis], np.asarray(theirs)
+    return float(np.mean((first > second) + 0.5 * (first == second)))
+
+
+def improvement_over(comparisons: Iterable[Compared]) -> pandas.DataFrame:
+    """Mean probability of improvement over the scenarios that have both runs."""
+    import pandas
+
+    tables = pandas.concat([compared.improvement.stack() for compared in comparisons])
+    return tables.groupby(level=[0, 1], sort=False).mean().unstack()
+
+
+def _check_labels(labels: Sequence[str], count: int) -> None:
+    if len(labels) != count:
+        raise InputError("compare", "labels", f"found {len(labels)}, expected {count}")
 
 
 def _progress(run: Run) -> pandas.DataFrame:
@@ -188,10 +241,12 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     return row
 
 
-def _labelled(runs: Sequence[Run]) -> dict[str, Run]:
-    """Runs by the name of the folder, or by path if two folders have the same name."""
-    labels = [run.directory.resolve().name for run in runs]
-    if len({*labels}) < len(labels):
+def _labelled(runs: Sequence[Run], given: Sequence[str] | None) -> dict[str, Run]:
+    """Runs by their given labels; otherwise by the name of the folder, or by path if two folders
+    have the same name."""
+    labels = list(given or [run.directory.resolve().name for run in runs])
+    _check_labels(labels, len(runs))
+    if given is None and len({*labels}) < len(labels):
         labels = [str(run.directory) for run in runs]
     labelled: dict[str, Run] = {}
     for label, run in zip(labels, runs, strict=True):
@@ -231,5 +286,6 @@ def comparison_numbers(compared: Compared) -> dict[str, Any]:
         "common": compared.common,
         "reach": compared.reach,
         "notes": compared.notes,
+        "improvement": compared.improvement.to_dict(orient="index"),
         "runs": json_rows(compared.runs),
     }

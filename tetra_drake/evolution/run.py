@@ -22,6 +22,7 @@ from tetra_drake.evolution.entries import (
 from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
+from tetra_drake.formatting import Table, heading_html, rounded
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.metrics import METRICS
@@ -86,6 +87,15 @@ class Run:
 
     def __repr__(self) -> str:
         return f"<Run {self.directory}>"
+
+    def _repr_html_(self) -> str:
+        rows, units, gaits = [], self.scenario.units, self.best().set_index("trial")
+        for trial in self.statuses:
+            distance = units.shown(trial.best_distance, "m") if trial.number in gaits.index else "-"
+            counts = [str(trial.number), str(trial.evaluations), rounded(trial.best_fitness)]
+            rows.append([*counts, distance, trial.stop or "not finished"])
+        headings = ["trial", "evaluations", "best fitness", "distance", "end"]
+        return heading_html(str(self)) + Table(headings, rows, (0, 4)).html()
 
     @property
     def scenario(self) -> Scenario:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.analysis.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
+    USUAL,
     Drawn,
+    Look,
     Page,
     figure_function,
     legend_below,
@@ -25,14 +28,20 @@ from tetra_drake.figures.style import (
 _FIRST = 10  # simulations; the axes of costs begin here
 
 
-def save_comparison(compared: Compared, folder: Path) -> list[str]:
+def save_comparison(
+    compared: Compared,
+    folder: Path,
+    *,
+    look: Look = USUAL,
+    kinds: Sequence[str] = ("svg", "png"),
+) -> list[str]:
     """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to a folder.
 
     Returns the names of the files. Raises InputError if a file cannot be written.
     """
     tables = {"trials": compared.trials, "curves": compared.curves}
-    figure, summary = comparison(compared), comparison_numbers(compared)
-    return save_findings(figure, folder, "comparison", tables=tables, summary=summary)
+    figure, summary = comparison(compared, **vars(look)), comparison_numbers(compared)
+    return save_findings(figure, folder, "comparison", tables=tables, summary=summary, kinds=kinds)
 
 
 @figure_function

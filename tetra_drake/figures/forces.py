@@ -72,7 +72,8 @@ def signals_and_tensions(
         panel.plot(forces.time, forces.tension[:, cable], **_FIRST)
         panel.plot(forces.time, forces.signal.sel(oscillator=oscillator), **_SECOND)
     legend_below(page, {"cable tension": _FIRST, "signal": _SECOND}, *others)
-    set_title(page, f"Signals and tensions of actuated cables ({unit.force_name})")
+    panels[0].figure.supylabel(f"force ({unit.force_name})")
+    set_title(page, "Signals and tensions of actuated cables")
     return page
 
 
@@ -110,7 +111,8 @@ def ground_forces(
     along = "along x" if result.robot.ground.flat else "along the forward tangent"
     looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
     legend_below(page, looks, Patch(color=SHADE, label="stance"))
-    set_title(page, f"Forces of the ground ({unit.force_name})")
+    panels[0].figure.supylabel(f"force ({unit.force_name})")
+    set_title(page, "Forces of the ground")
     return page
 
 

@@ -94,13 +94,16 @@ def before_and_after(
     unit = best.scenario.units
     page = page_of(figure, height_in=3.8)
     panel = page.subplots()
+    points = 72.0 * page.bbox.width / page.figure.dpi
+    letters = int(1.6 * points / rcParams["legend.fontsize"]) - 8  # beside the line
     legend = {}
     for when, result, look in (("before", initial, _BEFORE), ("after", best, _AFTER)):
         part = shown_part(result.trajectory, time)
         walked = _distance_walked(result, unit).sel(time=part.time)
         panel.plot(walked.time, walked, **look)
         way = f"{fixed(float(walked[-1]), unit.decimals + 1)} {unit.length_name}"
-        legend[f"{when}: {way}, {textwrap.shorten(result.name, 70)}"] = look
+        text = f"{when}: {way}, {textwrap.shorten(result.name, 70)}"
+        legend[textwrap.fill(text, letters)] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
     legend_below(page, legend)
     set_title(page, "Distance walked, before and after evolution")

@@ -68,6 +68,9 @@ class Look:
     title: bool = True
 
 
+USUAL = Look()
+
+
 SHADE = "0.9"
 """Grey behind marked intervals of time."""
 
@@ -95,7 +98,7 @@ def line_style(index: int) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def common_style(look: Look = Look()) -> Iterator[None]:
+def common_style(look: Look = USUAL) -> Iterator[None]:
     """Context manager for the common style of figures. It ignores the user's matplotlibrc."""
     sheet = Path(__file__).with_name("tetra_drake.mplstyle")
     cycle = cycler(color=LINE_COLOURS * len(DASHES), linestyle=DASHES * len(LINE_COLOURS))
@@ -230,6 +233,7 @@ def save_findings(
     *,
     tables: Mapping[str, pandas.DataFrame],
     summary: Mapping[str, Any],
+    kinds: Sequence[str] = ("svg", "png"),
 ) -> list[str]:
     """Writes the results of an analysis to a folder: tables as CSV, summary.json, and the figure.
 
@@ -239,8 +243,9 @@ def save_findings(
         write_whole(folder / f"{table}.csv", rows.to_csv(index=False))
     text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(folder / "summary.json", text + "\n")
-    save_figure(figure, folder, name)
-    return [*(f"{table}.csv" for table in tables), "summary.json", f"{name}.svg", f"{name}.png"]
+    save_figure(figure, folder, name, kinds=kinds)
+    pictures = [f"{name}.{kind}" for kind in kinds]
+    return [*(f"{table}.csv" for table in tables), "summary.json", *pictures]
 
 
 @common_style()

@@ -82,11 +82,25 @@ def comparison_text(compared: Compared) -> str:
         f"Best fitness of each trial after {compared.common} simulations, where the shortest run "
         "ends, and at its end:\ninterquartile mean over trials (95 % confidence interval).",
         _fitness_table(compared).text(),
+        improvement_text(compared.improvement),
         distances,
         _distance_table(compared).text(),
     ]
     texts += [f"note: {note}" for note in compared.notes]
     return "\n\n".join(texts)
+
+
+def improvement_text(improvement: pandas.DataFrame) -> str:
+    """Table of the probabilities of improvement."""
+    rows = []
+    for label, row in improvement.iterrows():
+        rows.append(
+            [str(label), *("" if name == label else fixed(row[name]) for name in row.index)]
+        )
+    return (
+        "Probability that a trial of the row's run ends fitter than a trial of the column's run.\n"
+        + Table(["run", *map(str, improvement.columns)], rows).text()
+    )
 
 
 def _fitness_table(compared: Compared) -> Table:

@@ -6,6 +6,7 @@ A figure has the name of the function that draws it. The function's docstring is
 from __future__ import annotations
 
 import inspect
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.gait_map import map_of_gaits
-from tetra_drake.figures.style import save_figure
+from tetra_drake.figures.style import USUAL, Look, save_figure
 from tetra_drake.results.result import SimulationResult
 
 
@@ -81,7 +82,13 @@ def simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
     return RecordedGait(recorded, simulate(run.scenario, gait, record=True))
 
 
-def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
+def draw_trajectory(
+    result: SimulationResult,
+    folder: Path,
+    *,
+    look: Look = USUAL,
+    kinds: Sequence[str] = ("svg", "png"),
+) -> dict[str, str]:
     """Writes the figures of one simulation. Returns captions by name of figure.
 
     Raises InputError if the folder cannot be written to.
@@ -97,10 +104,16 @@ def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
         pictures.append((forces.signals_and_tensions, result))
     if len(result.robot.structure.contacts):
         pictures.append((forces.ground_forces, result))
-    return _save(folder, *pictures)
+    return _save(folder, *pictures, look=look, kinds=kinds)
 
 
-def draw_run(shown: ShownGaits, folder: Path) -> dict[str, str]:
+def draw_run(
+    shown: ShownGaits,
+    folder: Path,
+    *,
+    look: Look = USUAL,
+    kinds: Sequence[str] = ("svg", "png"),
+) -> dict[str, str]:
     """Writes the figures of a run and of its best gait. Returns captions by name of figure."""
     run = shown.run
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
@@ -112,14 +125,16 @@ def draw_run(shown: ShownGaits, folder: Path) -> dict[str, str]:
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     pictures.append((motion.before_and_after, shown.initial.result, shown.best.result))
-    captions = _save(folder, *pictures)
-    return captions | draw_trajectory(shown.best.result, folder)
+    captions = _save(folder, *pictures, look=look, kinds=kinds)
+    return captions | draw_trajectory(shown.best.result, folder, look=look, kinds=kinds)
 
 
-def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:
+def _save(
+    folder: Path, *pictures: tuple[Any, ...], look: Look, kinds: Sequence[str]
+) -> dict[str, str]:
     """Draws and saves figures. A picture is a figure function and its arguments."""
     captions = {}
     for draw, *data in pictures:
-        save_figure(draw(*data), folder, draw.__name__)
+        save_figure(draw(*data, **vars(look)), folder, draw.__name__, kinds=kinds)
         captions[draw.__name__] = " ".join((inspect.getdoc(draw) or "").split())
     return captions

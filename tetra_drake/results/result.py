@@ -13,6 +13,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, write_whole
+from tetra_drake.formatting import heading_html
 from tetra_drake.machine import versions
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.metrics import compute_fitness, compute_metrics, headline
@@ -80,6 +81,10 @@ class SimulationResult:
 
     def __repr__(self) -> str:
         return f"<SimulationResult {self.title}>"
+
+    def _repr_html_(self) -> str:
+        about = f"scenario {self.scenario.name}, engine {self.engine}, fitness {self.fitness:.4g}"
+        return heading_html(f"{self.title}\n{about}") + self.metrics._repr_html_()
 
     @property
     def trajectory(self) -> xarray.Dataset:

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import given_path, read_json, write_whole
-from tetra_drake.formatting import Table
+from tetra_drake.formatting import Table, heading_html
 from tetra_drake.robot.weights import KINDS, Weights
 from tetra_drake.scenario.common_sections import Gains
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -79,6 +79,14 @@ class Gait:
 
     def __repr__(self) -> str:
         return f"<Gait {self.name}>"
+
+    def _repr_html_(self) -> str:
+        rows = [["τ_A", f"{self.tau_a:.4g} s"], ["τ_B", f"{self.tau_b:.4g} s"]]
+        rows += [["turn", f"{self.turn:.4g}"]] if self.turn else []
+        rows += [[f"gain of {name}", f"{gain:.4g}"] for name, gain in self.gains if gain]
+        least, most = min(self.weights, default=0.0), max(self.weights, default=0.0)
+        rows.append([f"{len(self.weights)} weights", f"{least:.2f} to {most:.2f}"])
+        return heading_html(self.name) + Table(["parameter", "value"], rows, (0, 1)).html()
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """Content of a gait file. The gait must fit `scenario`, which gives the names of the

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
+from tetra_drake.formatting import Table, heading_html
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
@@ -44,8 +45,8 @@ MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
 """Largest number of values of all signals in one simulation, on Drake and on other engines. They
 need about 3 GB."""
 
-_WIDTH = 100
-"""Largest number of characters in a line of a printed scenario."""
+_WIDTH, _ROWS = 100, 20
+"""Largest number of characters in a line of a printed scenario, and of rows in a notebook."""
 
 MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
@@ -99,6 +100,11 @@ class Scenario(Section):
 
     def __repr__(self) -> str:
         return f"<Scenario {self.name}>"
+
+    def _repr_html_(self) -> str:
+        heading = heading_html(str(self).partition("\n")[0])
+        rows = [[key, text] for key, text in self.differences(_thesis()) if len(text) <= _WIDTH]
+        return heading + Table(["differs from thesis", "value"], rows[:_ROWS], (0, 1)).html()
 
     def to_yaml(self) -> str:
         """All settings as a scenario file, in units with few digits."""

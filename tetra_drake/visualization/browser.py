@@ -1,0 +1,63 @@
+"""Headless browser that shows replay pages: Chromium or Chrome, by the package playwright."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from tetra_drake.errors import InputError
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+_SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+INSTALL = "pip install playwright imageio-ffmpeg"
+"""Command that installs the packages for videos."""
+
+
+def find_browser() -> str | None:
+    """Path of an installed Chromium or Chrome."""
+    return next((path for path in map(shutil.which, _NAMES) if path), None)
+
+
+@contextlib.contextmanager
+def launch_browser() -> Iterator[Browser]:
+    """A headless browser that draws WebGL without a graphics card.
+
+    Raises InputError if none is installed, or without playwright.
+    """
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        raise InputError("browser", "", f"needs playwright; install it by: {INSTALL}") from error
+    path = find_browser()
+    if path is None:
+        expected = f"expected one of {', '.join(_NAMES)}; install it by: apt install chromium"
+        raise InputError("browser", "", f"none is installed, {expected}")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=_SOFTWARE_WEBGL)
+        with contextlib.closing(browser):
+            yield browser
+
+
+def wait_until_loaded(page: Page) -> None:
+    """Waits until a replay page can play."""
+    page.wait_for_function("window.film")
+
+
+def do(page: Page, call: str, *arguments: object) -> None:
+    """Calls a function of the page (see film.js), such as "show", and waits until the page is
+    drawn."""
+    page.evaluate(
+        """async ([call, given]) => {
+            film[call](...given);
+            const frame = () => new Promise(requestAnimationFrame);
+            await frame();
+            await frame();
+        }""",
+        [call, list(arguments)],
+    )
