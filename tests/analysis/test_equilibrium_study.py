@@ -3,12 +3,18 @@
 import math
 
 import pytest
+from helpers.anchored import scenario_of
+from helpers.hanging import HANGING
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.mjcf import make_mjcf
+from tetra_drake.formatting import rounded
 from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.scenario.units import INCH
 
 
 def test_two_bars_side_by_side_bounce_as_masses_on_springs():
@@ -66,3 +72,19 @@ def test_text_page_and_model_are_of_the_structure(tmp_path):
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(make_mjcf(study.robot))
     assert (model.nbody, model.ntendon, model.nu) == (1 + 3, 9, 3)
+
+
+def test_struts_that_overlap_and_nodes_below_the_ground_are_named():
+    through = {"strut_contact": "!Nothing {}", "robot.struts.bar.diameter": "60 mm"}
+    scenario = load_scenario("prism")
+    assert "pass through" not in structure_text(study_equilibrium(Robot.of(scenario)))
+    text = structure_text(study_equilibrium(Robot.of(scenario.with_changes(through))))
+    assert "pass through" in text
+    assert "n0 n4 | " in text
+    # A point that hangs 3 mm below the ground, which only `a` can touch.
+    tree = HANGING | {"contacts": ["a"]}
+    lowered = {name: [x, y, z - 0.997] for name, (x, y, z) in HANGING["nodes"].items()}
+    hanging = scenario_of(tree | {"nodes": lowered}).with_sections(terrain=Flat())
+    study = study_equilibrium(Robot.of(hanging))
+    assert study.nodes["z"].idxmin() == "p"
+    assert f"p ({rounded(-study.nodes['z'].min() / INCH)} in)" in structure_text(study)

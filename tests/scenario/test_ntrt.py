@@ -264,3 +264,12 @@ def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path, refused) -> 
     part.unlink()
     with refused(part, ""):
         read(write(tmp_path, SPINE))
+
+
+def test_friction_and_restitution_that_the_scenario_replaces_are_announced(tmp_path, caplog):
+    read(write(tmp_path, PRISM))
+    [record] = caplog.records
+    assert "my.yaml: friction, restitution not used" in record.getMessage()
+    caplog.clear()
+    read(write(tmp_path, PRISM.replace(", friction: 0.9, restitution: 0", "")))
+    assert not caplog.records

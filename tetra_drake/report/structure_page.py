@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake.analysis.equilibrium import EquilibriumStudy
-from tetra_drake.formatting import Table, fixed, rounded
+from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
-from tetra_drake.robot.robot import Robot, undisturbed_structure
+from tetra_drake.robot.ground import START_DEPTH
+from tetra_drake.robot.robot import Robot, overlaps, undisturbed_structure
 from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
@@ -72,7 +73,23 @@ def structure_text(study: EquilibriumStudy) -> str:
         lines.append(_cables_table(study).text())
     if structure.held.any():
         lines.append(_anchors_table(study).text())
+    lines += _faults(study)
     return "\n\n".join(lines)
+
+
+def _faults(study: EquilibriumStudy) -> list[str]:
+    """Lines with the nodes that are below the ground at rest, and the struts that overlap."""
+    robot, structure = study.robot, study.robot.structure
+    lines, allowed = [], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
+    low = study.nodes["z"][study.nodes["z"] < -allowed]
+    if structure.contacts.size and len(low):
+        depths = [f"{node} ({rounded(-z / INCH)} in)" for node, z in low.items()]
+        lines.append(f"Below the ground, which does not touch them: {listed(depths)}.")
+    through = overlaps(robot.scenario, structure, robot.equilibrium.state)
+    if through:
+        pairs = [f"{a} | {b} ({rounded(depth / INCH)} in)" for (a, b), depth in through.items()]
+        lines.append(f"Struts that pass through each other: {listed(pairs)}.")
+    return lines
 
 
 def _bodies_table(study: EquilibriumStudy) -> Table:

@@ -16,6 +16,11 @@ of inertia (relative to its moments) become 0. Otherwise rounding errors would b
 a robot, and explicit integrators would amplify them."""
 
 
+POINT_RADIUS = 0.01
+"""Radius (m) of the ball whose inertia a point mass without strut has. Nothing turns it, and its
+turning moves nothing."""
+
+
 def strut_pose(p_BA: np.ndarray, p_BC: np.ndarray) -> RigidTransform:
     """Pose X_BS of a strut from A to C. The origin is in the middle, the z axis along the strut."""
     return RigidTransform(RotationMatrix.MakeFromOneVector(p_BC - p_BA, 2), (p_BA + p_BC) / 2)
@@ -88,8 +93,10 @@ def _body_inertia(
     for p, radius, density, mass in zip(p_FN, node_radius, node_density, node_mass, strict=True):
         if radius > 0.0:
             total += node_inertia(p, radius=radius, density=density)
-        if mass > 0.0:
+        if mass > 0.0 and len(struts):
             total += SpatialInertia(mass, p, UnitInertia.PointMass(p))
+        elif mass > 0.0:
+            total += SpatialInertia.SolidSphereWithMass(mass, radius or POINT_RADIUS).Shift(-p)
     return total
 
 

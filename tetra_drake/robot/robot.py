@@ -274,21 +274,32 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
 def check_apart(scenario: Scenario, structure: Structure) -> None:
     """Raises InputError if struts that touch overlap in the initial pose of a structure, by more
     than the robot's weight would press them."""
-    struts, contact = structure.strut_table, scenario.strut_contact.law(structure.strut_search)
-    if not contact.acts:
+    if not scenario.strut_contact.law(structure.strut_search).acts:
         return
-    weight = float(structure.mass.sum()) * scenario.robot.gravity
-    allowed = START_DEPTH + weight / NormalForce(*contact.normal).stiffness
-    near, state = NearStruts.of(struts), structure.initial_state
-    nodes = moved_nodes(structure, state)
+    for (first, second), depth in overlaps(scenario, structure, structure.initial_state).items():
+        found = f"struts '{first}' and '{second}' overlap by {1e3 * depth:.3g} mm at the start"
+        advice = "move their nodes, make them thinner, or set strut_contact to !Nothing"
+        raise InputError(scenario.name, "strut_contact", f"{found}; {advice}")
+
+
+def overlaps(
+    scenario: Scenario, structure: Structure, state: np.ndarray
+) -> dict[tuple[str, str], float]:
+    """Depths (m) by which struts of different bodies overlap in a state (13 bodies,), by their
+    names; those by which the robot's weight presses touching struts do not count."""
+    struts, contact = structure.strut_table, scenario.strut_contact.law(structure.strut_search)
+    allowed = START_DEPTH
+    if contact.acts:
+        weight = float(structure.mass.sum()) * scenario.robot.gravity
+        allowed += weight / NormalForce(*contact.normal).stiffness
+    near, nodes = NearStruts.of(struts), moved_nodes(structure, state)
     find_near_struts(struts, contact, structure.radius, state, nodes, near)
+    depths = {}
     for i, j in near.pairs[: near.count[0]].tolist():
         depth = find_touch(struts, nodes, i, j).depth
         if depth > allowed:
-            first, second = structure.strut_name(i), structure.strut_name(j)
-            found = f"struts '{first}' and '{second}' overlap by {1e3 * depth:.3g} mm at the start"
-            advice = "move their nodes, make them thinner, or set strut_contact to !Nothing"
-            raise InputError(scenario.name, "strut_contact", f"{found}; {advice}")
+            depths[structure.strut_name(i), structure.strut_name(j)] = depth
+    return depths
 
 
 def equilibrium_of(

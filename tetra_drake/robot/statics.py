@@ -99,14 +99,17 @@ def _motions_of_nodes(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
 
 
 def _spins(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
-    """Spins (6 B, straight bodies) of the straight ones of B bodies about their axes."""
+    """Spins (6 B, spins) of the straight ones of B bodies about their axes; of points about all
+    axes."""
     bodies = body_of_node.max() + 1
     spins = []
     for body in range(bodies):
         p = p_WN[body_of_node == body]
         _, sizes, axes = np.linalg.svd(p - p[0])
-        if sizes[1:].max(initial=0.0) <= TOLERANCE:
+        if sizes[1:].max(initial=0.0) > TOLERANCE:
+            continue
+        for axis in axes[:1] if len(p) > 1 else axes:
             spin = np.zeros((bodies, 6))
-            spin[body] = np.concatenate([axes[0], np.cross(p[0], axes[0])])
+            spin[body] = np.concatenate([axis, np.cross(p[0], axis)])
             spins.append(spin.ravel())
     return np.array(spins).reshape(-1, 6 * bodies).T

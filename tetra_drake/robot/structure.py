@@ -156,7 +156,7 @@ class Structure(Blueprint):
         shares = []
         for p_BN, mass in zip(of_bodies, self.mass, strict=True):
             # The weighted sum of the nodes of a body is its origin, the centre of mass.
-            conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max())])
+            conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max() or 1.0)])
             origin = [0.0, 0.0, 0.0, conditions[3, 0]]
             shares.append(mass * np.linalg.lstsq(conditions, origin)[0])
         return np.concatenate([*shares, np.zeros(len(fixed))]) / self.mass.sum()

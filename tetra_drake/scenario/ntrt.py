@@ -9,6 +9,7 @@ read.
 from __future__ import annotations
 
 import itertools
+import logging
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -46,6 +47,11 @@ UNUSED = (
     "moveCablePointAToEdge moveCablePointBToEdge"
 )
 """Parameters of NTRT's builders that are allowed and not used."""
+
+OF_GROUND = "friction", "roll_friction", "restitution"
+"""Unused parameters for which the scenario has others: its friction and its ground."""
+
+_LOG = logging.getLogger("tetra_drake")
 
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
@@ -88,13 +94,16 @@ class Parameters(Section):
     stiffness: float = Field(default=1000.0, gt=0)
     damping: float = Field(default=10.0, ge=0)
     pretension: float = Field(default=0.0, ge=0)
+    replaced: list[str] = Field(default=[])
+    """Names of OF_GROUND that the file gives."""
 
     @pydantic.model_validator(mode="before")
     @classmethod
     def _drop_unused(cls, tree: Any) -> Any:
         if not isinstance(tree, dict):
             return tree
-        return {name: value for name, value in tree.items() if name not in UNUSED.split()}
+        used = {name: value for name, value in tree.items() if name not in UNUSED.split()}
+        return used | {"replaced": [name for name in OF_GROUND if name in tree]}
 
 
 class Builder(Section):
@@ -268,6 +277,7 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     """
     whole = Assembly()
     whole.add_file(file)
+    _announce_replaced(whole.builders, file)
     structure = StructureFile.model_construct(nodes={}, struts={}, cables={}, spheres={})
     _add_spheres(structure, whole, unit)
     ground = min((p_W[1] for p_W in whole.nodes.values()), default=0.0)
@@ -294,6 +304,14 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
                 tension=given.pretension * unit,
             )
     return Tree(written(structure.model_dump()))
+
+
+def _announce_replaced(builders: dict[str, Builder], file: Path) -> None:
+    """Logs which parameters of builders the scenario's friction and ground replace."""
+    given = {name for builder in builders.values() for name in builder.parameters.replaced}
+    if given:
+        names = ", ".join(name for name in OF_GROUND if name in given)
+        _LOG.warning("%s: %s not used; the scenario's friction and ground hold", file, names)
 
 
 def _add_spheres(structure: StructureFile, whole: Assembly, unit: float) -> None:

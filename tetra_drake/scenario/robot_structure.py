@@ -178,7 +178,8 @@ class StructureFile(Section):
     actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, their nodes in either order."""
     masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
-    """Point masses at nodes, such as motors."""
+    """Point masses at nodes, such as motors. A node of no strut that only cables hold is a point
+    mass, such as a payload."""
     loads: dict[str, Annotated[list[Force], Field(min_length=3, max_length=3)]] = Field(default={})
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: dict[str, Annotated[str, pydantic.BeforeValidator(_check_axes)]] = Field(default={})
@@ -274,8 +275,12 @@ class StructureFile(Section):
 
     @cached_property
     def bodies(self) -> tuple[tuple[str, ...], ...]:
-        """Nodes of each rigid body. Bodies and nodes are in the order of the struts."""
-        return _components(self.all_struts)
+        """Nodes of each rigid body. Bodies and nodes are in the order of the struts; then come
+        point masses."""
+        of_struts = _components(self.all_struts)
+        used = {node for body in of_struts for node in body}
+        fixed = {node for node, axes in self.anchors.items() if len(axes) == len("xyz")}
+        return *of_struts, *((node,) for node in self.masses if node not in used | fixed)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
@@ -331,8 +336,9 @@ class StructureFile(Section):
     @property
     def contact_nodes(self) -> tuple[str, ...]:
         """Names of the nodes that the ground can touch, in the order of `nodes`."""
-        touching = self.sphere_of_node if self.contacts == "all" else self.contacts
-        return tuple(node for node in self.nodes if node in touching)
+        if self.contacts == "all":
+            return tuple(node for node in self.nodes if self.body_of_node[node] != WORLD)
+        return tuple(node for node in self.nodes if node in self.contacts)
 
     def _held(self, node: str) -> str:
         """Axes along which an anchor holds the node of a strut."""
@@ -389,6 +395,8 @@ class StructureFile(Section):
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
         self._check_pairs()
+        for node in self.masses:
+            self._check_moving(f"masses.{node}", node)
         self._check_sizes()
         self._check_places()
         self._check_bodies()
@@ -396,8 +404,6 @@ class StructureFile(Section):
         self._check_tensions()
         self._check_actuated()
         self._check_anchors()
-        for node in self.masses:
-            self._check_moving(f"masses.{node}", node)
         for node in self.loads:
             self._check_moving(f"loads.{node}", node)
         if self.contacts != "all":
@@ -418,7 +424,7 @@ class StructureFile(Section):
     def _check_moving(self, key: str, node: str) -> None:
         self._check_node(key, node)
         if self.body_of_node[node] == WORLD:
-            refuse(key, f"found the fixed node '{node}', expected a node of a strut")
+            refuse(key, f"found the fixed node '{node}', expected one that can move")
 
     def _check_anchors(self) -> None:
         for node in self.anchors:
@@ -430,7 +436,7 @@ class StructureFile(Section):
         """True if a body with these nodes can move in spite of its anchors. The spin of a straight
         body does not count."""
         p = np.array([self.nodes[node] for node in body])
-        motions = rigid_motions((p - p[0]) / np.ptp(p, axis=0).max())
+        motions = rigid_motions((p - p[0]) / (np.ptp(p, axis=0).max() or 1.0))
         held = np.array([[axis in self._held(node) for axis in "xyz"] for node in body])
         ways = np.linalg.matrix_rank(motions.reshape(-1, 6), tol=LEAST_DISTANCE)
         return bool(np.linalg.matrix_rank(motions[held], tol=LEAST_DISTANCE) < ways)
@@ -468,8 +474,12 @@ class StructureFile(Section):
     def _check_bodies(self) -> None:
         for node, body in self.body_of_node.items():
             if body == WORLD and len(self.anchors.get(node, "")) < len("xyz"):
-                expected = "a node of a strut, or an anchor along xyz"
+                expected = "a node of a strut, an anchor along xyz, or a mass"
                 refuse(f"nodes.{node}", f"is on no strut, expected {expected}")
+        ends = {node for cable in self.all_cables for node in cable.nodes}
+        for node in self.masses:
+            if self.bodies[self.body_of_node[node]] == (node,) and node not in ends:
+                refuse(f"masses.{node}", "is on no strut and no cable, expected a cable to it")
         for cable in self.all_cables:
             first, second = self._bodies_joined(cable)
             if first == second == WORLD:
