@@ -42,8 +42,8 @@ NAMES = sorted(file.stem for file in TUTORIALS.glob("*.py"))
 LONGEST = 50  # lines
 
 
-def test_there_are_twelve_each_short_and_with_its_picture():
-    assert [int(name[:2]) for name in NAMES] == list(range(1, 13))
+def test_there_are_thirteen_each_short_and_with_its_picture():
+    assert [int(name[:2]) for name in NAMES] == list(range(1, 14))
     for name in NAMES:
         assert len((TUTORIALS / f"{name}.py").read_text("utf-8").splitlines()) <= LONGEST, name
         assert (TUTORIALS / f"{name}.png").is_file()
