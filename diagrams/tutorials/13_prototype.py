@@ -11,9 +11,9 @@ from tetra_drake.prototype.export import export
 from tetra_drake.scenario.scenario import Scenario
 
 settings = {"actuation": "!TensionMotor {max_force: 20 N, max_speed: 1 m/s, time_constant: 20 ms}"}
-settings |= {"friction.stiffness": 0, "simulation.duration": "8 s", "simulation.steady_from": "2 s"}
-settings |= {"optimizer": "!CmaEs", "evolution.trials": 1, "evolution.evaluations": 1000}
-model = td.load_scenario("coulomb").with_changes(settings)
+settings |= {"simulation.duration": "8 s", "simulation.steady_from": "2 s", "optimizer": "!CmaEs"}
+numbers = {"friction.stiffness": 0.0, "evolution.trials": 1, "evolution.evaluations": 1000}
+model = td.load_scenario("coulomb").with_changes(settings | numbers)
 hidden = {"friction.static": 0.35, "friction.kinetic": 0.35, "robot.cables.damping": "7 N*s/m"}
 prototype = model.with_changes(hidden | {"engine": "!Mujoco", "actuation": "!Force"})
 figure = Figure(figsize=(7.0, 3.0), layout="constrained")
