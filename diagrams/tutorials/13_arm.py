@@ -37,4 +37,4 @@ found, figure = log.FindLog(simulator.get_context()), Figure((7, 3), layout="con
 axes = figure.subplots(subplot_kw={"xlabel": "time (s)", "ylabel": "angle (degrees)"})
 axes.plot(found.sample_times(), np.degrees(found.data()[:2].T), label=["shoulder", "elbow"])
 axes.legend()
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -37,4 +37,4 @@ for time in times:
 figure = Figure(figsize=(7.0, 3.0), layout="constrained")
 axes = figure.subplots(subplot_kw={"xlabel": "time (s)", "ylabel": "way of the centre (mm)"})
 axes.plot(times, ways)
-figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

@@ -23,7 +23,7 @@ from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import value_at
-from tetra_drake.scenario.units import plainest, quantity_to_si
+from tetra_drake.scenario.units import quantity_to_si
 
 STEP = 1e-3
 """Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and
@@ -172,9 +172,11 @@ def fit_values(
         for number, each in enumerate(measurements, start=1)
     ]
     numbers = sum(len(each.numbers) for each in measured)
-    if not fitted or numbers < len(fitted):
-        found = f"found {len(fitted)} for {numbers} measured numbers"
-        raise InputError("fit", "parameters", f"{found}, expected one at least, and no more")
+    if not fitted:
+        raise InputError("fit", "parameters", "is empty, expected a key with bounds")
+    if numbers < len(fitted):
+        found = f"found {len(fitted)} keys and {numbers} measured numbers"
+        raise InputError("fit", "parameters", f"{found}, expected at least a number for each key")
     digest = _digest(scenario, measurements)
     problem = _Problem(scenario, fitted, measured, digest, folder, say)
     start = np.array([parameter.start / parameter.scale for parameter in fitted])
@@ -464,7 +466,7 @@ def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[s
         if not row["determined"]:
             warnings.append(f"the data do not determine {key}: the bounds are all that is known")
         elif min(value - row["least"], row["most"] - value) < STEP * width:
-            warnings.append(f"{key} is at a bound, {plainest(value, row['unit'])}")
+            warnings.append(f"{key} is at a bound, {rounded(value)} {row['unit']}".rstrip())
     determined = table.index[table["determined"]]
     for place, one in enumerate(determined):
         others = [

@@ -79,15 +79,15 @@ def structure_text(study: EquilibriumStudy) -> str:
 
 def _faults(study: EquilibriumStudy) -> list[str]:
     """Lines with the nodes that are below the ground at rest, and the struts that overlap."""
-    robot, structure = study.robot, study.robot.structure
+    robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     lines, allowed = [], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
-        depths = [f"{node} ({rounded(-z / INCH)} in)" for node, z in low.items()]
+        depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]
         lines.append(f"Below the ground, which does not touch them: {listed(depths)}.")
     through = overlaps(robot.scenario, structure, robot.equilibrium.state)
     if through:
-        pairs = [f"{a} | {b} ({rounded(depth / INCH)} in)" for (a, b), depth in through.items()]
+        pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), depth in through.items()]
         lines.append(f"Struts that pass through each other: {listed(pairs)}.")
     return lines
 
