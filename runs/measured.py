@@ -1,4 +1,4 @@
-"""Predictions beside measurements of three real structures; no constant is fitted.
+"""Predictions beside measurements of three real structures; their constants are not fitted.
 
     python runs/measured.py
 
@@ -16,6 +16,8 @@ import pandas
 from matplotlib.figure import Figure
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.analysis.fit import Fit, fit_values
+from tetra_drake.analysis.measurements import Rest
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
@@ -37,6 +39,11 @@ TUBE, GRAVITY = 2.63, 9.81
 """Mass (kg) of a strut of the simplex, and acceleration of gravity (m/s²)."""
 VIBRATING = {"n0": 45.7, "n1": 45.7, "n2": 45.7, "n3": 50.3, "n4": 50.3, "n5": 50.3}
 """Weights (N) at the nodes of the simplex in the tests of its frequency, half a strut included."""
+
+UPPER = ("n3", "n4", "n5")
+"""Upper nodes of the simplex, which are loaded."""
+HEIGHT_UNCERTAINTY = 2e-4
+"""Standard deviation (m) of a measured height."""
 
 SADDLE = ("horizontal_bottom", "horizontal_top", "saddle_bottom", "saddle_top")
 """Cables of the spine, in the order of its measurements."""
@@ -110,12 +117,12 @@ def simplex_under_load() -> pandas.DataFrame:
     for _, of_step in measured[measured["quantity"] != "angle"].groupby("step"):
         load = max(0.0, of_step["x"].mean())
         force = ["0 N", "0 N", f"{-1e3 * load} N"]
-        loads = {f"robot.loads.{node}": force for node in ("n3", "n4", "n5")}
+        loads = {f"robot.loads.{node}": force for node in UPPER}
         robot = Robot.of(stressed.with_changes(loads))
         study = study_equilibrium(robot)
         tension = study.cables.groupby("group")["tension"].mean() / 1e3
         predicted = {
-            "H": 1e3 * np.mean([at_rest(robot)[node][2] for node in ("n3", "n4", "n5")]),
+            "H": 1e3 * np.mean([at_rest(robot)[node][2] for node in UPPER]),
             "CB": tension["bottom"],
             "CT": tension["top"],
             "CV": tension["vertical"],
@@ -127,6 +134,33 @@ def simplex_under_load() -> pandas.DataFrame:
             row |= {f"{kind} least": values.min(), f"{kind} greatest": values.max()}
         rows.append(row)
     return pandas.DataFrame(rows)
+
+
+def simplex_heights(most_load: float = 1.01) -> list[Rest]:
+    """Measured mean heights of the upper nodes, up to a load (kN) per node, for a fit."""
+    measured = pandas.read_csv(HERE / "simplex_loading.csv")
+    heights = measured[measured["quantity"] == "height"]
+    cases = []
+    for _, of_step in heights.groupby("step"):
+        load = max(0.0, of_step["x"].mean())
+        if load > most_load:
+            continue
+        force = ["0 N", "0 N", f"{-1e3 * load} N"]
+        height = of_step["value"].mean() / 1e3
+        cases.append(
+            Rest(
+                changes={f"robot.loads.{node}": force for node in UPPER},
+                positions={f"{node} z": height for node in UPPER},
+                position_uncertainty=HEIGHT_UNCERTAINTY,
+            )
+        )
+    return cases
+
+
+def fitted_free_lengths(*groups: str) -> Fit:
+    """Free lengths of groups of the simplex's cables, fitted to its measured heights."""
+    bounds = {f"robot.cables.{group}.free_length": ("2035 mm", "2050 mm") for group in groups}
+    return fit_values(simplex(1.5), simplex_heights(), bounds)
 
 
 def simplex_frequency(self_stress: float) -> float:
@@ -208,6 +242,17 @@ def frequency_table(frequencies: dict[float, float]) -> Table:
         for stress, predicted in frequencies.items()
     ]
     return Table(["self-stress, kN", "first frequency, Hz", "measured"], rows, text_columns=())
+
+
+def free_length_table(fit: Fit) -> Table:
+    """The fitted free lengths beside the published ones."""
+    rows = []
+    for key, row in fit.parameters.iterrows():
+        interval = f"{fixed(1e3 * row['low'], 1)} to {fixed(1e3 * row['high'], 1)}"
+        published, group = row["start"], str(key).split(".")[2]
+        rows.append([group, *(fixed(1e3 * x, 1) for x in (row["value"], published)), interval])
+    head = ["cables", "free length, fitted (mm)", "published (mm)", "95 % interval (mm)"]
+    return Table(head, rows)
 
 
 def spine_table(poses: pandas.DataFrame) -> Table:
@@ -303,8 +348,8 @@ def jump_figure(jumps: dict[float, list[tuple[float, float]]]) -> Figure:
 PAGE = """\
 # Measured robots
 
-Predictions beside measurements of three real structures. No constant is fitted. `python
-runs/measured.py` writes this page.
+Predictions beside measurements of three real structures. No constant of a prediction is fitted.
+`python runs/measured.py` writes this page.
 
 ## Simplex (UCLouvain)
 
@@ -318,6 +363,11 @@ The self-stress is made as in the laboratory: the tubes are lengthened until the
 
 Up to 1 kN the heights are within 1 mm of the measured ones. At the end the real simplex is lower by
 several mm; its authors suspect that the tubes bend, and ours stay straight.
+
+The other way round, a [fit](../../README.md) of two free lengths to these heights finds the
+published ones. The bottom cables are as published: the heights do not tell them from the top ones.
+
+{free_lengths}
 
 {frequencies}
 
@@ -382,6 +432,7 @@ def main() -> None:
         save_figure(figure, HERE, name, kinds=["svg"])
     page = PAGE.format(
         simplex=simplex_table(under_load).markdown(),
+        free_lengths=free_length_table(fitted_free_lengths("top", "vertical")).markdown(),
         frequencies=frequency_table(frequencies).markdown(),
         spine=spine_table(poses).markdown(),
         jumps=jump_table(jumps).markdown(),

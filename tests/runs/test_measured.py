@@ -14,6 +14,15 @@ def test_the_simplex_is_as_high_as_measured_up_to_a_load_of_1_kn():
         np.testing.assert_allclose(moderate[kind], moderate[f"{kind} measured"], rtol=0.05)
 
 
+def test_the_measured_heights_of_the_simplex_tell_its_free_lengths():
+    found = measured.fitted_free_lengths("top", "vertical").parameters
+    assert ((found["low"] < found["start"]) & (found["start"] < found["high"])).all()
+    np.testing.assert_allclose(found["value"], found["start"], atol=5e-4)
+    # Longer bottom cables lower the upper nodes as longer top cables do.
+    all_groups = measured.fitted_free_lengths("bottom", "top", "vertical").parameters
+    assert all_groups["determined"].to_list() == [False, False, True]
+
+
 def test_the_simplex_vibrates_faster_with_more_self_stress():
     slow, fast = (measured.simplex_frequency(stress) for stress in measured.SELF_STRESSES)
     assert slow == pytest.approx(2.28, abs=0.02) and fast == pytest.approx(2.72, abs=0.02)

@@ -66,8 +66,10 @@ class Parameter(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Unit of the relative parameter: the start, or the width of the bounds if it is 0."""
-        return abs(self.start) or self.most - self.least
+        """Unit of the relative parameter: the start, or the width of the bounds if the start is 0
+        or they are narrower."""
+        width = self.most - self.least
+        return min(abs(self.start) or width, width)
 
     def given(self, number: float) -> str | float:
         """The number for a scenario."""
