@@ -166,7 +166,8 @@ def test_it_begins_with_a_random_sample_and_goes_on_from_the_mean_of_its_best_qu
     assert (first, second) == (None, pytest.approx(1e-9, rel=1e-4))
 
 
-def test_without_a_sample_it_starts_in_the_middle_as_wide_as_sigma_says():
+def test_without_a_sample_it_starts_in_the_middle_as_wide_as_sigma_says(monkeypatch):
+    monkeypatch.setattr(cma_es, "SIGMA", 0.2)  # hardly bent by the floors
     (batch, *_), _ = run(CmaEs(sample=0, population=400), budget=400)
     widths = np.array([2.4] * 24 + [0.3])  # of [1, 3.4] and [0.2, 0.5] s
     middle = np.array([2.2] * 24 + [0.35])
@@ -179,16 +180,36 @@ def test_without_a_sample_it_starts_in_the_middle_as_wide_as_sigma_says():
 def test_the_best_of_several_searches_goes_on(monkeypatch):
     for name, value in (("TRYOUT", 45), ("SIGMA", 0.01), ("TOLERANCE", 1e-9)):
         monkeypatch.setattr(cma_es, name, value)
-    kind = CmaEs(population=10, sample=10, starts=5)
+    kind = CmaEs(population=10, sample=12, starts=5)
     batches, iterations = run(kind, budget=300)
     starts = [iteration.report["start"] for iteration in iterations]
-    tried, after = starts[1:16], starts[16:]
-    assert tried == [0] * 5 + [1] * 5 + [2] * 5  # a fourth one would take more than 150 in all
-    best = max(range(3), key=lambda i: fitnesses(batches[1 + 5 * i : 6 + 5 * i]).max())
+    tried, after = starts[:18], starts[18:]
+    # A fourth search would take more than 150 in all. Each has a sample of its own.
+    assert tried == [None, *[0] * 5, None, *[1] * 5, None, *[2] * 5]
+    firsts = (1, 7, 13)
+    best = max(range(3), key=lambda i: fitnesses(batches[firsts[i] : firsts[i] + 5]).max())
     assert set(after) == {best}
-    ranked = sorted(batches[0], key=lambda vector: bowl(vector).fitness)[::-1]
-    for batch, start in zip((batches[6], batches[11]), ranked, strict=False):
-        assert np.abs(np.mean(batch, axis=0) - start)[:-2].max() < 4 * 0.01 * 2.4 / np.sqrt(10)
+    for first in firsts:
+        ranked = sorted(batches[first - 1], key=lambda vector: bowl(vector).fitness)[-3:]
+        distance = np.abs(np.mean(batches[first], axis=0) - np.mean(ranked, axis=0))[:-2]
+        assert distance.max() < 4 * 0.01 * 2.4 / np.sqrt(10)
+
+
+def test_where_a_search_has_stalled_another_begins_elsewhere(monkeypatch):
+    for name, value in (("TRYOUT", 60), ("PATIENCE", 80), ("SIGMA", 0.1)):
+        monkeypatch.setattr(cma_es, name, value)
+
+    kind = CmaEs(population=10, sample=0, starts=1)
+    _, iterations = run(kind, lambda vector: Evaluation(1.0), budget=400)
+    sizes = [[], [], []]
+    for report in (iteration.report for iteration in iterations[:-1]):
+        sizes[report["start"]].append(report["population"])
+    # The first batch sets the level. After 80 more without a rise, the next search begins.
+    for first, *later in sizes[:2]:
+        assert first == 10 and sum(later) >= 80 > sum(later[:-1])
+    assert iterations[-1].report["start"] == 2
+    _, iterations = run(kind, budget=300)  # the bowl: it rises
+    assert {iteration.report["start"] for iteration in iterations} == {0}
 
 
 def test_it_begins_anew_and_larger_around_its_best_where_it_has_converged():

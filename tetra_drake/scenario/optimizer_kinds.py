@@ -43,20 +43,20 @@ class CmaEs(Section):
     """Covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
 
     Vectors are drawn from a normal distribution that adapts to the fittest. A search that has
-    converged restarts around the best gait, with twice the population.
+    converged restarts around its best gait, with twice the population. Where a search has stalled,
+    a new one begins elsewhere.
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
     """Number of vectors in an iteration. The default is 4 + 3 ln n, rounded down, for n
     parameters."""
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
-    """Number of random gaits that are evaluated first, the sample."""
+    """Number of random gaits that are evaluated before each search, the sample."""
     starts: int = Field(default=5, ge=1, le=1000)
-    """Number of searches that are tried out; the search with the best gait continues. The first
-    search starts at the mean of the best quarter of the sample, the others start at the best gaits
-    of the sample. Without a sample, the first starts in the middle of the ranges, the others start
-    at random gaits. The searches take at most half of the evaluations, so there may be fewer. There
-    is at most one more than sampled gaits."""
+    """Number of searches that are tried out, for 1,000 evaluations each; the search with the best
+    gait continues. A search starts at the mean of the best quarter of its sample. Without a sample,
+    the first starts in the middle of the ranges, the others start at random gaits. The searches
+    take at most half of the evaluations, so there may be fewer."""
 
 
 class RandomSearch(Section):
