@@ -8,13 +8,11 @@ from helpers.hanging import HANGING
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.mjcf import make_mjcf
-from tetra_drake.formatting import rounded
 from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.terrain_kinds import Flat
-from tetra_drake.scenario.units import INCH
 
 
 def test_two_bars_side_by_side_bounce_as_masses_on_springs():
@@ -65,13 +63,13 @@ def test_text_page_and_model_are_of_the_structure(tmp_path):
     study = study_equilibrium(robot_of_file("prism"))
     text = structure_text(study)
     assert "60.83 g" in text  # 3 bars of 20.277 g
-    for name in ("n0 n4", "bottom", "side", "0.951"):  # 4.2308 N
+    for name in ("n0 n4", "bottom", "side", "4.23"):  # N
         assert name in text
     save_structure_page(study, tmp_path / "prism.html")
     assert "prism at rest" in (tmp_path / "prism.html").read_text()
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(make_mjcf(study.robot))
-    assert (model.nbody, model.ntendon, model.nu) == (1 + 3, 9, 3)
+    assert (model.nbody, model.ntendon, model.nu) == (1 + 3, 9, 6)
 
 
 def test_struts_that_overlap_and_nodes_below_the_ground_are_named():
@@ -87,4 +85,4 @@ def test_struts_that_overlap_and_nodes_below_the_ground_are_named():
     hanging = scenario_of(tree | {"nodes": lowered}).with_sections(terrain=Flat())
     study = study_equilibrium(Robot.of(hanging))
     assert study.nodes["z"].idxmin() == "p"
-    assert f"p ({rounded(-study.nodes['z'].min() / INCH)} in)" in structure_text(study)
+    assert f"p ({hanging.units.shown(-study.nodes['z'].min(), 'm')})" in structure_text(study)
