@@ -8,7 +8,7 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 from helpers.widths import WIDEST
 
 from tetra_drake.engines.simulation import Simulation
-from tetra_drake.gym import WALK, TensegrityEnv, TensegrityVectorEnv
+from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.robot.robot import AMPLITUDE
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
@@ -37,9 +37,16 @@ def episode(env: gymnasium.Env, *, seed: int) -> tuple[np.ndarray, list[float], 
 
 
 @pytest.mark.filterwarnings("ignore:.*infinity")
-def test_the_environment_passes_gymnasiums_checks(short):
-    env = gymnasium.make(WALK, scenario=short)
-    check_env(env.unwrapped, skip_render_check=True)
+@pytest.mark.parametrize("name", [WALK, ROLL])
+def test_the_environments_pass_gymnasiums_checks(name):
+    check_env(gymnasium.make(name).unwrapped, skip_render_check=True)
+
+
+def test_one_environment_walks_and_one_rolls():
+    walks, rolls = (gymnasium.make(name).unwrapped for name in (WALK, ROLL))
+    assert walks._episodes.simulation.scenario.name == "coulomb"
+    assert "rolled" in rolls._episodes.simulation.scenario.objective
+    assert rolls.action_space.shape == (24,)
 
 
 @pytest.mark.parametrize("actuation", [FORCE, WINCH, MOTOR])

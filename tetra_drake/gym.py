@@ -47,8 +47,9 @@ from tetra_drake.scenario.scenario import Scenario
 
 Info = dict[str, Any]
 
-WALK = "tetra_drake/Walk-v0"
-"""Name of the environment of a robot that walks; by default on the scenario `coulomb`."""
+WALK, ROLL = "tetra_drake/Walk-v0", "tetra_drake/Roll-v0"
+"""Names of the environments of a robot that walks, by default on the scenario `coulomb`, and of one
+that rolls, by default on `rover`."""
 
 
 class _Episodes:
@@ -252,7 +253,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._episodes.reset(int(self.np_random.integers(2**31)), places)
 
 
-for _name, _scenario in {WALK: "coulomb"}.items():
+for _name, _scenario in {WALK: "coulomb", ROLL: "rover"}.items():
     gymnasium.register(
         _name,
         entry_point="tetra_drake.gym:TensegrityEnv",
