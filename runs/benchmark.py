@@ -9,6 +9,7 @@ Prints tables in Markdown for tetra_drake/engines/README.md. The gaits are rando
     integrators    speed and error for settings of the diagram; takes longest
     batches        speed of the compiled engine with many gaits at a time
     grounds        speed by ground and network
+    controlled     speed of robots that are controlled, on all cores
 
 Errors are differences of distances from converged simulations of the compiled engine. For MuJoCo,
 with its different ground, they are from converged simulations of MuJoCo. Times are only meaningful
@@ -20,25 +21,33 @@ from __future__ import annotations
 import statistics
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import yaml
 
+from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.command import Command, controlled_robot
+from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 GAITS = 12  # for each engine
 BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time
 GROUND_BATCH = 30  # gaits at a time on each ground
+CONTROLLED = (1, 8, 64, 512)  # robots at a time
+ROLLOUT_PERIODS = 50  # control periods that MuJoCo simulates
 ROUNDS = 3  # measurements; their medians count
 
 ENGINES = {
@@ -173,7 +182,90 @@ def grounds_table(scenario: Scenario) -> str:
     return Table(headings, rows).markdown()
 
 
-TABLES = {"batches": batches_table, "grounds": grounds_table}
+def held_gait(scenario: Scenario, gait: Gait) -> Command:
+    """The signals of a gait, held for control periods."""
+    robot, period = Robot.of(scenario), scenario.simulation.control_period
+    times = np.arange(0.0, scenario.simulation.duration, period)
+    of_cable = robot.structure.cables["signal"][robot.driven]
+    return Command(gait.name, period, signals_at(robot, gait, times)[:, of_cable])
+
+
+def step_through(simulation: Simulation, actions: np.ndarray) -> None:
+    """Simulates robots with actions (periods, robots, actions)."""
+    simulation.reset()
+    for some in actions:
+        simulation.step(some)
+
+
+def controlled_rows(scenario: Scenario) -> list[list[str]]:
+    """Control periods per second of robots with the actions of gaits, and this throughput beside
+    simulations of the same actions as commands, and of the gaits themselves."""
+    rows: list[list[str]] = [[], [], []]
+    for robots in CONTROLLED:
+        gaits = [seeded_gait(scenario, seed) for seed in range(robots)]
+        commands = [held_gait(scenario, gait) for gait in gaits]
+        actions = np.stack([command.samples for command in commands], axis=1)
+        stepped, commanded, walked = median_times(
+            partial(step_through, Simulation(scenario, count=robots), actions),
+            partial(simulate_many, scenario, commands),
+            partial(simulate_many, scenario, gaits),
+        )
+        rows[0].append(f"{robots * len(actions) / stepped:,.0f}")
+        rows[1].append(fixed(commanded / stepped))
+        rows[2].append(fixed(walked / stepped))
+    names = "", ", beside commands", ", beside gaits"
+    return [[f"`{scenario.name}`{name}", *row] for name, row in zip(names, rows, strict=True)]
+
+
+def rollout_row(scenario: Scenario) -> list[str]:
+    """Control periods per second of robots in MuJoCo's rollout, with its threads."""
+    import mujoco
+    from mujoco.rollout import Rollout
+
+    robot = controlled_robot(with_engine(scenario, "!Mujoco {step: 1 ms}"))
+    model = mujoco.MjModel.from_xml_string(make_mjcf(robot))
+    data = [mujoco.MjData(model) for _ in range(available_cores())]
+    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    start = np.empty(mujoco.mj_stateSize(model, kind))
+    mujoco.mj_getState(model, data[0], start, kind)
+
+    def roll_out(robots: int) -> None:
+        steps = round(scenario.simulation.control_period / model.opt.timestep)
+        states, controls = np.tile(start, (robots, 1)), np.zeros((robots, steps, model.nu))
+        with Rollout(nthread=len(data)) as rollout:
+            for _ in range(ROLLOUT_PERIODS):
+                states = rollout.rollout(model, data, states, controls)[0][:, -1]
+
+    times = median_times(*(partial(roll_out, robots) for robots in CONTROLLED))
+    speeds = ROLLOUT_PERIODS * np.array(CONTROLLED) / times
+    return [f"`{scenario.name}`, MuJoCo's rollout", *(f"{speed:,.0f}" for speed in speeds)]
+
+
+def median_times(*runs: Callable[[], object]) -> np.ndarray:
+    """Median wall time (s) of each function (functions,). They take turns in several rounds."""
+    rounds = []
+    for _ in range(1 + ROUNDS):
+        times = []
+        for run in runs:
+            started = time.perf_counter()
+            run()
+            times.append(time.perf_counter() - started)
+        rounds.append(times)
+    return np.median(rounds[1:], axis=0)  # the first round compiles
+
+
+def controlled_table(scenario: Scenario) -> str:
+    """Table of the speed of robots in control periods."""
+    compiled, coulomb = with_engine(scenario, "!Compiled {}"), load_scenario("coulomb")
+    changes = {"friction": coulomb.friction, "engine": coulomb.engine, "name": coulomb.name}
+    second = compiled.with_sections(**changes)
+    rows = [*controlled_rows(compiled), *controlled_rows(second)]
+    if installed():
+        rows.append(rollout_row(second.with_changes({"friction.stiffness": "0 N/m"})))
+    return Table(["control periods per second", *map(str, CONTROLLED)], rows).markdown()
+
+
+TABLES = {"batches": batches_table, "grounds": grounds_table, "controlled": controlled_table}
 
 
 def main(names: Sequence[str], scenario: Scenario) -> None:

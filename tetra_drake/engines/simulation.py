@@ -76,6 +76,7 @@ class Simulation:
         self.scenario = scenario = given_scenario(scenario)
         self.robot: Robot = controlled_robot(scenario)
         """The robot without disturbances. Its structure has the names of nodes and cables."""
+        self._first_readings = first_readings(self.robot)
         workers = available_cores() if workers is None else workers
         _check_whole("count", count, least=1)
         _check_whole("workers", workers, least=1)
@@ -186,7 +187,9 @@ class Simulation:
             values[place] = given
         self.rest[place] = robot.scenario.actuation.commands(cables)
         self._robots[place], self.failures[place], self._steps[place] = robot, None, 0
-        self._stepper.readings.put(place, first_readings(robot))
+        self._stepper.readings.put(
+            place, self._first_readings if robot is self.robot else first_readings(robot)
+        )
 
     def _gait_simulation(self, robot: Robot) -> GaitSimulation:
         return GaitSimulation(robot, self._gait, record=self._record, viewer=self._viewer)

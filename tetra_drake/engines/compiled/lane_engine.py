@@ -55,13 +55,17 @@ class LaneEngine:
         self._constants, constants = _constants_in_lanes(first.constants, self._heights, width)
         self._lanes, states = in_lanes(first.start, width)
         self._log = allocate(loop.Log, first.log_sizes | {"lanes": width, "places": places})
-        tables = self._lanes
-        self._tally = (tables.tally.begins.address - tables.clock.address) // (8 * width)
-        """Index of the tally among the numbers of a robot's state."""
+
+        def index(table: FieldArray, memory: np.ndarray) -> int:
+            """Index of a table's first number among the numbers of its memory."""
+            return (table.address - memory.ctypes.data) // memory.strides[0]
+
+        self._tally = index(self._lanes.tally.begins, states)
+        self._first_height = index(self._constants.robot.ground.grid, constants) + FIRST
         sizes = {
             "places": places,
             "lanes": width,
-            "numbers": (tables.step.end.address - tables.clock.address) // (8 * width),
+            "numbers": index(self._lanes.step.end, states),
             "constants": len(constants),
             "paused": paused,
             "signals": robot.structure.signals,
@@ -105,8 +109,7 @@ class LaneEngine:
         log, start, heights = self._log, prepared.start, prepared.robot.ground.heights
         constants, network = self._places.constants[place], self._constants.network
         constants[:] = numbers_of(prepared.constants)
-        grid = views(prepared.constants, constants).robot.ground.grid
-        grid[FIRST] = place * self._heights.shape[1]
+        constants[self._first_height] = place * self._heights.shape[1]
         self._heights[place, : heights.size] = heights
         # The kernel has one range of inhibiting neurons for all lanes.
         network.first.array[:] = np.minimum(network.first.array, prepared.constants.network.first)
@@ -151,11 +154,9 @@ class LaneEngine:
         """Simulates until a robot ends, or for about `body_steps` iterations times bodies. Returns
         the places of robots that have ended; stop() empties a place. Other Python threads run
         meanwhile."""
-        started = time.perf_counter()
-        self._advance(self._parts, max(1, body_steps // (ROUND * self._bodies)))
-        busy = [place for place, prepared in enumerate(self._prepared) if prepared is not None]
-        self._wall_times += (time.perf_counter() - started) / max(len(busy), 1)
-        return [place for place in busy if self.status[place] != loop.RUNNING]
+        self._simulate(body_steps)
+        ended = np.flatnonzero(self.status != loop.RUNNING).tolist()
+        return [place for place in ended if self._prepared[place] is not None]
 
     def advance_to_pause(self, signals: np.ndarray, marks: np.ndarray) -> None:
         """Simulates a control period of the robots with marks; see Stepper.advance()."""
@@ -164,9 +165,16 @@ class LaneEngine:
         self._tried += work
         longest_first = np.argsort(-work, kind="stable")  # so that the lanes end together
         self._wait(longest_first[np.isfinite(marks[longest_first, 0])])
-        self.advance(_BODY_STEPS)
+        self._simulate(_BODY_STEPS)
         while (self._running == loop.RUNNING).any():
-            self.advance(_BODY_STEPS)
+            self._simulate(_BODY_STEPS)
+
+    def _simulate(self, body_steps: int) -> None:
+        """Simulates until a robot ends, or for about `body_steps` iterations times bodies."""
+        started = time.perf_counter()
+        self._advance(self._parts, max(1, body_steps // (ROUND * self._bodies)))
+        busy = len(self._prepared) - self._prepared.count(None)
+        self._wall_times += (time.perf_counter() - started) / max(busy, 1)
 
     def failure(self, place: int) -> SimulationFailure | None:
         """The failure of the robot in a place; None if it goes on or has reached its end."""

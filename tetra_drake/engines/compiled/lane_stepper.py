@@ -23,7 +23,8 @@ class LaneStepper(Stepper):
     def __init__(self, first: GaitSimulation, *, count: int, threads: int) -> None:
         """A stepper for `count` robots like the first one, in at most `threads` threads."""
         self.readings = Readings.empty(first.robot.structure, count)
-        prepared, self._share = Prepared.of(first), math.ceil(count / threads)
+        prepared = self._first = Prepared.of(first)
+        self._share = math.ceil(count / threads)
         self._shares = [slice(i, i + self._share) for i in range(0, count, self._share)]
         width = lanes_for(self._share)
         self._engines = [
@@ -33,7 +34,7 @@ class LaneStepper(Stepper):
         self._pool = ThreadPoolExecutor(len(self._engines))
 
     def begin(self, place: int, simulation: GaitSimulation) -> None:
-        prepared, (engine, row) = Prepared.of(simulation), self._row(place)
+        prepared, (engine, row) = self._first.begun_by(simulation), self._row(place)
         if not engine.accepts(prepared):
             problem = "a disturbed robot has other kinds of laws, or more heights of its terrain"
             raise InputError(simulation.robot.scenario.name, "disturbances", problem)
