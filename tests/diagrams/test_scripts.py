@@ -57,8 +57,8 @@ NAMES = sorted(file.stem for file in TUTORIALS.glob("*.py"))
 LONGEST = 53  # lines
 
 
-def test_there_are_fifteen_each_short_and_with_its_picture():
-    assert [int(name[:2]) for name in NAMES] == list(range(1, 16))
+def test_there_are_sixteen_each_short_and_with_its_picture():
+    assert [int(name[:2]) for name in NAMES] == list(range(1, 17))
     for name in NAMES:
         assert len((TUTORIALS / f"{name}.py").read_text("utf-8").splitlines()) <= LONGEST, name
         assert (TUTORIALS / f"{name}.png").is_file()
