@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tetra_drake as td
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 
 measured = Path(__file__).parents[2] / "runs" / "measured" / "jump.yaml"
@@ -24,10 +25,11 @@ def jump(numbers: np.ndarray) -> Command:
     return Command("jump", 0.002, np.where(times < release + delay, wound, loose))
 
 
-def flights(drawn: np.ndarray) -> list[np.ndarray]:
+def flights(drawn: list[np.ndarray]) -> list[np.ndarray]:
     """Distance and rise (m) of the centre, from the release to the first touch after the top."""
     paths = []
     for result in td.simulate_many(scenario, [*map(jump, drawn)], record=True):
+        assert isinstance(result, SimulationResult)
         motion = result.trajectory.sel(time=slice(release, None))
         x, y, rise = (motion.p_WB.mean("body") - motion.p_WB.mean("body")[0]).values.T
         touches, top = motion.in_contact.any("contact").values, rise.argmax()
@@ -41,12 +43,11 @@ options = {"bounds": [0.0, most], "popsize": 16, "seed": 2, "verbose": -9}
 search = cma.CMAEvolutionStrategy(np.full(6, 0.5), 0.25, options)
 for _ in range(generations):
     drawn = np.array(search.ask())
-    search.tell(drawn, [-path[0, -1] for path in flights(drawn)])
+    search.tell(drawn, [-path[0, -1] for path in flights([*drawn])])
 symmetric = np.linspace(0.5, 1.0, 6)[:, np.newaxis] * [1, 1, 1, 0, 0, 0]
 best = {"evolved": flights([search.result.xbest])[0]}
-best["symmetric"] = max(flights(symmetric), key=lambda path: path[1].max())
-figure = Figure(figsize=(7.0, 3.5), layout="constrained")
-axes = figure.subplots()
+best["symmetric"] = max(flights([*symmetric]), key=lambda path: path[1].max())
+axes = (figure := Figure(figsize=(7.0, 3.5), layout="constrained")).subplots()
 for name, path in best.items():
     axes.plot(*path, label=f"{name}: {path[0, -1]:.2f} m far, {path[1].max():.2f} m high")
 axes.set(xlabel="distance from the start (m)", ylabel="rise of the centre (m)")

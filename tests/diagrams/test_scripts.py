@@ -54,7 +54,7 @@ def test_signals_and_bodies_are_shown_live():
 CHECKOUT = Path(__file__).parents[2]
 TUTORIALS = CHECKOUT / "diagrams" / "tutorials"
 NAMES = sorted(file.stem for file in TUTORIALS.glob("*.py"))
-LONGEST = 53  # lines
+LONGEST = 55  # lines
 
 
 def test_there_are_sixteen_each_short_and_with_its_picture():

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from helpers.states import mass_matrix
-from helpers.structures import poses_of, simulated, thrown, unit_inertias
+from helpers.structures import driven_as_recorded, poses_of, simulated, thrown, unit_inertias
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.robot.gait import seeded_gait
@@ -112,7 +112,8 @@ def test_thrown_bodies_turn_by_eulers_equations_on_the_diagram(flying, expected)
 def test_the_spin_of_a_bar_about_its_axis_hardly_shortens_steps():
     # It exerts no torque. It turns with the axis, so it does add to the error of a long step.
     times = {"simulation.duration": "2 s", "simulation.steady_from": "1 s", "cpg.start_up": "0.5 s"}
-    robot = Robot.of(load_scenario("prism").with_changes(times))
+    prism = load_scenario("prism").with_sections(robot=driven_as_recorded("prism"))
+    robot = Robot.of(prism.with_changes(times))
     structure = robot.structure
     a, b = structure.struts.T
     axes = structure.p_BN[b] - structure.p_BN[a]

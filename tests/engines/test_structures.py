@@ -9,7 +9,13 @@ import dataclasses
 import numpy as np
 import pytest
 from helpers.kernels import forces_at, make_step
-from helpers.structures import onto_recorded, poses_of, recorded_structure, simulated
+from helpers.structures import (
+    driven_as_recorded,
+    onto_recorded,
+    poses_of,
+    recorded_structure,
+    simulated,
+)
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Sine
@@ -56,7 +62,8 @@ def centre_of(state: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
     recorded = recorded_structure(data, name)
-    robot = Robot.of(load_scenario(name).with_changes(NO_BRISTLES))
+    scenario = load_scenario(name).with_sections(robot=driven_as_recorded(name))
+    robot = Robot.of(scenario.with_changes(NO_BRISTLES))
     model, phase, h = robot.model, np.array(recorded["drive"]["phase"]), 1e-4
     solver, work, forces = Solver.of(model), make_step(model), Forces.of(model)
     modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
@@ -80,7 +87,8 @@ def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_the_diagrams_systems_move_as_the_independent_simulation(name, data):
     recorded = recorded_structure(data, name)
-    robot = Robot.of(load_scenario(name).with_changes(NO_BRISTLES))
+    scenario = load_scenario(name).with_sections(robot=driven_as_recorded(name))
+    robot = Robot.of(scenario.with_changes(NO_BRISTLES))
     structure, phase = robot.structure, np.array(recorded["drive"]["phase"])
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(time_step=0.0))

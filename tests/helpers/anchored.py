@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from helpers.structures import SIDES_ALONE
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
@@ -53,8 +54,8 @@ def scenario_of(tree: dict[str, Any], duration: float = 2.0, **changes: object) 
 
 def supported_prism(**changes: object) -> Scenario:
     """The shipped prism on supports, with loads."""
-    tree = read_structure("prism").model_dump()
-    return scenario_of(tree | {"anchors": SUPPORTS, "loads": LOADS}, **changes)
+    parts = {"anchors": SUPPORTS, "loads": LOADS, "actuated": SIDES_ALONE}
+    return scenario_of(read_structure("prism").model_dump() | parts, **changes)
 
 
 def floating_prism(**changes: object) -> Scenario:

@@ -18,6 +18,8 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario import robot_structure
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.structure_files import read_structure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,6 +74,18 @@ def joined_nodes(given: robot_structure.StructureFile) -> dict[str, np.ndarray]:
         "cable_ends": np.array([[number[n] for n in cable.nodes] for cable in given.all_cables]),
         "held": np.array(held),
     }
+
+
+SIDES_ALONE = {"first": ["side n0 n3"], "second": ["side n1 n4"], "third": ["side n2 n5"]}
+"""`actuated` of a prism whose bottom cables are passive."""
+
+
+def driven_as_recorded(name: str) -> StructureFile:
+    """A shipped structure, driven at the cables where the independent simulation pulls."""
+    tree = read_structure(name).model_dump()
+    if name == "prism":
+        tree["actuated"] = SIDES_ALONE
+    return StructureFile.model_validate(tree)
 
 
 def recorded_structure(data: Path, name: str) -> dict[str, Any]:
