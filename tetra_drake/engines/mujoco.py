@@ -35,9 +35,10 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.actuator import Actuator, actuator_force, has_drive
-from tetra_drake.physics.cable import PASSIVE, Cables, cable_tension, law_of
+from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator, has_drive
+from tetra_drake.physics.cable import PASSIVE, Cables
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.physics.forces import pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.ground import ground_axes
@@ -387,18 +388,13 @@ def pull_cables(
     `lengths` (cables,) are in m, their `rates` in m/s, `signals` (n,) in N. With `slack`, passive
     cables do not push.
     """
-    drive = 0
+    drive, table = 0, np.zeros((drives.size, DRIVE_COLUMNS))
+    table[:, DRIVE] = drives
     for i in range(tensions.size):
-        law, driver = law_of(cables, i), cables.signal[i]
-        if driver == PASSIVE:
-            tensions[i] = cable_tension(lengths[i], rates[i], 0.0, law)
-            if slack:
-                tensions[i] = max(tensions[i], 0.0)
-            continue
-        driven = actuator_force(actuator, drives[drive], lengths[i], rates[i], signals[driver], law)
-        tensions[i] = driven.tension
-        drives[drive] += step * driven.rate
-        drive += 1
+        tensions[i], _, drive = pull_of_cable(
+            cables, actuator, slack, i, drive, lengths[i], rates[i], signals, table
+        )
+    drives += step * table[:, RATE]
 
 
 ENGINE = MujocoEngine()

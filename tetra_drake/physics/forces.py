@@ -22,7 +22,7 @@ from tetra_drake.physics.vectors import (
 )
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Table, any_lane, inverse_sqrt, maximum, named, select
+from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
 from tetra_drake.simd.packed import Packed, unpacked
 
 
@@ -83,6 +83,42 @@ def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
 
 
 @inlined
+def pull_of_cable(
+    cables: cable.Cables,
+    of_cables: actuator.Actuator,
+    slack: bool,
+    i: int,
+    drive: int,
+    length: Real,
+    rate: Real,
+    signals: Table,
+    drives: Table,
+) -> tuple[Real, Real, int]:
+    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the index of
+    the next drive.
+
+    `drive` is the index of the cable's drive, if it has one; then its rate and limit are written to
+    `drives`. The length is in m, its rate in m/s, `signals` (signals,) in N. With `slack`, a cable
+    without a drive does not push.
+    """
+    driver, signal = cables.signal[i], 0.0
+    if driver != cable.PASSIVE:
+        signal = signals[driver]
+    law = cable.law_of(cables, i)
+    if driver == cable.PASSIVE or not actuator.has_drive(of_cables):
+        tension = cable.cable_tension(length, rate, signal, law)
+        if slack:
+            tension = maximum(tension, 0.0)
+        return tension, law.damping, drive
+    driven = actuator.actuator_force(
+        of_cables, drives[drive, actuator.DRIVE], length, rate, signal, law
+    )
+    drives[drive, actuator.RATE] = driven.rate
+    drives[drive, actuator.LIMITED] = driven.limited
+    return driven.tension, driven.tension_per_rate, drive + 1
+
+
+@inlined
 def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
     """Adds the forces of all cables to the forces on the nodes.
 
@@ -92,7 +128,7 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
     drive = 0
     for i in range(parts.shape[0]):
-        a, b, driver = robot.cables.node_a[i], robot.cables.node_b[i], robot.cables.signal[i]
+        a, b = robot.cables.node_a[i], robot.cables.node_b[i]
         p_AB = difference(
             vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN)
         )
@@ -102,24 +138,10 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
         square = dot(p_AB, p_AB)
         per_length = inverse_sqrt(square)
         length, direction = square * per_length, scaled(per_length, p_AB)
-        signal = 0.0
-        if driver != cable.PASSIVE:
-            signal = signals[driver]
         rate = dot(v_AB, direction)
-        law = cable.law_of(robot.cables, i)
-        if driver == cable.PASSIVE or not actuator.has_drive(robot.actuator):
-            tension_per_rate = law.damping
-            tension = cable.cable_tension(length, rate, signal, law)
-            if robot.slack:
-                tension = maximum(tension, 0.0)
-        else:
-            driven = actuator.actuator_force(
-                robot.actuator, drives[drive, actuator.DRIVE], length, rate, signal, law
-            )
-            tension, tension_per_rate = driven.tension, driven.tension_per_rate
-            drives[drive, actuator.RATE] = driven.rate
-            drives[drive, actuator.LIMITED] = driven.limited
-            drive += 1
+        tension, tension_per_rate, drive = pull_of_cable(
+            robot.cables, robot.actuator, robot.slack, i, drive, length, rate, signals, drives
+        )
         force = scaled(tension, direction)
         add_vector(force, a, kinematics.FORCE, nodes)
         subtract_vector(force, b, kinematics.FORCE, nodes)
