@@ -12,8 +12,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from tetra_drake.robot.bodies import strut_pose
-from tetra_drake.robot.structure import NODE_COLOUR, STRUT_COLOUR, Structure
+from tetra_drake.robot.structure import Shape, Structure, shapes_of
 from tetra_drake.robot.xml_elements import add_element, xml_text
 from tetra_drake.scenario.blueprint import WORLD
 
@@ -25,12 +24,15 @@ def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
     """Model of the bodies of a structure, at the poses of a state (13 bodies,)."""
     root = Element("sdf", version="1.9")
     model = add_element(root, "model", name=name)
+    shapes = [*shapes_of(structure)]
     poses = state[: 7 * len(structure.bodies)].reshape(-1, 7)
     for body, pose in enumerate(poses):
         link = add_element(model, "link", name=structure.bodies[body])
         _add_pose(link, RigidTransform(Quaternion(pose[:4] / np.linalg.norm(pose[:4])), pose[4:]))
         _add_inertia(link, structure.mass[body], structure.unit_inertia[body])
-        _add_visuals(link, structure, body)
+        for shape in shapes:
+            if shape.body == body:
+                _add_visual(link, shape)
     if (structure.carriers == WORLD).any():
         add_element(model, "link", name=FIXED)
         joint = add_element(model, "joint", name=FIXED + " weld", type="fixed")
@@ -59,31 +61,13 @@ def _add_inertia(link: Element, mass: float, unit_inertia: np.ndarray) -> None:
         add_element(inertia, f"i{axes}", value)
 
 
-def _add_visuals(link: Element, structure: Structure, body: int) -> None:
-    """Adds the struts of a body, and its spheres."""
-    table, p_BN = structure.strut_table, structure.p_BN
-    for strut in range(table.first_strut[body], table.first_strut[body + 1]):
-        a, b = structure.struts[strut]
-        name = f"strut {structure.strut_name(strut)}"
-        shape = _add_visual(link, name, strut_pose(p_BN[a], p_BN[b]), "cylinder", STRUT_COLOUR)
-        add_element(shape, "radius", table.radius[strut])
-        add_element(shape, "length", table.length[strut])
-    for node in range(structure.first_node[body], structure.first_node[body + 1]):
-        if structure.node_radius[node]:
-            name = f"sphere {structure.node_names[node]}"
-            shape = _add_visual(link, name, p_BN[node], "sphere", NODE_COLOUR)
-            add_element(shape, "radius", structure.node_radius[node])
-
-
-def _add_visual(
-    link: Element,
-    name: str,
-    pose: RigidTransform | np.ndarray,
-    kind: str,
-    colour: tuple[float, ...],
-) -> Element:
-    """Adds a visual shape, and returns the shape's element."""
-    visual = add_element(link, "visual", name=name)
-    _add_pose(visual, pose)
-    add_element(add_element(visual, "material"), "diffuse", colour)
-    return add_element(add_element(visual, "geometry"), kind)
+def _add_visual(link: Element, shape: Shape) -> None:
+    """Adds a visible shape."""
+    visual = add_element(link, "visual", name=shape.name)
+    _add_pose(visual, shape.X_BS)
+    add_element(add_element(visual, "material"), "diffuse", shape.colour)
+    kind = "cylinder" if shape.length else "sphere"
+    solid = add_element(add_element(visual, "geometry"), kind)
+    add_element(solid, "radius", shape.radius)
+    if shape.length:
+        add_element(solid, "length", shape.length)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from pydrake.geometry import Cylinder, Sphere
@@ -228,16 +228,35 @@ def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
 
 def _show_bodies(plant: MultibodyPlant, structure: Structure, bodies: list[RigidBody]) -> None:
     """Adds visual shapes of struts and spheres."""
+    for shape in shapes_of(structure):
+        solid = Cylinder(shape.radius, shape.length) if shape.length else Sphere(shape.radius)
+        body = bodies[shape.body]
+        plant.RegisterVisualGeometry(body, shape.X_BS, solid, shape.name, shape.colour)
+
+
+class Shape(NamedTuple):
+    """Visible shape of a body: a cylinder along the z axis of its frame S, or a sphere."""
+
+    name: str
+    body: int
+    X_BS: RigidTransform
+    radius: float
+    length: float
+    """Length of the cylinder in m; 0 for a sphere."""
+    colour: tuple[float, ...]
+
+
+def shapes_of(structure: Structure) -> Iterator[Shape]:
+    """The struts of a structure, then its spheres."""
     table, p_BN = structure.strut_table, structure.p_BN
     for strut, (a, b) in enumerate(structure.struts):
-        shape = Cylinder(table.radius[strut], table.length[strut])
-        X_BS, name = strut_pose(p_BN[a], p_BN[b]), f"strut {structure.strut_name(strut)}"
-        body = bodies[structure.carriers[a]]
-        plant.RegisterVisualGeometry(body, X_BS, shape, name, STRUT_COLOUR)
+        name, X_BS = f"strut {structure.strut_name(strut)}", strut_pose(p_BN[a], p_BN[b])
+        size = table.radius[strut], table.length[strut]
+        yield Shape(name, structure.carriers[a], X_BS, *size, STRUT_COLOUR)
     for node in np.flatnonzero(structure.node_radius):
-        body, X_BN = bodies[structure.carriers[node]], RigidTransform(p_BN[node])
-        shape, name = Sphere(structure.node_radius[node]), f"sphere {structure.node_names[node]}"
-        plant.RegisterVisualGeometry(body, X_BN, shape, name, NODE_COLOUR)
+        name, X_BS = f"sphere {structure.node_names[node]}", RigidTransform(p_BN[node])
+        radius = structure.node_radius[node]
+        yield Shape(name, structure.carriers[node], X_BS, radius, 0.0, NODE_COLOUR)
 
 
 def AddNodes(
