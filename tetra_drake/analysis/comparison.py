@@ -91,15 +91,20 @@ def compare(
     Raises:
         InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
     """
+    return _compared(_labelled([load_run(directory) for directory in directories], labels), reach)
+
+
+def _compared(runs: Mapping[str, Run], reach: float | None) -> Compared:
+    """The comparison of runs by their labels; see compare()."""
     import pandas
 
-    runs = _labelled([load_run(directory) for directory in directories], labels)
     notes = _differences(runs)
     searches = {label: _progress(run) for label, run in runs.items()}
     common = min(_end(progress) for progress in searches.values())
-    trials, curves, summaries = [], [], {}
+    trials, curves, summaries, ends = [], [], {}, {}
     for label, progress in searches.items():
         rows = _trials(progress, common, reach)
+        ends[label] = rows["fitness"]
         trials.append(rows.assign(run=label))
         curves.append(_curve(progress).assign(run=label))
         run = runs[label]
@@ -112,7 +117,6 @@ def compare(
             notes.append(f"{label}: {going_on} of {len(rows)} trials go on")
         if failed := int(np.isneginf(rows["fitness"]).sum()):
             notes.append(f"{label}: {failed} of {len(rows)} trials have no fitness")
-    ends = {label: _trials(table, common, reach)["fitness"] for label, table in searches.items()}
     return Compared(
         improvement=pandas.DataFrame(
             [[improvement(ours, theirs) for theirs in ends.values()] for ours in ends.values()],
@@ -138,11 +142,12 @@ def compare_scenarios(
     """Compares the runs of each scenario, by the name of the scenario; see compare()."""
     names = labels or [Path(directory).resolve().name for directory in directories]
     _check_labels(names, len(directories))
-    groups: dict[str, list[tuple[str | Path, str]]] = {}
+    groups: dict[str, list[tuple[Run, str]]] = {}
     for directory, label in zip(directories, names, strict=True):
-        groups.setdefault(load_run(directory).scenario.name, []).append((directory, label))
+        run = load_run(directory)
+        groups.setdefault(run.scenario.name, []).append((run, label))
     return {
-        name: compare([run for run, _ in group], reach=reach, labels=[own for _, own in group])
+        name: _compared(_labelled([run for run, _ in group], [own for _, own in group]), reach)
         for name, group in groups.items()
     }
 
