@@ -161,7 +161,7 @@ def AddCables(
     """
     actuated, actuation = actuated or {}, actuation or Force()
     nodes = Nodes.of(plant, (frame for one in cables for frame in (one.frame_a, one.frame_b)))
-    table = _CableTable(cables, actuated, nodes)
+    table = _cable_table(cables, actuated, nodes)
     model = Model.of_nodes(
         nodes.p_BN,
         nodes.first_node,
@@ -171,24 +171,24 @@ def AddCables(
     )
     network = builder.AddNamedSystem(name, CableNetwork(model, signals=len(actuated)))
     Attach(builder, plant, network)
-    lengths = _DefaultLengths(plant, cables)
     if drives is None:
-        drives = actuation.drives(_cables_at_rest(table, lengths))
+        drives = actuation.drives(_cables_at_rest(table, _default_lengths(plant, cables)))
     if len(drives):
         actuators = builder.AddNamedSystem(f"{name}_actuators", Actuators(drives))
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.GetInputPort("rates"))
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None:
-        shown = {one.name: length for one, length in zip(cables, lengths, strict=True)}
+        names = [one.name for one in cables]
+        shown = dict(zip(names, _default_lengths(plant, cables), strict=True))
         AddCableGeometry(builder, scene_graph, network.GetOutputPort("ends"), lengths=shown)
     return network
 
 
-def _CableTable(
+def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
     """Records of the cables, of dtype CABLE."""
-    names = [one.name for one in cables]
+    places = {one.name: place for place, one in enumerate(cables)}
     table = np.zeros(len(cables), dtype=cable.CABLE)
     table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]
     table["node_b"] = [nodes.of_frame[one.frame_b.index()] for one in cables]
@@ -197,14 +197,14 @@ def _CableTable(
         table[constant] = [getattr(one.law, constant) for one in cables]
     for signal, (group, driven) in enumerate(actuated.items()):
         for one in driven:
-            if one not in names:
-                problem = f"found unknown cable '{one}'; {hint(one, names)}"
+            if one not in places:
+                problem = f"found unknown cable '{one}'; {hint(one, [*places])}"
                 raise InputError("AddCables", f"actuated.{group}", problem)
-            table["signal"][names.index(one)] = signal
+            table["signal"][places[one]] = signal
     return table
 
 
-def _DefaultLengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> np.ndarray:
+def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> np.ndarray:
     """Lengths of cables (cables,) in m at the plant's default positions."""
     context = plant.CreateDefaultContext()
     return np.array(
