@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import io
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -23,7 +22,7 @@ from PIL import Image
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.visualization.browser import do, launch_browser, wait_until_loaded
+from tetra_drake.visualization.browser import do, launch_browser, picture_of, wait_until_loaded
 from tetra_drake.visualization.scene import COLOURS
 
 if TYPE_CHECKING:
@@ -50,11 +49,6 @@ FRAME_TIME = 100  # ms: twice as fast as the robot walks
 INSTANTS = 4  # of a still
 
 
-def shot(page: Page) -> Image.Image:
-    """Picture of the page as it is."""
-    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-
-
 def shots(page: Page, times: Iterable[float]) -> list[Image.Image]:
     """Pictures of the robot at times (s) of the motion."""
     do(page, "dress", False)
@@ -62,14 +56,14 @@ def shots(page: Page, times: Iterable[float]) -> list[Image.Image]:
     images = []
     for time in times:
         do(page, "show", time)
-        images.append(shot(page))
+        images.append(picture_of(page))
     return images
 
 
 def still(page: Page, times: Sequence[float]) -> Image.Image:
     """One picture of the robot at several times (s) of the motion."""
     do(page, "still", list(times))
-    return shot(page)
+    return picture_of(page)
 
 
 def save(images: Sequence[Image.Image], path: Path) -> None:

@@ -385,11 +385,10 @@ def _figures(
 
     Example: tetra-drake figures runs/thesis --out figures
     """
-    from tetra_drake.figures.style import Look
     from tetra_drake.report.run_page import write_figures
 
-    look = Look(width_in=width / INCH, font_size=font, title=title)
-    written = write_figures(source, out, look=look, kinds=_kinds(pdf))
+    drawn = _drawn(width, font, title=title, pdf=pdf)
+    written = write_figures(source, out, **drawn)
     print(f"wrote {', '.join(str(path) for path in written)}")
 
 
@@ -480,10 +479,9 @@ def _compare(
         print(f"\nScenario {name}:\n" if name else "", comparison_text(compared), sep="")
         if out:
             from tetra_drake.figures.comparison import save_comparison
-            from tetra_drake.figures.style import Look
 
-            look = Look(width_in=width / INCH, font_size=font, title=title)
-            written = save_comparison(compared, out / name, look=look, kinds=_kinds(pdf))
+            drawn = _drawn(width, font, title=title, pdf=pdf)
+            written = save_comparison(compared, out / name, **drawn)
             print(f"wrote {', '.join(written)} to {out / name}/")
     if scenarios:
         means = improvement_over(by_scenario.values())
@@ -605,9 +603,12 @@ def _structure(
     print(text)
 
 
-def _kinds(pdf: bool) -> list[str]:
-    """Kinds of the files of a figure."""
-    return ["svg", "png", "pdf"] if pdf else ["svg", "png"]
+def _drawn(width: float, font: float, *, title: bool, pdf: bool) -> dict[str, Any]:
+    """Look and kinds of files of figures with a width (m) and letters of a size (points)."""
+    from tetra_drake.figures.style import FILE_KINDS, Look
+
+    look = Look(width_in=width / INCH, font_size=font, title=title)
+    return {"look": look, "kinds": [*FILE_KINDS, "pdf"] if pdf else FILE_KINDS}
 
 
 def _engine_change(engine: str | None) -> dict[str, Any]:

@@ -41,10 +41,9 @@ class Simulation:
 
     Each driven cable has an action: the setpoint of its actuator, by the kind of `actuation`. It is
     a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. It is
-    held for a control period.
-    Like a sample of a command, it takes effect within one `cpg.listing_step`. There is no network
-    and no start-up time. Steps with the samples of a command give the motion of
-    simulate(command=...), if each sample differs from the one before.
+    held for a control period. Like a sample of a command, it takes effect within one
+    `cpg.listing_step`. There is no network and no start-up time. Steps with the samples of a
+    command give the motion of simulate(command=...), if each sample differs from the one before.
     """
 
     def __init__(

@@ -13,6 +13,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.analysis.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
+    FILE_KINDS,
     USUAL,
     Drawn,
     Look,
@@ -33,7 +34,7 @@ def save_comparison(
     folder: Path,
     *,
     look: Look = USUAL,
-    kinds: Sequence[str] = ("svg", "png"),
+    kinds: Sequence[str] = FILE_KINDS,
 ) -> list[str]:
     """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to a folder.
 

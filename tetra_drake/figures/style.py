@@ -70,6 +70,9 @@ class Look:
 
 USUAL = Look()
 
+FILE_KINDS = ("svg", "png")
+"""Kinds of the files of a figure, by default."""
+
 
 SHADE = "0.9"
 """Grey behind marked intervals of time."""
@@ -233,7 +236,7 @@ def save_findings(
     *,
     tables: Mapping[str, pandas.DataFrame],
     summary: Mapping[str, Any],
-    kinds: Sequence[str] = ("svg", "png"),
+    kinds: Sequence[str] = FILE_KINDS,
 ) -> list[str]:
     """Writes the results of an analysis to a folder: tables as CSV, summary.json, and the figure.
 
@@ -250,7 +253,7 @@ def save_findings(
 
 @common_style()
 def save_figure(
-    figure: Figure, folder: str | Path, name: str, *, kinds: Sequence[str] = ("svg", "png")
+    figure: Figure, folder: str | Path, name: str, *, kinds: Sequence[str] = FILE_KINDS
 ) -> None:
     """Writes a figure to a folder, by default as NAME.svg and NAME.png.
 

@@ -19,7 +19,7 @@ from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.gait_map import map_of_gaits
-from tetra_drake.figures.style import USUAL, Look, save_figure
+from tetra_drake.figures.style import FILE_KINDS, USUAL, Look, save_figure
 from tetra_drake.results.result import SimulationResult
 
 
@@ -87,7 +87,7 @@ def draw_trajectory(
     folder: Path,
     *,
     look: Look = USUAL,
-    kinds: Sequence[str] = ("svg", "png"),
+    kinds: Sequence[str] = FILE_KINDS,
 ) -> dict[str, str]:
     """Writes the figures of one simulation. Returns captions by name of figure.
 
@@ -112,7 +112,7 @@ def draw_run(
     folder: Path,
     *,
     look: Look = USUAL,
-    kinds: Sequence[str] = ("svg", "png"),
+    kinds: Sequence[str] = FILE_KINDS,
 ) -> dict[str, str]:
     """Writes the figures of a run and of its best gait. Returns captions by name of figure."""
     run = shown.run

@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import gait_label, load_run
-from tetra_drake.figures.style import USUAL, Look
+from tetra_drake.figures.style import FILE_KINDS, USUAL, Look
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, listed, render, rounded
 from tetra_drake.machine import versions
@@ -57,7 +57,7 @@ def write_figures(
     out: Path | None = None,
     *,
     look: Look = USUAL,
-    kinds: Sequence[str] = ("svg", "png"),
+    kinds: Sequence[str] = FILE_KINDS,
 ) -> list[Path]:
     """Writes the figures of a run or of a result folder. Returns the paths that were written.
 
@@ -87,7 +87,7 @@ def write_figures(
 
 
 def write_report(
-    directory: Path, *, look: Look = USUAL, kinds: Sequence[str] = ("svg", "png")
+    directory: Path, *, look: Look = USUAL, kinds: Sequence[str] = FILE_KINDS
 ) -> list[Path]:
     """Writes figures/, replay.html and report.html into the folder of a run. Returns their paths.
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import shutil
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
+
+from PIL import Image
 
 from tetra_drake.errors import InputError
 
@@ -42,6 +45,11 @@ def launch_browser() -> Iterator[Browser]:
         browser = playwright.chromium.launch(executable_path=path, args=_SOFTWARE_WEBGL)
         with contextlib.closing(browser):
             yield browser
+
+
+def picture_of(page: Page) -> Image.Image:
+    """Picture of a page as it is."""
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
 def wait_until_loaded(page: Page) -> None:

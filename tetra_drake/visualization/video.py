@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.visualization.browser import INSTALL, do, launch_browser, wait_until_loaded
+from tetra_drake.visualization.browser import (
+    INSTALL,
+    do,
+    launch_browser,
+    picture_of,
+    wait_until_loaded,
+)
 
 VIEWS = {
     "free": None,
@@ -83,7 +87,7 @@ def make_video(
         film.send(None)
         for number, time in enumerate(times):
             do(page, "show", time)
-            film.send(np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")))
+            film.send(np.asarray(picture_of(page)))
             if number % 50 == 0:
                 say(f"frame {number + 1} of {len(times)}")
         film.close()
