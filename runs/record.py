@@ -170,8 +170,10 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     analysis, copy = made / ANALYSIS, shown / ANALYSIS
     if analysis.exists() and copy.exists() and filecmp.cmp(analysis, copy, shallow=False):
         return
+    resume, progress = (made / MANIFEST).exists(), Display(sys.stdout)
+    if not resume:
+        save_times(load_times(out) | {name: {}}, out)
     with timed(name, "evolution", out):
-        resume, progress = (made / MANIFEST).exists(), Display(sys.stdout)
         scenario = experiment.scenario(name)
         # No reevaluation: analyse() simulates the best gaits on the diagram with tighter settings.
         evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
@@ -195,20 +197,32 @@ def make_folder(made: Path, shown: Path) -> None:
     thin(made, shown)
 
 
+def load_times(out: Path) -> dict[str, Any]:
+    """Times of the experiments recorded in the folder `out`: wall_s and cores_s (s) by name and
+    stage."""
+    file = out / TIMES
+    times: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    return times
+
+
+def save_times(times: Mapping[str, Any], out: Path) -> None:
+    """Writes the times of the experiments recorded in the folder `out`."""
+    write_whole(out / TIMES, json.dumps(times, indent=1) + "\n")
+
+
 @contextlib.contextmanager
 def timed(name: str, stage: str, out: Path) -> Iterator[None]:
-    """Context manager that adds the times of the block to TIMES in `out`: wall time, and the time
-    of all cores, in s. Also after an interruption."""
+    """Context manager that adds the times of the block to the times in `out`: wall time, and the
+    time of all cores. Also after an interruption."""
     begin, work = time.monotonic(), sum(os.times()[:4])
     try:
         yield
     finally:
-        file = out / TIMES
-        times = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        times = load_times(out)
         spent = times.setdefault(name, {}).setdefault(stage, {"wall_s": 0.0, "cores_s": 0.0})
         spent["wall_s"] = round(spent["wall_s"] + time.monotonic() - begin, 1)
         spent["cores_s"] = round(spent["cores_s"] + sum(os.times()[:4]) - work, 1)
-        write_whole(file, json.dumps(times, indent=1) + "\n")
+        save_times(times, out)
         print(f"{name}, {stage}: {duration(spent['wall_s'])}", flush=True)
 
 
@@ -230,12 +244,17 @@ def take_pictures(page: Path, *pictures: Path) -> None:
     subprocess.run([sys.executable, script, page, *pictures], check=True)
 
 
-def main(names: Sequence[str]) -> None:
-    """Records the experiments of the given names, or all. Raises InputError."""
+def chosen(names: Sequence[str]) -> Sequence[str]:
+    """The given names of experiments, or all. Raises InputError for an unknown name."""
     if unknown := {*names} - {*EXPERIMENTS}:
         problem = f"found {listed([*unknown])}, expected {listed([*EXPERIMENTS])}"
         raise InputError("NAME", "", problem)
-    for name in names or EXPERIMENTS:
+    return names or [*EXPERIMENTS]
+
+
+def main(names: Sequence[str]) -> None:
+    """Records the experiments of the given names, or all. Raises InputError."""
+    for name in chosen(names):
         record(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
 
 

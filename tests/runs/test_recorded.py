@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import record
 import tables
-from analyse import load_analysis
+from analyse import ROUNDINGS, load_analysis
 
 from tetra_drake.analysis.elites import elites
 from tetra_drake.engines.simulate import simulate
@@ -22,18 +22,6 @@ from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import INCH
-
-ROUNDINGS = 3.0
-"""Tolerance of a distance, in multiples of the gait's own sensitivity: the largest change of the
-distance in thirty starts that are displaced by 1 nm.
-
-Processors, versions of packages and changes of the code round differently, in the sixteenth digit;
-1 nm is in the eighth digit of a position. Some gaits enlarge both by the same factor: the change
-by rounding is then a ten-millionth of the sensitivity. In the others, the lengths of steps soon
-have nothing in common, and the distance differs by the integration error, the same for 1 nm and
-for rounding. Rounding is then a draw like those thirty. Of sixty draws for each of the 120 gaits,
-one in two thousand exceeds three times the largest of thirty others.
-"""
 
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""
