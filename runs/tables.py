@@ -1,4 +1,4 @@
-"""Tables of the README in this folder, and of the READMEs of recorded runs; the page index.html.
+"""Tables of README.md, of the README in this folder and of recorded runs; the page index.html.
 
     python runs/tables.py [FILE ...]
 
@@ -8,31 +8,38 @@ Each table is in a Markdown file between two lines:
     <!-- end -->
 
 index.html shows all runs. Each picture opens the replay of a run, on any host of static files.
+The rover's numbers are from rolling.py.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import jinja2
 import numpy as np
 from analyse import MUJOCO, SHOWN, TIGHT, Analysis, load_analysis
 from PIL import Image
-from record import DIAGRAM, EXPERIMENTS, PICTURE
+from record import DIAGRAM, EXPERIMENTS, FILM, PICTURE, load_times
+from rolling import LAPSE, ROLLING, best_of, load_policies
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import Table, fixed, listed, percents, rounded
 from tetra_drake.report.result_folder import REPLAY
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS
-from tetra_drake.scenario.units import INCH, Units
+from tetra_drake.scenario.units import INCH, Units, units_named
 
 HERE = Path(__file__).parent
+FRONT = HERE.parent
+"""Folder of the project's README."""
 README, GALLERY = "README.md", "index.html"
 
 APART = 0.3 * INCH
@@ -40,6 +47,37 @@ APART = 0.3 * INCH
 
 HEIGHT = 96
 """Height of pictures in the gallery's table, in pixels."""
+
+ENGINES = ("compiled", "diagram", "MuJoCo")
+
+FILMS = {
+    "rolling": "a rover of six struts",
+    "champion": "the thesis's robot",
+    "motors": "the same with motors on board",
+}
+"""Runs whose films are at the top of README.md, with what moves."""
+
+SMALL_FILMS = {
+    "prism": "prism",
+    "mast": "mast",
+    "six-bar": "six-bar",
+    "turning": "turning on the spot",
+    "twelve": "twelve tetrahedra",
+}
+"""Runs whose films are in the second row."""
+
+ROW = 867
+"""Width of a row of films, in pixels."""
+
+MEASURED = {
+    "simplex": "a simplex of 2 m: heights under load",
+    "spine": "a planar spine: poses",
+    "jumper": "a jumper of six struts: height of jumps",
+}
+"""Figures of the folder `measured`, with what they show."""
+
+FAR = 5.0
+"""Distance (in) from which a gait walks; of less, a difference in percent says little."""
 
 _TABLE = re.compile(
     r"(?P<begin><!-- table (?P<name>\S+): made by runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
@@ -73,35 +111,110 @@ def units_of(name: str) -> Units:
     return load_scenario(HERE / name / SCENARIO).units
 
 
-def gallery_table(runs: Runs) -> str:
-    """Table of all runs with the distances of their best gaits."""
-    rows = []
+@dataclass(frozen=True)
+class Best:
+    """The best gait of a run, or the best policy of the rover, for the gallery."""
+
+    title: str
+    diagram: str
+    """File of the picture beside PICTURE."""
+    distances: Mapping[str, float]
+    """Distances (m) by ENGINES; NaN if not simulated."""
+    kept: float
+    """Share of disturbed robots on which it does as well."""
+    units: Units
+
+    def text(self, engine: str, digits: int = 2) -> str:
+        """The distance on an engine."""
+        distance = self.distances[engine]
+        if math.isnan(distance):
+            return "-"
+        return f"{fixed(distance / self.units.length, digits)} {self.units.length_name}"
+
+
+def best_of_all(runs: Runs) -> dict[str, Best]:
+    """The rover's policy, then the best gaits of the runs, by name of the folder."""
+    policy = best_of(load_policies())
+    ways = {engine: policy["engines"][engine]["way_m"] for engine in ENGINES}
+    kept = policy["rolls"] / policy["draws"]
+    title = "a rover of six struts rolls by a feedback policy, in 20 s"
+    bests = {ROLLING: Best(title, f"{LAPSE}.svg", ways, kept, units_named("SI"))}
     for name, run in runs.items():
-        best, units = run.best_trial, units_of(name)
+        trial = run.best_trial
+        inches = run.undisturbed(trial), run.again(trial, TIGHT), run.again(trial, MUJOCO)
+        distances = {engine: INCH * x for engine, x in zip(ENGINES, inches, strict=True)}
+        kept = float(run.disturbed.loc[trial, "kept"])
+        title = EXPERIMENTS[name].title
+        bests[name] = Best(title, f"{DIAGRAM}.svg", distances, kept, units_of(name))
+    return bests
+
+
+def gallery_table(runs: Runs) -> str:
+    """Table of all runs with the distances of their best gaits, and the work of two cores."""
+    minutes = {
+        name: sum(stage["cores_s"] for stage in stages.values()) / (2 * 60)
+        for name, stages in load_times(HERE).items()
+    }
+    rows = []
+    for name, best in best_of_all(runs).items():
         picture = shown(name, PICTURE, f"{name} walking")
-        diagram = shown(name, f"{DIAGRAM}.svg", f"gait diagram of {name}")
-        title = f"[`{name}`]({name}/{README}): {EXPERIMENTS[name].title}"
+        diagram = shown(name, best.diagram, f"how {name} moves")
+        title = f"[`{name}`]({name}/{README}): {best.title}"
         title += f"<br>{picture} {diagram} [replay]({name}/{REPLAY})"
-        distances = [
-            f"{fixed(inches * INCH / units.length)} {units.length_name}"
-            for inches in (run.undisturbed(best), run.again(best, TIGHT))
+        distances = [best.text(engine) for engine in ENGINES]
+        work = fixed(minutes.get(name, math.nan), 0)
+        rows.append([title, *distances, f"{100.0 * best.kept:.0f} %", work])
+    rows.append(["all", *["" for _ in ENGINES], "", fixed(sum(minutes.values()), 0)])
+    return Table(["experiment", *ENGINES, "keeps", "minutes"], rows).markdown()
+
+
+def trust_table(runs: Runs) -> str:
+    """Table of the differences between engines and their causes, by law of friction."""
+    rows = []
+    for law, is_coulomb in (("Coulomb", True), ("the thesis's", False)):
+        under_law = [
+            run
+            for name, run in runs.items()
+            if isinstance(load_scenario(HERE / name / SCENARIO).friction, Coulomb) == is_coulomb
         ]
-        kept = f"{100.0 * run.disturbed.loc[best, 'kept']:.0f} %"
-        rows.append([title, *distances, kept])
-    headings = ["experiment", "distance", "on the diagram", "keeps"]
+        gaits = [(run, trial) for run in under_law for trial in run.best_gaits.index]
+        inches = np.array(
+            [(run.undisturbed(i), run.again(i, TIGHT), run.again(i, MUJOCO)) for run, i in gaits]
+        )
+        compiled, diagram, mujoco = inches.T
+        apart = np.abs(diagram - compiled)
+        judged = (np.abs(compiled) >= FAR) & np.isfinite(mujoco)
+        shares = np.abs(mujoco / compiled - 1.0)[judged]
+        changes = np.array([run.best_gaits.loc[i, "sensitivity_in"] for run, i in gaits])
+        numbers = [np.median(apart), np.max(apart), np.median(changes), np.max(changes)]
+        counts = [f"{len(under_law)}", f"{len(gaits)}"]
+        percent = [f"{100.0 * x:.0f} %" for x in (np.median(shares), np.max(shares))]
+        rows.append([law, *counts, *(fixed(x, 4) for x in numbers), *percent])
+    headings = ["friction", "runs", "gaits", "diagram, median (in)", "largest"]
+    headings += ["1 nm, median (in)", "largest", "MuJoCo, median", "largest"]
     return Table(headings, rows).markdown()
+
+
+def films(names: Mapping[str, str], runs: Runs, *, distances: bool) -> str:
+    """A row of films for README.md, of one height, with what moves. With `distances`, with the
+    distances and times of the best gaits."""
+    bests, width = best_of_all(runs), ROW // len(names)
+    pictures, captions = [], []
+    for name, words in names.items():
+        folder = f"{HERE.name}/{name}"
+        pictures.append(f'<img src="{folder}/{FILM}" width="{width}" alt="{words}">')
+        far = f": {bests[name].text('compiled', 1)}" if distances else ""
+        captions.append(f"[{words}]({folder}/{README}){far}")
+    lines = [pictures, [":-:" for _ in names], captions]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 def gallery_page(runs: Runs) -> str:
     """The page index.html."""
-    cards = []
-    for name, run in runs.items():
-        units = units_of(name)
-        best = run.undisturbed(run.best_trial) * INCH / units.length
-        cards.append((name, EXPERIMENTS[name].title, f"{fixed(best, 1)} {units.length_word}"))
     source = read_text(HERE / f"{GALLERY}.jinja", "template")
     template = jinja2.Template(source, autoescape=True, keep_trailing_newline=True)
-    return template.render(cards=cards, replay=REPLAY, picture=PICTURE)
+    bests = best_of_all(runs)
+    return template.render(bests=bests, replay=REPLAY, picture=PICTURE, measured=MEASURED)
 
 
 def trials_table(run: Analysis, units: Units) -> str:
@@ -137,16 +250,18 @@ def trials_table(run: Analysis, units: Units) -> str:
 
 def pages(runs: Runs) -> list[Path]:
     """All pages with tables."""
-    return [HERE / README, *(HERE / name / README for name in runs)]
+    return [FRONT / README, HERE / README, *(HERE / name / README for name in runs)]
 
 
 def made_again(page: Path, runs: Runs) -> str:
-    """Text of a page with a new table: the gallery, or the trials of the page's run. Raises
-    InputError if the page cannot be read."""
+    """Text of a page with new tables. Raises InputError if the page cannot be read."""
 
     def make_table(name: str) -> str:
         tables = {
+            "films": lambda: films(FILMS, runs, distances=True),
+            "small-films": lambda: films(SMALL_FILMS, runs, distances=False),
             "gallery": lambda: gallery_table(runs),
+            "trust": lambda: trust_table(runs),
             "trials": lambda: trials_table(runs[page.parent.name], units_of(page.parent.name)),
         }
         return tables[name]()

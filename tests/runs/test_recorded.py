@@ -105,7 +105,8 @@ def test_the_gallery_is_current_and_opens_every_replay_in_its_folder():
     text = (tables.HERE / tables.GALLERY).read_text(encoding="utf-8")
     assert tables.gallery_page(tables.load_all()) == text
     links = re.findall(r'(?:href|src)="([^"]+)"', text)
-    assert {f"{name}/{REPLAY}" for name in FOLDERS} <= set(links)
+    figures = {f"measured/{name}.svg" for name in tables.MEASURED}
+    assert {f"{name}/{REPLAY}" for name in ("rolling", *FOLDERS)} | figures <= set(links)
     for link in links:
         assert (tables.HERE / link).is_file() and ".." not in link
 
