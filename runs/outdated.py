@@ -3,10 +3,9 @@
     python runs/outdated.py [NAME ...]
 
 A recorded run is outdated if its experiment in record.py has another scenario, or if trial 0 does
-not begin as recorded. Its first evaluations are repeated: 1,200, so that CMA-ES tries out a search
-and begins another; on the Drake diagram 20. Last digits do not count, as processors and versions
-round differently: parameters may differ by 1e-9 of their values, and distances by what a
-displacement by 1 nm changes (see analyse.ROUNDINGS).
+not begin as recorded. Its first 600 evaluations are repeated, on the Drake diagram 20. Last digits
+do not count, as processors and versions round differently: parameters may differ by 1e-9 of their
+values, and distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS).
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from tetra_drake.optimizers.base import Optimizer
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.common_sections import EvolutionSection
 
-EVALUATIONS, ON_DIAGRAM = 1200, 20
+EVALUATIONS, ON_DIAGRAM = 600, 20
 """Numbers of evaluations that are repeated, on the fast engines and on the Drake diagram."""
 
 PARAMETERS = 1e-9
