@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from tetra_drake.robot.gait import seeded_gait as seeded_gait
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 _HOMES = {
     "Simulation": "tetra_drake.engines.simulation",
