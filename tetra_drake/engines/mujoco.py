@@ -56,7 +56,7 @@ INSTALL = 'pip install "mujoco>=3.13"'
 
 _FLOOR = 0  # index of the floor's geom
 _STRETCH = 5000  # steps between two checks of stability
-_OBSERVED = 8  # steps from one observation to the next; 1 ms with the default step
+_OBSERVED = 16  # steps from one observation to the next; 1 ms with the default step
 MAX_SPEED = 1.0
 """Largest speed of a body (m/s) of a robot that starts on the ground; less than in other engines.
 With too long a step a robot is thrown about, sometimes far forward. A walking robot stays below

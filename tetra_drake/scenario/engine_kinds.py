@@ -62,8 +62,8 @@ class Compiled(EngineSettings):
 class Mujoco(EngineSettings):
     """MuJoCo with its own contact, on planes."""
 
-    step: Time = Field(default=0.125e-3, ge=1e-7, le=1)
-    """Time step."""
+    step: Time = Field(default=0.0625e-3, ge=1e-7, le=1)
+    """Time step. If it is too long for the dampers of the cables, the robot is thrown about."""
 
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
 
