@@ -43,7 +43,8 @@ def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
 def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, float, float]:
     """Mean of `other` (m,) minus mean of `one` (n,), and its 95 % interval by bootstrap."""
     generator = np.random.default_rng(0)
-    means, other_means = resampled(one, generator), resampled(other, generator)
+    means = resampled(one, generator).mean(axis=1)
+    other_means = resampled(other, generator).mean(axis=1)
     return float(other.mean() - one.mean()), *interval_of_resamples(other_means - means)
 
 

@@ -449,8 +449,8 @@ def _compare(
 
     Compares the best fitness of each trial at the same number of simulations. An evaluation is
     one simulation, or one for each draw of disturbances. Prints interquartile means with bootstrap
-    intervals, the probability that a trial of one run ends fitter than a trial of another,
-    simulations until a trial reaches a distance, and time. With --out it writes
+    intervals, the probability that a trial of one run ends fitter than a trial of another with its
+    interval, simulations until a trial reaches a distance, and time. With --out it writes
     trials.csv, curves.csv, summary.json and the figure comparison.
 
     Args:
@@ -484,7 +484,7 @@ def _compare(
             written = save_comparison(compared, out / name, **drawn)
             print(f"wrote {', '.join(written)} to {out / name}/")
     if scenarios:
-        means = improvement_over(by_scenario.values())
+        means = improvement_over(compared.trials for compared in by_scenario.values())
         print(f"\nMean over {len(by_scenario)} scenarios:\n\n{improvement_text(means)}")
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 
+import numpy as np
 import pandas
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
@@ -56,9 +57,50 @@ def test_the_probability_of_improvement_counts_pairs_of_trials(run):
     paths = [run("a", trial(3.0), trial(2.0)), run("b", trial(1.0), trial(3.0))]
     found = compare(paths, labels=["ours", "theirs"])
     assert list(found.runs.index) == ["ours", "theirs"]
-    assert found.improvement.loc["ours", "theirs"] == 0.625
-    assert found.improvement.loc["theirs", "ours"] == 0.375
-    assert "0.62" in comparison_text(found)
+    ours, theirs = found.improvement.loc["ours", "theirs"], found.improvement.loc["theirs", "ours"]
+    assert (ours["probability"], theirs["probability"]) == (0.625, 0.375)
+    # Drawn anew, theirs are (1, 1) in a quarter of the cases; (2, 2) meets (3, 3) in a sixteenth.
+    assert (ours["low"], ours["high"], theirs["low"], theirs["high"]) == (0.0, 1.0, 0.0, 1.0)
+    assert "0.62 (0.00 to 1.00)" in comparison_text(found)
+
+
+def test_the_interval_of_separated_trials_has_no_width_and_a_single_trial_has_none(run):
+    paths = [run("a", trial(4.0), trial(3.0)), run("b", trial(1.0), trial(None))]
+    found = compare([*paths, run("c", trial(2.0))])
+    assert found.improvement.loc["a", "b"].tolist() == [1.0, 1.0, 1.0]
+    assert found.improvement.loc["b", "a"].tolist() == [0.0, 0.0, 0.0]
+    single = found.improvement.loc["a", "c"]
+    assert single["probability"] == 1.0 and single[["low", "high"]].isna().all()
+    assert "1.00 (-)" in comparison_text(found)
+    assert compare(paths[:1]).improvement.empty
+
+
+def ends(**fitnesses):
+    """Table of trials, by run."""
+    rows = [(run, fitness) for run, numbers in fitnesses.items() for fitness in numbers]
+    return pandas.DataFrame(rows, columns=["run", "fitness"])
+
+
+def test_the_interval_of_improvement_covers_the_truth_of_normal_numbers(run):
+    """A normal number of mean 1 exceeds one of mean 0, both of deviation 1, with the probability
+    Phi(1 / sqrt 2) = 0.760. The percentile bootstrap of 2 x 12 numbers covers it in some 92 % of
+    the samples; the deviation of a share of 100 samples is 2.7 %."""
+    generator, covered = np.random.default_rng(5), 0
+    for _ in range(100):
+        ours, theirs = generator.normal(1.0, size=12), generator.normal(0.0, size=12)
+        row = improvement_over([ends(a=ours, b=theirs)]).loc["a", "b"]
+        covered += row["low"] <= 0.760 <= row["high"]
+    assert 0.84 <= covered / 100 <= 0.99
+
+
+def test_the_interval_of_a_mean_over_scenarios_draws_within_each():
+    """Trials of one scenario never meet those of another: 1 and 2 exceed 0, 11 and 12 exceed 10."""
+    low, high = ends(a=[1.0, 2.0], b=[0.0, 0.0]), ends(a=[11.0, 12.0], b=[10.0, 10.0])
+    assert improvement_over([low, high]).loc["a", "b"].tolist() == [1.0, 1.0, 1.0]
+    # A scenario with equal trials halves the width: from 0..1 to 1/4..3/4.
+    even, wide = ends(a=[1.0, 1.0], b=[1.0, 1.0]), ends(a=[0.0, 2.0], b=[1.0, 1.0])
+    assert improvement_over([wide]).loc["a", "b"].tolist() == [0.5, 0.0, 1.0]
+    assert improvement_over([wide, even]).loc["a", "b"].tolist() == [0.5, 0.25, 0.75]
 
 
 def test_runs_are_compared_within_their_scenarios(run, refused):
@@ -66,9 +108,9 @@ def test_runs_are_compared_within_their_scenarios(run, refused):
     paths = [run("a", trial(3.0)), run("b", trial(1.0))]
     paths += [run("c", trial(1.0), changes=other), run("d", trial(1.0), changes=other)]
     found = compare_scenarios(paths, labels=["x", "y", "x", "y"])
-    shares = [compared.improvement.loc["x", "y"] for compared in found.values()]
+    shares = [c.improvement.loc[("x", "y"), "probability"] for c in found.values()]
     assert len(found) == 2 and shares == [1.0, 0.5]
-    assert improvement_over(found.values()).loc["x", "y"] == 0.75
+    assert improvement_over(c.trials for c in found.values()).loc[("x", "y"), "probability"] == 0.75
     with refused("compare", "labels", "expected 4"):
         compare_scenarios(paths, labels=["x"])
 

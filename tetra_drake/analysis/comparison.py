@@ -6,15 +6,23 @@ The cost is the number of simulations. An evaluation costs one simulation per dr
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.analysis.statistics import interquartile_mean, interval, json_rows
+from tetra_drake.analysis.statistics import (
+    interquartile_mean,
+    interval,
+    interval_of_resamples,
+    json_rows,
+    resampled,
+)
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import FITNESS
 from tetra_drake.evolution.run import Run, load_run
@@ -69,8 +77,12 @@ class Compared:
     - wall_time: mean time per evaluation, in s
     """
     improvement: pandas.DataFrame
-    """Probability of improvement: that a trial of the row's run ends fitter than a trial of the
-    column's run, over all pairs of trials. Equal fitness counts one half."""
+    """Probability of improvement, a row per pair of runs. Index: run, other. Columns:
+
+    - probability: that a trial of `run` ends fitter than a trial of `other`; see improvement()
+    - low, high: 95 % confidence interval, by bootstrap over the trials of both runs; NaN if one of
+      them has a single trial
+    """
     notes: list[str]
     """Notes on differences of the scenarios outside the search, and on unfinished trials."""
 
@@ -101,10 +113,9 @@ def _compared(runs: Mapping[str, Run], reach: float | None) -> Compared:
     notes = _differences(runs)
     searches = {label: _progress(run) for label, run in runs.items()}
     common = min(_end(progress) for progress in searches.values())
-    trials, curves, summaries, ends = [], [], {}, {}
+    trials, curves, summaries = [], [], {}
     for label, progress in searches.items():
         rows = _trials(progress, common, reach)
-        ends[label] = rows["fitness"]
         trials.append(rows.assign(run=label))
         curves.append(_curve(progress).assign(run=label))
         run = runs[label]
@@ -117,16 +128,13 @@ def _compared(runs: Mapping[str, Run], reach: float | None) -> Compared:
             notes.append(f"{label}: {going_on} of {len(rows)} trials go on")
         if failed := int(np.isneginf(rows["fitness"]).sum()):
             notes.append(f"{label}: {failed} of {len(rows)} trials have no fitness")
+    table = pandas.concat(trials, ignore_index=True)[_TRIAL_COLUMNS]
     return Compared(
-        improvement=pandas.DataFrame(
-            [[improvement(ours, theirs) for theirs in ends.values()] for ours in ends.values()],
-            index=list(ends),
-            columns=list(ends),
-        ),
         scenario=next(iter(runs.values())).scenario,
         common=common,
         reach=reach,
-        trials=pandas.concat(trials, ignore_index=True)[_TRIAL_COLUMNS],
+        trials=table,
+        improvement=improvement_over([table]),
         curves=pandas.concat(curves, ignore_index=True),
         runs=pandas.DataFrame.from_dict(summaries, orient="index").rename_axis("run"),
         notes=notes,
@@ -152,19 +160,46 @@ def compare_scenarios(
     }
 
 
-def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> float:
-    """Probability of improvement: that a number of the first list exceeds one of the second. Equal
-    numbers count one half. From R. Agarwal et al., NeurIPS 2021 (rliable)."""
-    first, second = np.asarray(ours)[:, np.newaxis], np.asarray(theirs)
-    return float(np.mean((first > second) + 0.5 * (first == second)))
+def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Probability of improvement: that one of our numbers (..., n) exceeds one of theirs (..., m),
+    over all n m pairs. Equal numbers count one half.
+
+    From R. Agarwal et al., "Deep reinforcement learning at the edge of the statistical precipice",
+    NeurIPS 2021 (rliable).
+    """
+    first, second = np.asarray(ours)[..., :, np.newaxis], np.asarray(theirs)[..., np.newaxis, :]
+    return np.mean((first > second) + 0.5 * (first == second), axis=(-2, -1))
 
 
-def improvement_over(comparisons: Iterable[Compared]) -> pandas.DataFrame:
-    """Mean probability of improvement over the scenarios that have both runs."""
+def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
+    """Mean probability of improvement over the scenarios that have both runs, in the form of
+    Compared.improvement. The bootstrap draws trials within each scenario.
+
+    Args:
+        scenarios: a table of trials for each scenario, with at least the columns `run` and
+            `fitness`, such as Compared.trials.
+    """
     import pandas
 
-    tables = pandas.concat([compared.improvement.stack() for compared in comparisons])
-    return tables.groupby(level=[0, 1], sort=False).mean().unstack()
+    generator = np.random.default_rng(0)
+    probabilities, resamples = defaultdict(list), defaultdict(list)
+    for trials in scenarios:
+        by_run = trials.groupby("run", sort=False)["fitness"]
+        ends = {str(run): fitnesses.to_numpy() for run, fitnesses in by_run}
+        drawn = {run: resampled(fitnesses, generator) for run, fitnesses in ends.items()}
+        for run, other in permutations(ends, 2):
+            spread = improvement(drawn[run], drawn[other])
+            if min(len(ends[run]), len(ends[other])) == 1:
+                spread[:] = math.nan
+            probabilities[run, other].append(improvement(ends[run], ends[other]))
+            resamples[run, other].append(spread)
+    rows = []
+    for (run, other), values in probabilities.items():
+        low, high = interval_of_resamples(np.mean(resamples[run, other], axis=0))
+        probability = float(np.mean(values))
+        rows.append((run, other, probability, low, high))
+    columns = ["run", "other", "probability", "low", "high"]
+    return pandas.DataFrame(rows, columns=columns).set_index(["run", "other"])
 
 
 def _check_labels(labels: Sequence[str], count: int) -> None:
@@ -291,6 +326,6 @@ def comparison_numbers(compared: Compared) -> dict[str, Any]:
         "common": compared.common,
         "reach": compared.reach,
         "notes": compared.notes,
-        "improvement": compared.improvement.to_dict(orient="index"),
+        "improvement": json_rows(compared.improvement),
         "runs": json_rows(compared.runs),
     }

@@ -25,16 +25,12 @@ def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> 
     numbers = numbers[~np.isnan(numbers)]
     if not len(numbers):
         return math.nan, math.nan
-    return interval_of_resamples(resampled(numbers, np.random.default_rng(0), statistic))
+    return interval_of_resamples(statistic(resampled(numbers, np.random.default_rng(0)), axis=1))
 
 
-def resampled(
-    values: np.ndarray, generator: np.random.Generator, statistic: Callable[..., Any] = np.mean
-) -> np.ndarray:
-    """The statistic of RESAMPLES resamples. Each resample has n of the n values, drawn with
-    replacement."""
-    picks = generator.integers(len(values), size=(RESAMPLES, len(values)))
-    return np.asarray(statistic(values[picks], axis=1))
+def resampled(values: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+    """Resamples (RESAMPLES, n): each has n of the n values, drawn with replacement."""
+    return values[generator.integers(len(values), size=(RESAMPLES, len(values)))]
 
 
 def interval_of_resamples(resamples: np.ndarray) -> tuple[float, float]:

@@ -82,7 +82,7 @@ def comparison_text(compared: Compared) -> str:
         f"Best fitness of each trial after {compared.common} simulations, where the shortest run "
         "ends, and at its end:\ninterquartile mean over trials (95 % confidence interval).",
         _fitness_table(compared).text(),
-        improvement_text(compared.improvement),
+        *([] if compared.improvement.empty else [improvement_text(compared.improvement)]),
         distances,
         _distance_table(compared).text(),
     ]
@@ -91,15 +91,17 @@ def comparison_text(compared: Compared) -> str:
 
 
 def improvement_text(improvement: pandas.DataFrame) -> str:
-    """Table of the probabilities of improvement."""
-    rows = []
-    for label, row in improvement.iterrows():
-        rows.append(
-            [str(label), *("" if name == label else fixed(row[name]) for name in row.index)]
-        )
+    """Table of the probabilities of improvement, with their intervals. See Compared.improvement."""
+    cells = {}
+    for pair, row in improvement.iterrows():
+        interval = "-" if math.isnan(row["low"]) else f"{fixed(row['low'])} to {fixed(row['high'])}"
+        cells[pair] = f"{fixed(row['probability'])} ({interval})"
+    labels = list(dict.fromkeys(run for run, _ in cells))
+    rows = [[run, *(cells.get((run, other), "") for other in labels)] for run in labels]
     return (
-        "Probability that a trial of the row's run ends fitter than a trial of the column's run.\n"
-        + Table(["run", *map(str, improvement.columns)], rows).text()
+        "Probability that a trial of the row's run ends fitter than a trial of the column's run\n"
+        "(95 % confidence interval, - where a run has a single trial).\n"
+        + Table(["run", *labels], rows).text()
     )
 
 
