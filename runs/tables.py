@@ -30,7 +30,7 @@ from rolling import LAPSE, ROLLING, best_of, load_policies
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import Table, fixed, listed, percents, rounded
+from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
@@ -229,14 +229,15 @@ def trials_table(run: Analysis, units: Units) -> str:
         judged = run.disturbed.loc[trial]
         inches = np.array([compiled, tight, run.again(trial, MUJOCO), judged["mean"] / INCH])
         distances = inches * INCH / units.length
-        kept = percents(*judged[["kept", "kept_low", "kept_high"]]).replace(" to ", "–")
+        share, low, high = 100.0 * judged[["kept", "kept_low", "kept_high"]]
+        kept = f"{share:.0f} ({low:.0f}–{high:.0f})"
         metrics = [gait[name] / size for name, (size, _) in of_metrics.items()]
         counts = [f"{trial}", f"{gait['evaluations']:.0f}", fixed(gait["fitness"])]
         rows.append([*counts, *map(fixed, distances), kept, *map(fixed, metrics)])
     headings = ["trial", "gaits", "fitness"]
     for engine in ("compiled", "diagram", "MuJoCo", "disturbed"):
         headings.append(f"{engine} ({units.length_name})")
-    headings.append("keeps")
+    headings.append("keeps (%)")
     for name, (_, unit) in of_metrics.items():
         title = name.replace("_", " ")
         headings.append(f"{title} ({unit})" if unit else title)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from record import EXPERIMENTS
 
 import tetra_drake as td
@@ -153,15 +154,51 @@ FOLDERS = (
     "diagrams",
     "runs",
     *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
+    *("runs/measured", "runs/rolling", "tetra_drake"),
     *(f"tetra_drake/{name}" for name in ("engines", "evolution", "scenario")),
 )
 """Runs of one's own may lie beside the recorded ones."""
+PAGES = ["README.md", *(f"{folder}/README.md" for folder in FOLDERS)]
 
 
-@pytest.mark.parametrize("page", ["README.md", *(f"{folder}/README.md" for folder in FOLDERS)])
+def anchors(page: Path) -> set[str]:
+    """The names by which links reach the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-") for text in headings}
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page: str) -> None:
     file = CHECKOUT / page
-    links = re.findall(r"\]\(([^)#]+)[^)]*\)", file.read_text(encoding="utf-8"))
+    links = re.findall(r'(?:\]\(|src="|href=")([^)"]+)', file.read_text(encoding="utf-8"))
     assert links
     for link in links:
-        assert link.startswith("https://") or (file.parent / link).exists(), link
+        if link.startswith("https://"):
+            continue
+        path, _, anchor = link.partition("#")
+        target = file.parent / path if path else file
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+def aspect(picture: Path) -> float:
+    """Width of a picture over its height."""
+    if picture.suffix == ".svg":
+        text = picture.read_text(encoding="utf-8")
+        width, height = map(float, re.findall(r'(?:width|height)="([\d.]+)pt"', text)[:2])
+    else:
+        with Image.open(picture) as opened:
+            width, height = opened.size
+    return width / height
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pictures_beside_each_other_have_one_height_and_all_have_a_text(page: str) -> None:
+    file = CHECKOUT / page
+    text = file.read_text(encoding="utf-8")
+    assert "![](" not in text
+    for line in text.splitlines():
+        pictures = re.findall(r'<img src="([^"]+)" width="([\d.]+)%?" alt="[^"]+">', line)
+        assert len(pictures) == line.count("<img")
+        heights = [float(width) / aspect(file.parent / source) for source, width in pictures]
+        assert not heights or max(heights) < 1.03 * min(heights), line

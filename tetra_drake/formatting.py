@@ -59,6 +59,12 @@ def percents(share: float, low: float, high: float) -> str:
     return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
+def _unbroken(text: str) -> str:
+    """A text whose spaces and dashes do not end a line in a browser."""
+    no_break_space, word_joiner = "\u00a0", "\u2060"
+    return text.replace(" ", no_break_space).replace("–", f"–{word_joiner}")
+
+
 def heading_html(text: str) -> str:
     """Lines of text as HTML above a table, the first in bold."""
     first, *others = html.escape(text).splitlines()
@@ -99,9 +105,14 @@ class Table:
         return f"<table><tr>{row('th', self.headings)}</tr>{rows}</table>"
 
     def markdown(self) -> str:
-        """The table in Markdown, without a line feed at the end."""
+        """The table in Markdown, without a line feed at the end. Numbers stay on one line in a
+        browser."""
         rule = ["---" if i in self.text_columns else "---:" for i in range(len(self.headings))]
-        lines = [self.headings, rule, *self.rows]
+        rows = [
+            [cell if i in self.text_columns else _unbroken(cell) for i, cell in enumerate(row)]
+            for row in self.rows
+        ]
+        lines = [self.headings, rule, *rows]
         return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 

@@ -104,7 +104,7 @@ def test_the_pages_show_the_recorded_runs():
 def test_the_gallery_is_current_and_opens_every_replay_in_its_folder():
     text = (tables.HERE / tables.GALLERY).read_text(encoding="utf-8")
     assert tables.gallery_page(tables.load_all()) == text
-    links = re.findall(r'(?:href|src)="([^"]+)"', text)
+    links = re.findall(r'(?:href|src)="([^":]+)"', text)
     figures = {f"measured/{name}.svg" for name in tables.MEASURED}
     assert {f"{name}/{REPLAY}" for name in ("rolling", *FOLDERS)} | figures <= set(links)
     for link in links:
@@ -117,6 +117,7 @@ def test_a_run_has_its_page_replay_and_picture(name):
     text = (folder / tables.README).read_text(encoding="utf-8")
     assert "<!-- to be written -->" not in text
     assert ("The engines differ by more" in text) == ("## Why the engines differ" in text)
+    assert f"]({REPLAY})" in text
     assert (folder / REPLAY).exists() and (folder / record.PICTURE).exists()
     assert (tables.HERE / record.VIEWER).exists()
 

@@ -5,6 +5,7 @@ Without Chromium the tests skip; where CI is set they fail instead.
 
 import base64
 import contextlib
+import functools
 import io
 import json
 import os
@@ -12,6 +13,8 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 import animation
 import numpy as np
@@ -48,8 +51,16 @@ if not os.environ.get("CI"):
     if find_browser() is None:
         pytest.skip("neither Chromium nor Chrome is installed", allow_module_level=True)
 
+RUNS = Path(__file__).parents[2] / "runs"
 PATIENCE = 90_000  # ms
 WINDOW = 600, 400  # small, as it is drawn again and again in software
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    """Serves files and prints nothing."""
+
+    def log_message(self, *args):
+        pass
 
 
 @pytest.fixture(scope="module")
@@ -224,6 +235,24 @@ def test_keys_play_stop_and_move_in_time(page):
         assert page.locator("#play").get_attribute("aria-pressed") == pressed
 
 
+def test_the_keys_work_on_the_slider_and_scroll_nothing(page):
+    do(page, "show", 2.0)
+    page.locator("#time").focus()
+    page.keyboard.press("ArrowRight")
+    assert text(page, "clock") == "2.1 / 5.0 s"
+    page.keyboard.press("Space")
+    assert page.locator("#play").get_attribute("aria-pressed") == "true"
+    do(page, "pause")
+    for code in ("Space", "ArrowLeft", "ArrowRight"):
+        left_to_the_browser = page.evaluate(
+            """code => document.body.dispatchEvent(
+                new KeyboardEvent("keydown", {code, bubbles: true, cancelable: true}))""",
+            code,
+        )
+        assert not left_to_the_browser
+    do(page, "pause")
+
+
 def test_every_control_has_a_name(page):
     controls = page.locator("button, input, select, output, canvas").filter(visible=True)
     assert controls.count() >= 7
@@ -285,6 +314,21 @@ def test_what_cannot_be_a_video_is_refused(replay, tmp_path, refused):
         make_video(replay, tmp_path / "talk.avi")
 
 
+def test_the_gallery_opens_replays_on_a_static_host(browser):
+    if not (RUNS / "index.html").exists():
+        pytest.skip("the recorded runs are not here")  # as in a source distribution
+    handler = functools.partial(QuietHandler, directory=RUNS)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server, ThreadPoolExecutor(1) as pool:
+        pool.submit(server.serve_forever)
+        try:
+            address = f"http://127.0.0.1:{server.server_port}/index.html"
+            with opened(browser, address, offline=False) as page:
+                page.locator("a[href='champion/replay.html']").click()
+                wait_until_loaded(page)
+        finally:
+            server.shutdown()
+
+
 def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_path):
     path, viewer = tmp_path / "replay.html", tmp_path / "meshcat.js"
     robot = Robot.of(load_scenario("thesis"))
@@ -332,6 +376,9 @@ def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, m
         assert page.locator("img").count() >= 9
         assert page.evaluate("[...document.images].every(image => image.naturalWidth > 100)")
         assert page.locator("iframe").count() == 1
+        page.set_viewport_size({"width": 400, "height": 800})
+        _, film = page.frames
+        film.wait_for_function("document.getElementById('meshcat-pane').offsetHeight > 200")
         page.evaluate("document.querySelector('iframe').remove()")  # it draws at every width
         for width in (400, 1280):
             page.set_viewport_size({"width": width, "height": 800})

@@ -285,9 +285,12 @@ window.addEventListener("load", () => {
   element("legend").open = window.innerWidth > 900;
   const ARROWS = {ArrowLeft: -0.1, ArrowRight: 0.1};  // s
   window.addEventListener("keydown", (event) => {
-    if (event.target.matches("input[type=range], select")) return;  // they have keys of their own
-    if (event.code == "Space" && event.target == document.body) set_playing(!playing);
-    if (event.code in ARROWS) show(time + ARROWS[event.code] * (event.shiftKey ? 10 : 1));
+    const {code, shiftKey, target} = event;
+    const plays = code == "Space" && [document.body, element("time")].includes(target);
+    const moves = code in ARROWS && !target.matches("select");  // which has arrows of its own
+    if (plays) set_playing(!playing);
+    if (moves) show(time + ARROWS[code] * (shiftKey ? 10 : 1));
+    if (plays || moves) event.preventDefault();  // the report around this page would scroll
   });
   element("legend").addEventListener("toggle", arrange);
   window.addEventListener("resize", arrange);
