@@ -3,9 +3,13 @@
     python runs/outdated.py [NAME ...]
 
 A recorded run is outdated if its experiment in record.py has another scenario, or if trial 0 does
-not begin as recorded. Its first 600 evaluations are repeated, on the Drake diagram 20. Last digits
-do not count, as processors and versions round differently: parameters may differ by 1e-9 of their
-values, and distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS).
+not begin as recorded. Its first 600 evaluations are repeated, on the Drake diagram 20. The search
+is told the recorded fitnesses: it must ask for the recorded parameters. Each gait that is kept with
+its parameters must go as far as recorded.
+
+Last digits do not count, as processors and versions round differently: parameters may differ by
+1e-9 of their values, distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS). A
+thinned run keeps six digits of most fitnesses, so gaits that are equal in these may change places.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +33,8 @@ from tetra_drake.experiment import evolve
 from tetra_drake.formatting import fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.optimizers import optimizer_of
-from tetra_drake.optimizers.base import Optimizer
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.optimizers.base import Evaluation, Iteration, Optimizer
+from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.common_sections import EvolutionSection
 
 EVALUATIONS, ON_DIAGRAM = 600, 20
@@ -38,8 +43,9 @@ EVALUATIONS, ON_DIAGRAM = 600, 20
 PARAMETERS = 1e-9
 """Largest relative difference of parameters that does not count."""
 
-FITNESS, DISTANCE = 1e-5, 5e-3
-"""Relative errors of the numbers that a thinned run keeps of a gait without genome."""
+DISTANCE = 1e-3
+"""Difference of distances (in) that does not count for any gait. It is less than the difference of
+most gaits on two engines."""
 
 
 def why_outdated(name: str, experiment: Experiment, directory: Path) -> str:
@@ -53,17 +59,44 @@ def why_outdated(name: str, experiment: Experiment, directory: Path) -> str:
         return first_difference(run, begun_again(run, Path(scratch)))
 
 
+@dataclass
+class Reminded:
+    """Optimiser that is told recorded fitnesses in place of those of its evaluations."""
+
+    optimizer: Optimizer
+    fitnesses: Sequence[float]
+    """Recorded fitnesses by evaluation; NaN of a failure."""
+    told: int = 0
+    """Number of evaluations so far."""
+
+    def ask(self) -> list[Vector]:
+        """See Optimizer.ask()."""
+        return self.optimizer.ask()
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
+        """See Optimizer.tell()."""
+        recorded = self.fitnesses[self.told : self.told + len(evaluations)]
+        self.told += len(evaluations)
+        reminded = [
+            replace(evaluation, fitness=-math.inf if math.isnan(fitness) else fitness)
+            for evaluation, fitness in zip(evaluations, recorded, strict=False)
+        ]
+        return self.optimizer.tell([*reminded, *evaluations[len(reminded) :]])
+
+
 def begun_again(run: Run, out: Path) -> Run:
     """The beginning of trial 0 of a run, evolved again in the folder `out`."""
     scenario = run.scenario
     most = ON_DIAGRAM if scenario.engine_name == "drake" else EVALUATIONS
     count = min(most, scenario.evolution.evaluations)
+    fitnesses = run.evaluations.loc[run.evaluations["trial"] == 0, "fitness"].tolist()
 
     def make_optimizer(
         space: ParameterSpace, _: EvolutionSection, generator: np.random.Generator
     ) -> Optimizer:
         # An optimiser may plan for the evaluations of the whole trial.
-        return optimizer_of(scenario.optimizer)(space, scenario.evolution, generator)
+        make = optimizer_of(scenario.optimizer)
+        return Reminded(make(space, scenario.evolution, generator), fitnesses)
 
     return evolve(
         scenario.with_changes({"evolution.trials": 1, "evolution.evaluations": count}),
@@ -77,39 +110,31 @@ def begun_again(run: Run, out: Path) -> Run:
 
 def first_difference(run: Run, again: Run) -> str:
     """First difference between trial 0 of a run and the same trial, evolved again; empty if only
-    last digits differ. Where last digits lead to another search, the rest is not compared."""
+    last digits differ."""
     trial = run.evaluations[run.evaluations["trial"] == 0]
     trial = trial.head(again.scenario.evolution.evaluations)
-    kept = {*run.with_parameters.index}
-    last_digits = False
-    for (row, then), (_, now) in zip(trial.iterrows(), again.evaluations.iterrows(), strict=False):
-        index = int(now["index"])
-        if row in kept:
-            genomes = run.vector(0, index), again.vector(0, index)
-            if not np.allclose(*genomes, rtol=PARAMETERS, atol=0.0):
-                return "" if last_digits else f"search differs from evaluation {index} on"
-        if _equal(then["fitness"], now["fitness"]):
-            continue
-        (change,) = sensitivity(again.scenario, [again.gait(0, index)], available_cores())
-        tolerance = ROUNDINGS * change
-        tolerance += 0.0 if row in kept else DISTANCE * abs(now["distance_in"])
-        if not abs(now["distance_in"] - then["distance_in"]) <= tolerance:
-            return _other_walk(then, now)
-        last_digits = True
-    if len(trial) != len(again.evaluations) and not last_digits:
+    if len(trial) != len(again.evaluations):
         return f"trial 0 ends after {len(again.evaluations)} evaluations, not {len(trial)}"
+    kept = trial.index.intersection(run.with_parameters.index)
+    for row, then in trial.loc[kept].iterrows():
+        index, now = int(then["index"]), again.evaluations.loc[row]
+        genomes = run.vector(0, index), again.vector(0, index)
+        if not np.allclose(*genomes, rtol=PARAMETERS, atol=0.0):
+            return f"search differs at evaluation {index} or earlier"
+        if _goes_elsewhere(then, now, again):
+            before, after = (fixed(gait["distance_in"], 3) for gait in (then, now))
+            return f"evaluation {index} goes {after} in on {now['engine']}, not {before} in"
     return ""
 
 
-def _equal(then: float, now: float) -> bool:
-    """True if two fitnesses are the same in all recorded digits, or both are missing."""
-    return math.isclose(then, now, rel_tol=FITNESS) or (math.isnan(then) and math.isnan(now))
-
-
-def _other_walk(then: pandas.Series, now: pandas.Series) -> str:
-    """What has become of an evaluation."""
-    before, after = (fixed(gait["distance_in"], 3) for gait in (then, now))
-    return f"evaluation {now['index']} goes {after} in on {now['engine']}, not {before} in"
+def _goes_elsewhere(then: pandas.Series, now: pandas.Series, again: Run) -> bool:
+    """True if a gait's distance is another, by more than rounding explains."""
+    apart = abs(now["distance_in"] - then["distance_in"])
+    if apart <= DISTANCE or (math.isnan(then["distance_in"]) and math.isnan(now["distance_in"])):
+        return False
+    gait = again.gait(0, int(now["index"]))
+    (change,) = sensitivity(again.scenario, [gait], available_cores())
+    return not apart <= ROUNDINGS * change
 
 
 def main(names: Sequence[str]) -> None:
