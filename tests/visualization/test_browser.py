@@ -51,12 +51,12 @@ if not os.environ.get("CI"):
     if find_browser() is None:
         pytest.skip("neither Chromium nor Chrome is installed", allow_module_level=True)
 
-RUNS = Path(__file__).parents[2] / "runs"
+GALLERY = Path(__file__).parents[2] / "runs/index.html"
 PATIENCE = 90_000  # ms
 WINDOW = 600, 400  # small, as it is drawn again and again in software
 
 
-class QuietHandler(SimpleHTTPRequestHandler):
+class QuietHost(SimpleHTTPRequestHandler):
     """Serves files and prints nothing."""
 
     def log_message(self, *args):
@@ -314,19 +314,31 @@ def test_what_cannot_be_a_video_is_refused(replay, tmp_path, refused):
         make_video(replay, tmp_path / "talk.avi")
 
 
-def test_the_gallery_opens_replays_on_a_static_host(browser):
-    if not (RUNS / "index.html").exists():
-        pytest.skip("the recorded runs are not here")  # as in a source distribution
-    handler = functools.partial(QuietHandler, directory=RUNS)
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server, ThreadPoolExecutor(1) as pool:
+@contextlib.contextmanager
+def hosted(folder):
+    """Address of a folder on a host of static files."""
+    host = functools.partial(QuietHost, directory=folder)
+    with ThreadingHTTPServer(("127.0.0.1", 0), host) as server, ThreadPoolExecutor(1) as pool:
         pool.submit(server.serve_forever)
         try:
-            address = f"http://127.0.0.1:{server.server_port}/index.html"
-            with opened(browser, address, offline=False) as page:
-                page.locator("a[href='champion/replay.html']").click()
-                wait_until_loaded(page)
+            yield f"http://127.0.0.1:{server.server_port}"
         finally:
             server.shutdown()
+
+
+def test_a_static_host_needs_no_file_but_the_page(browser, replay):
+    with (
+        hosted(replay.parent) as address,
+        opened(browser, f"{address}/replay.html", offline=False) as page,
+    ):
+        wait_until_loaded(page)
+
+
+@pytest.mark.skipif(not GALLERY.exists(), reason="as in a source distribution")
+def test_the_gallery_opens_replays(browser):
+    with opened(browser, GALLERY.as_uri()) as page:
+        page.locator("a[href='champion/replay.html']").click()
+        wait_until_loaded(page)
 
 
 def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_path):

@@ -57,8 +57,11 @@ LONG_ARROW = 0.8
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
 """Pattern of the asynchronous commands in Meshcat's page that add parts of the scene. The film runs
 them at once, because it needs the whole scene."""
-_TO_SCALE = '<meta name="viewport" content="width=device-width, initial-scale=1">'
-"""Without this line, phones show a page small."""
+_IN_HEAD = (
+    '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    '<link rel="icon" href="data:,">'
+)
+"""Without these elements, phones show a page small, and browsers ask the host for an icon."""
 _USUAL = 99.0
 """Percentile of tensions and forces that is drawn at full size. Impacts are far larger."""
 
@@ -243,7 +246,7 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
     )
     page = _COMMAND.sub(r"handle(\1);", page)
     # The replacements are functions, because backslashes in a text would be interpreted.
-    named = f"<title>{html.escape(title)}</title>{_TO_SCALE}"
+    named = f"<title>{html.escape(title)}</title>{_IN_HEAD}"
     page = page.replace("<html>", '<html lang="en">', 1)
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
