@@ -152,6 +152,7 @@ def fit(
         scenario: a scenario, its name or file, or a run. Its values are the start.
         measurements: values of the kinds td.MotionCapture and td.Rest.
         parameters: the bounds, least and most, by scenario key. Texts have units; numbers are SI.
+            Keys joined by commas get the same value.
         search: searches all values within the bounds for a better start, by CMA-ES, for data that
             several minima may fit.
         out: a folder for the fitted scenario, tables, figure and page. It also keeps each

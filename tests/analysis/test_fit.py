@@ -21,7 +21,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario, save_scenario
 
 STIFFNESS, FREE_LENGTH = "robot.cables.line.stiffness", "robot.cables.line.free_length"
-DAMPING = "robot.cables.line.damping"
+DAMPING, MASSES = "robot.cables.line.damping", "robot.masses.a, robot.masses.b"
 BOUNDS = {STIFFNESS: (100.0, 400.0), FREE_LENGTH: (0.3, 0.5)}
 NOISE, PULLS = 2e-4, (0.0, 4.0, 8.0, 12.0)
 
@@ -105,6 +105,14 @@ def test_a_tension_and_a_frequency_give_mass_and_stiffness():
     bounds = {"robot.masses.a": (0.1, 0.5), STIFFNESS: (100.0, 400.0)}
     found = fit_values(scenario, [case], bounds)
     assert found.parameters["value"].to_list() == pytest.approx([0.3, stiffness], rel=1e-4)
+
+
+def test_joined_keys_get_the_same_value():
+    scenario = hung().with_changes({"robot.masses.b": "0.2 kg"})
+    weight = (Robot.of(scenario).structure.mass.sum() + 2.0 * 0.1) * scenario.robot.gravity
+    found = fit_values(scenario, [Rest(tensions={"line top a": weight})], {MASSES: (0.1, 0.5)})
+    assert found.parameters["value"].to_dict() == pytest.approx({MASSES: 0.3}, rel=1e-5)
+    assert found.scenario.robot.masses == dict.fromkeys("ab", found.parameters["value"][MASSES])
 
 
 def test_predictions_that_are_not_smooth_have_no_intervals(monkeypatch):
@@ -268,6 +276,7 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
         ({STIFFNESS: ("1 m", "400 N/m")}, STIFFNESS),
         ({STIFFNESS: (-1.0, 400.0)}, STIFFNESS),
         ({STIFFNESS: 100.0}, STIFFNESS),
+        ({MASSES: (0.1, 0.5)}, MASSES),  # 0.2 and 0.3
         ({}, "parameters"),
         (BOUNDS, "parameters"),  # two for one number
     ],

@@ -20,6 +20,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.optimizers.cma_es import Box, Search
+from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import value_at
@@ -59,6 +60,7 @@ class Parameter(NamedTuple):
     """A number of a scenario that is fitted, in SI."""
 
     key: str
+    """The key, or several joined by commas."""
     unit: str
     start: float
     least: float
@@ -71,9 +73,10 @@ class Parameter(NamedTuple):
         width = self.most - self.least
         return min(abs(self.start) or width, width)
 
-    def given(self, number: float) -> str | float:
-        """The number for a scenario."""
-        return f"{number!r} {self.unit}" if self.unit else number
+    def changes(self, number: float) -> dict[str, str | float]:
+        """Changes of a scenario that give each of the joined keys the number."""
+        given = f"{number!r} {self.unit}" if self.unit else number
+        return dict.fromkeys(separate(self.key), given)
 
 
 @dataclass(frozen=True)
@@ -157,7 +160,7 @@ def fit_values(
     Args:
         scenario: the scenario whose values are the start.
         measurements: the measurements.
-        parameters: the bounds, least and most, by key.
+        parameters: the bounds, least and most, by key. Keys joined by commas get the same value.
         search: searches all values within the bounds for a better start, by CMA-ES.
         folder: keeps each evaluation; another fit to the same data takes them from there.
         say: is told of each iteration.
@@ -202,10 +205,16 @@ def fit_values(
 def _parameter(scenario: Scenario, key: str, bounds: Bounds) -> Parameter:
     """The parameter of a key. Raises InputError if key or bounds cannot be used."""
     source = f"scenario {scenario.name}"
-    start = value_at(scenario.model_dump(), key)
-    if isinstance(start, bool) or not isinstance(start, float):
-        what = "no value" if start is None else f"{start!r:.40}"
-        raise InputError(source, key, f"found {what}, expected the key of a number to fit")
+    values = scenario.model_dump()
+    starts = [value_at(values, each) for each in separate(key)]
+    for start in starts:
+        if isinstance(start, bool) or not isinstance(start, float):
+            what = "no value" if start is None else f"{start!r:.40}"
+            raise InputError(source, key, f"found {what}, expected the key of a number to fit")
+    start = starts[0]
+    if any(other != start for other in starts):
+        found = " and ".join(f"{each:g}" for each in starts)
+        raise InputError(source, key, f"found {found}, expected joined keys of the same value")
     unit = start.unit if isinstance(start, Quantity) else ""
     if isinstance(bounds, str) or not isinstance(bounds, Sequence) or len(bounds) != 2:
         raise InputError(source, key, f"found {bounds!r:.40}, expected bounds: least and most")
@@ -217,7 +226,7 @@ def _parameter(scenario: Scenario, key: str, bounds: Bounds) -> Parameter:
         raise InputError(source, key, f"{problem}, expected them around the start, {start:g}")
     parameter = Parameter(key, unit, float(start), least, most)
     for bound in (least, most):  # a scenario may have limits of its own
-        scenario.with_changes({key: parameter.given(bound)})
+        scenario.with_changes(parameter.changes(bound))
     return parameter
 
 
@@ -278,9 +287,10 @@ class _Problem:
         """The scenario with relative parameters (n,)."""
         numbers = (x * self.scale).tolist()
         pairs = zip(self.parameters, numbers, strict=True)
-        return self.scenario.with_changes(
-            {parameter.key: parameter.given(number) for parameter, number in pairs}
-        )
+        changes: dict[str, str | float] = {}
+        for parameter, number in pairs:
+            changes |= parameter.changes(number)
+        return self.scenario.with_changes(changes)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Weighted residuals (numbers,); the neighbours of the point are simulated with it."""

@@ -200,7 +200,7 @@ class FitFile(Section):
     """What a fit needs beside the scenario."""
 
     parameters: dict[str, Annotated[list[str | float], Field(min_length=2, max_length=2)]]
-    """Bounds, least and most, by scenario key."""
+    """Bounds, least and most, by scenario key. Keys joined by commas get the same value."""
     measurements: list[Measurement] = Field(min_length=1)
 
 
