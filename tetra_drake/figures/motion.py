@@ -81,7 +81,7 @@ def relative_distances(
     if names:
         page.legend(loc="outside right upper", reverse=True, frameon=False)
     title = f"Distance of each body from {first}"  # the legend is beside it
-    set_title(page, folded(title, 2.0 * width, size="figure.titlesize"))
+    set_title(page, folded(title, 2.0 * width, size=rcParams["figure.titlesize"]))
     return page
 
 

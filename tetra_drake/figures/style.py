@@ -187,9 +187,10 @@ def page_width(figure: Page | None) -> float:
     return rcParams["figure.figsize"][0] if figure is None else figure.bbox.width / figure.dpi
 
 
-def folded(text: str, width_in: float, *, size: str = "legend.fontsize") -> str:
-    """A text in lines of at most `width_in` inches, written in letters of a named size."""
-    letters = int(_LETTERS_PER_SIZE * 72.0 * width_in / rcParams[size])
+def folded(text: str, width_in: float, *, size: float | None = None) -> str:
+    """A text in lines of at most `width_in` inches, in letters of a size (points), by default the
+    legend's."""
+    letters = int(_LETTERS_PER_SIZE * 72.0 * width_in / (size or rcParams["legend.fontsize"]))
     return textwrap.fill(text, max(letters, _FEWEST_LETTERS))
 
 

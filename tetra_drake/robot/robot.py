@@ -176,12 +176,9 @@ class Robot:
         return self._at_start(self.structure.cables[self.driven])
 
     def _at_start(self, driven: np.ndarray) -> DrivenCables:
-        length, rate = self._starting_lengths(driven), np.zeros(len(driven))
-        law, signal = cable.CableLaw.of(driven), rate
-        if len(self.commanded):
-            signal = self.commanded[0, driven["signal"]]
-        tension = np.maximum(cable.cable_tension(length, rate, signal, law), 0.0)
-        return DrivenCables(law, signal, length, rate, tension, law.free_length)
+        commanded = self.commanded[0] if len(self.commanded) else np.zeros(self.structure.signals)
+        law, signal = cable.CableLaw.of(driven), commanded[driven["signal"]]
+        return DrivenCables.at_rest(law, self._starting_lengths(driven), signal)
 
     def _starting_lengths(self, cables: np.ndarray) -> Any:
         """Lengths of cables, records of physics.cable.CABLE, in m at t = 0."""
