@@ -39,9 +39,9 @@ class Simulation:
         ...     readings = simulation.step(simulation.rest + 3.0 * readings.rates[:, driven])
         >>> inches = [simulation.result(place).metrics.distance_in for place in range(4)]
 
-    Each driven cable has an action: the setpoint of its actuator, by the kind of `actuation`.
-    Actions are in the order of `robot.driven`: that of the oscillators in the scenario. It is
-    a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. It is
+    Each driven cable has an action: the setpoint of its actuator, by the kind of `actuation`. It is
+    a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. The
+    order is the same as in `robot.driven`, oscillator by oscillator. An action is
     held for a control period. Like a sample of a command, it takes effect within one
     `cpg.listing_step`. There is no network and no start-up time. Steps with the samples of a
     command give the motion of simulate(command=...), if each sample differs from the one before.
