@@ -39,6 +39,21 @@ def test_a_table_aligns_numbers_to_the_right():
     assert Table(["in", "note"], [["1", "b"]], text_columns=(1,)).text() == "in  note\n 1  b"
 
 
+def test_texts_and_headings_are_folded_where_the_terminal_ends_and_numbers_are_not(monkeypatch):
+    long = "front_right_leg/knee/base_bottom front_right_leg/knee/center"
+    table = Table(["body", "load on the ground (N)"], [[long, "1.25 to 1000"], ["b", "2"]])
+    monkeypatch.setenv("COLUMNS", "48")
+    assert table.text().splitlines() == [
+        "body                                 load on the",
+        "                                      ground (N)",
+        "front_right_leg/knee/base_bottom    1.25 to 1000",
+        "  front_right_leg/knee/center",
+        "b                                              2",
+    ]
+    monkeypatch.setenv("COLUMNS", "5")
+    assert "1.25 to 1000" in table.text()
+
+
 def test_a_range_without_width_or_ends_is_not_shown():
     assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
     assert percents(1.0, 1.0, 1.0) == "100 %"

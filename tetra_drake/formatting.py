@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import html
+import itertools
 import math
+import shutil
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -71,6 +74,10 @@ def heading_html(text: str) -> str:
     return "<br>".join([f"<b>{first}</b>", *others])
 
 
+_WIDTH = 100  # letters in a line of a table where there is no terminal
+_NARROW = 12  # letters; texts are not folded into narrower columns
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of texts with headings."""
@@ -81,14 +88,35 @@ class Table:
     """Indices of the columns that are aligned to the left; other columns have numbers."""
 
     def text(self) -> str:
-        """The table as aligned lines."""
-        lines = [self.headings, *self.rows]
-        columns = []
-        for column, cells in enumerate(zip(*lines, strict=True)):
-            width = max(map(len, cells))
-            align = str.ljust if column in self.text_columns else str.rjust
-            columns.append([align(cell, width) for cell in cells])
-        return "\n".join("  ".join(cells).rstrip() for cells in zip(*columns, strict=True))
+        """The table as aligned lines. Texts and headings are folded where the table is wider than
+        the terminal; numbers never are."""
+        widths, lines = self._widths(shutil.get_terminal_size((_WIDTH, 24)).columns), []
+        aligns = [
+            str.ljust if column in self.text_columns else str.rjust for column in range(len(widths))
+        ]
+        for cells in [self.headings, *self.rows]:
+            folded = [_folded(cell, width) for cell, width in zip(cells, widths, strict=True)]
+            for parts in itertools.zip_longest(*folded, fillvalue=""):
+                aligned = zip(aligns, parts, widths, strict=True)
+                lines.append("  ".join(align(part, width) for align, part, width in aligned))
+        return "\n".join(line.rstrip() for line in lines)
+
+    def _widths(self, most: int) -> list[int]:
+        """Widths of the columns, in letters. If the table is wider than `most`, headings of numbers
+        are folded first, then texts; wide columns before narrow ones."""
+        columns = list(zip(self.headings, *self.rows, strict=True))
+        widths = [max(map(len, cells)) for cells in columns]
+        least = [
+            _NARROW if column in self.text_columns else max(_NARROW, *map(len, cells[1:]))
+            for column, cells in enumerate(columns)
+        ]
+        while sum(widths) + 2 * (len(widths) - 1) > most:
+            foldable = [column for column, width in enumerate(widths) if width > least[column]]
+            if not foldable:
+                break
+            headed = [column for column in foldable if column not in self.text_columns]
+            widths[max(headed or foldable, key=widths.__getitem__)] -= 1
+        return widths
 
     def html(self) -> str:
         """The table as HTML, as notebooks show it."""
@@ -114,6 +142,13 @@ class Table:
         ]
         lines = [self.headings, rule, *rows]
         return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+def _folded(text: str, width: int) -> list[str]:
+    """Lines of at most `width` letters; further lines are indented."""
+    if len(text) <= width:
+        return [text]
+    return textwrap.wrap(text, width, subsequent_indent="  ")
 
 
 def render(template: str, **values: object) -> str:

@@ -1,5 +1,6 @@
 """On a page of any width every figure is whole, and no text is on another."""
 
+import dataclasses
 import functools
 import itertools
 
@@ -37,12 +38,27 @@ OF_A_GAIT = (
 NAME = "$rough-feedback, seed 0, trial 5, evaluation 3991"
 
 
+def with_long_names(robot):
+    """A robot with names such as those of NTRT's structures."""
+    names = {
+        field: tuple(
+            f"front_right/{name}/leg/knee base_bottom/{name}/saddle t1-bottom"
+            for name in getattr(robot.structure, field)
+        )
+        for field in ("bodies", "node_names", "cable_names", "oscillators")
+    }
+    return dataclasses.replace(robot, structure=dataclasses.replace(robot.structure, **names))
+
+
 @functools.cache
 def gait_of(robot):
     """A result of a made-up motion, which no test may change."""
     if robot == "prism":
         carried = prism.make_prism()
         return result_of(carried, prism.slide_prism(carried))
+    if robot == "long names":
+        carried = with_long_names(prism.make_prism())
+        return result_of(carried, prism.slide_prism(carried), name=NAME * 4)
     bodies, duration = {"three": (3, 0.5), "five": (5, 9.0), "twelve": (12, 9.0)}[robot]
     motion = make_walk(bodies=bodies, duration=duration)
     return result_of(make_row(bodies), motion, name=NAME)
@@ -92,7 +108,8 @@ def check(drawn_texts, request):
 
 
 @pytest.mark.parametrize(
-    "robot", ["three", "five", "prism", pytest.param("twelve", marks=pytest.mark.slow)]
+    "robot",
+    ["three", "five", "prism", "long names", pytest.param("twelve", marks=pytest.mark.slow)],
 )
 @pytest.mark.parametrize("draw", OF_A_GAIT)
 def test_figures_of_a_gait(draw, robot, check):

@@ -88,7 +88,7 @@ def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
         "4.25 in",
         "5.75 in",
     ]
-    assert walked["evaluations"].startswith("7,") and "1" in walked["evaluations"]
+    assert walked["evaluations"].startswith("7 ") and "1" in walked["evaluations"]
     assert walked["time per evaluation"] == "500 ms"
 
     turning = tiny_scenario().with_changes({"objective": {"heading_change": "1 /rad"}})

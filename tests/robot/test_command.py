@@ -5,8 +5,15 @@ import pytest
 from helpers.actuations import MOTOR, WINCH
 
 from tetra_drake.physics.cable import CableLaw
-from tetra_drake.robot.command import Command, commanded_robot, held_samples
+from tetra_drake.prototype.command_file import command_columns
+from tetra_drake.robot.command import (
+    Command,
+    commanded_robot,
+    held_samples,
+    robot_without_network,
+)
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
 
 
 def counting(cables: int = 8, samples: int = 3) -> Command:
@@ -35,6 +42,21 @@ def test_each_driven_cable_has_a_signal_of_its_own(scenario):
     assert list(robot.structure.oscillators) == names
     assert robot.structure.signals == 8
     assert robot.commanded[0].tolist() == list(range(8)), "no start-up gate"
+
+
+def test_commands_have_the_order_of_the_oscillators_and_drives_that_of_the_cables():
+    """The prism's oscillators drive a cable each, not in the order of the cables. At rest a winch
+    is wound to the free length of its cable."""
+    prism = load_scenario("prism")
+    robot = Robot.of(prism.with_changes(WINCH))
+    given = [name for names in prism.robot.actuated.values() for name in names]
+    assert command_columns(robot) == [f"{name} free_length_mm" for name in given]
+    assert list(robot_without_network(prism).structure.oscillators) == given
+    assert (np.diff(robot.driven) < 0).any()
+    free = robot.structure.cables["free_length"]
+    assert len(set(free)) > 1
+    np.testing.assert_array_equal(robot.starting_cables().free_length, free[robot.driven])
+    np.testing.assert_array_equal(robot.starting_drives(), free[np.sort(robot.driven)])
 
 
 def test_a_free_length_is_the_signal_that_shortens_the_cable_to_it(scenario):

@@ -87,7 +87,7 @@ def test_a_builder_has_no_pretension_unless_it_says_so(tmp_path: Path, text: str
 def test_a_spine_by_substructures(tmp_path: Path) -> None:
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     given = read(write(tmp_path, SPINE))
-    assert len(given.bodies) == 3
+    assert given.body_names == ("v1", "v2", "v3")
     rod = given.struts["rod"]  # by the default builder
     assert (rod.diameter, rod.density) == pytest.approx((0.1, 1000.0))
     assert given.nodes["v1/front"] == pytest.approx([0.1, 0.1, 0.2])

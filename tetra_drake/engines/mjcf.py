@@ -60,8 +60,8 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     actuators have drives, tendons have no law, and a motor for each cable exerts its tension.
 
     Motors are in the order of their cables; for their names see motor_names(). With a state
-    (13 bodies,) at `rest`, there is a key frame of this name, and nodes are shown. Raises
-    InputError if MuJoCo does not know the terrain or the friction.
+    (13 bodies,) at `rest`, there is a key frame of this name. Raises InputError if MuJoCo does not
+    know the terrain or the friction.
     """
     scenario = robot.scenario
     check_mjcf(scenario)
@@ -77,7 +77,6 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     _add_bodies(model, world, robot)
     if rest is not None:
         _add_key_frame(model, robot.structure, rest)
-        _show_nodes(world, robot.structure)
     if robot.model.strut_contact.acts:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot)
@@ -102,8 +101,10 @@ def _add_fixed_nodes(world: Element, structure: Structure) -> None:
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
-    """Adds the bodies: a site at each node, a small sphere at each contact node, and struts."""
+    """Adds the bodies: a site at each node, shown at least as thick as the thinnest strut; a small
+    sphere at each contact node; and struts."""
     structure, bodies = robot.structure, robot.model.bodies
+    radii = structure.node_radius.clip(min=structure.strut_radius.min())
     pairs = add_element(model, "contact")
     for i, body_name in enumerate(structure.bodies):
         pos, quat = structure.p_WB[i], structure.q_WB[i]
@@ -125,7 +126,7 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         contact = _contact(robot, mass)
         for node in range(structure.first_node[i], structure.first_node[i + 1]):
             name, p_BN = structure.node_names[node], structure.p_BN[node]
-            add_element(body, "site", name=name, pos=p_BN)
+            add_element(body, "site", name=name, pos=p_BN, size=radii[node], rgba=NODE_COLOUR)
             if node in structure.contacts:
                 add_element(body, "geom", name=name, pos=p_BN, size=_POINT, **_ALONE)
                 add_element(pairs, "pair", geom1="floor", geom2=name, **contact)
@@ -141,15 +142,6 @@ def _add_key_frame(model: Element, structure: Structure, state: Array) -> None:
     poses = state[: 7 * len(structure.bodies)].reshape(-1, 7)
     qpos = np.hstack([poses[:, 4:], poses[:, :4]])
     add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
-
-
-def _show_nodes(world: Element, structure: Structure) -> None:
-    """Adds a sphere to look at for each node of a body, at least as thick as the thinnest strut."""
-    radii = structure.node_radius.clip(min=structure.strut_radius.min())
-    for i, body in enumerate(world.findall("body")):
-        for node in range(structure.first_node[i], structure.first_node[i + 1]):
-            shape = {"pos": structure.p_BN[node], "size": radii[node], "rgba": NODE_COLOUR}
-            add_element(body, "geom", **shape, **_ALONE)
 
 
 def _contact(robot: Robot, mass: float) -> dict:

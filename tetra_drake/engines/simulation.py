@@ -40,7 +40,8 @@ class Simulation:
         >>> inches = [simulation.result(place).metrics.distance_in for place in range(4)]
 
     Each driven cable has an action: the setpoint of its actuator, by the kind of `actuation`. It is
-    a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. It is
+    a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. The
+    order is the same as in `robot.driven`, oscillator by oscillator. An action is
     held for a control period. Like a sample of a command, it takes effect within one
     `cpg.listing_step`. There is no network and no start-up time. Steps with the samples of a
     command give the motion of simulate(command=...), if each sample differs from the one before.

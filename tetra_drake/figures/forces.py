@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,9 +18,12 @@ from tetra_drake.figures.style import (
     Drawn,
     Page,
     figure_function,
+    folded,
     legend_below,
+    most_lines,
     name_panel,
     page_of,
+    page_width,
     panels_in_columns,
     set_title,
     shown_part,
@@ -40,7 +42,7 @@ _TOP = 0.92  # height of the marks of landings, as a share of a panel's height
 _IMPACTS = 0.01  # share of the smallest and of the largest forces that the y axis may cut off
 _MARGIN = 0.25  # free space above and below the forces, as a share of their range
 _ROWS, _COLUMNS = 10, 4  # largest numbers of rows and columns of panels
-_LETTERS = 80  # largest number of letters in the names of a row of panels
+_NAME = 0.7  # largest width of a panel's name, as a share of the panel's
 _MIRRORED = 0.01  # two nodes share a panel if mean difference / mean force is at most this
 
 
@@ -93,7 +95,9 @@ def ground_forces(
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)
     _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)
-    page, panels = _panels_over_time(figure, list(feet.values()), groups=per_body.min())
+    page, panels = _panels_over_time(
+        figure, list(feet.values()), groups=per_body.min(), beside="stands 100 %"
+    )
     limits = _limits_between_impacts(forces)
     for foot, panel in zip(feet, panels, strict=True):
         node, stands = forces.sel(contact=foot), ~off_ground(end.sel(contact=foot))
@@ -153,18 +157,23 @@ def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
 
 
 def _panels_over_time(
-    figure: Page | None, names: Sequence[str], *, groups: int
+    figure: Page | None, names: Sequence[str], *, groups: int, beside: str = ""
 ) -> tuple[Page, list[Axes]]:
-    """The page and a panel per name. If there are few groups of panels, each group has a
-    column."""
+    """The page and a panel per name. If there are few groups of panels, each group has a column. A
+    text `beside` the names has its own line if it needs one."""
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
-    page = page_of(figure, height_in=1.0 + min(1.2 * rows, 9.0))
+    width = _NAME / columns * page_width(figure)
+    names = [folded(name.replace("_", " "), width) for name in names]
+    if most_lines(folded(f"{name} {beside}", width) for name in names) > most_lines(names):
+        names = [f"{name}\n" for name in names]
+    row = 1.05 + 0.15 * most_lines(names)
+    page = page_of(figure, height_in=1.0 + min(row * rows, 9.0))
     panels = panels_in_columns(
         page, len(names), columns, x_label="time (s)", sharex=True, sharey=True
     )
     for name, panel in zip(names, panels, strict=True):
-        name_panel(panel, textwrap.shorten(name.replace("_", " "), _LETTERS // columns))
+        name_panel(panel, name)
         panel.set_xmargin(0.0)
     return page, panels

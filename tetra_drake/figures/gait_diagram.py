@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,12 @@ from tetra_drake.figures.style import (
     Drawn,
     Page,
     figure_function,
+    folded,
+    most_lines,
     name_panel,
     own_words,
     page_of,
+    page_width,
     set_title,
     shown_part,
     write_beside,
@@ -34,7 +37,8 @@ _LAST_SHARE = 0.25  # share of the time that is shown if no signal oscillates
 _ROW = 0.165  # height of a row, in inches; a signal or a foot takes one
 _ROWS = (4, 20)  # least and greatest height of the panels of signals and of stance, in rows
 _SPEED_ROWS = 5  # height of the panel of speed, in rows
-_NAMED = 14  # largest number of feet, or of signals, for which each has its name
+_NAMED = 14  # largest number of feet, or of lines with names of signals, beside their rows
+_NAMES = 0.3  # largest width of the names, as a share of the page's width
 
 _BETWEEN_BODIES = 0.5  # gap between the feet of two bodies, in heights of a row
 _BAR = 0.78  # height of a stance bar, in heights of a row
@@ -65,15 +69,18 @@ def gait_diagram(
     cycle = measures.last_step(result.trajectory)
     trajectory = shown_part(result.trajectory, time or _last_cycles(result.trajectory, cycle))
     stands = _stance(trajectory, structure)
-    feet = _rows_of_feet(stands)
-    rows = [np.clip(max(feet.values(), default=0.0), *_ROWS), _SPEED_ROWS]
+    feet, width = _rows_of_feet(stands), _NAMES * page_width(figure)
+    names_of_feet = {folded(name, width): row for name, row in _named_rows(stands, feet).items()}
+    height = max(feet.values(), default=0.0) * _rows_of_names(names_of_feet)
+    rows = [np.clip(height, *_ROWS), _SPEED_ROWS]
     if structure.signals:
-        rows.insert(0, np.clip(structure.signals, *_ROWS))
+        names = [folded(name, width) for name in own_words(structure.oscillators)]
+        rows.insert(0, np.clip(structure.signals * _rows_of_names(names), *_ROWS))
     page = page_of(figure, height_in=_ROW * sum(rows) + 1.25)
     panels = page.subplots(len(rows), sharex=True, height_ratios=rows)
     if structure.signals:
-        _draw_signals(panels[0], trajectory, unit)
-    _draw_stance(panels[-2], stands, feet)
+        _draw_signals(panels[0], trajectory, names, unit)
+    _draw_stance(panels[-2], stands, feet, names_of_feet)
     _draw_speed(panels[-1], trajectory, structure, unit)
     _mark_cycles(panels, trajectory.time.values, cycle)
     of_cycle = "" if cycle is None else f", cycle of {fixed(cycle[1] - cycle[0])} s"
@@ -114,12 +121,36 @@ def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:
     return rows
 
 
+def _named_rows(stands: xarray.DataArray, rows: Mapping[str, float]) -> dict[str, float]:
+    """Names beside the rows of feet, with their heights: of the feet; of their bodies, if there are
+    many feet."""
+    if len(rows) <= _NAMED:
+        return {foot_name(foot): row for foot, row in rows.items()}
+    by_body: dict[str, list[float]] = {}
+    for foot, row in rows.items():
+        by_body.setdefault(str(stands.sel(contact=foot).contact_body.values), []).append(row)
+    return {body: float(np.mean(of)) for body, of in by_body.items()}
+
+
+def _rows_of_names(names: Iterable[str]) -> float:
+    """Height in rows that each of these names needs."""
+    return 1.3 * most_lines(names) - 0.3
+
+
+def _write_names(panel: Axes, names: Sequence[str], rows: Iterable[float]) -> None:
+    """Writes names beside rows; if they have too many lines, only every second, or fewer."""
+    every = 1 + (len(names) - 1) // max(1, _NAMED // most_lines(names))
+    panel.set_yticks(list(rows)[::every], names[::every])
+
+
 def foot_name(node: str) -> str:
     """Name of a contact node as a foot, such as "T1 left"."""
     return node.replace("bottom_", "").replace("_", " ")
 
 
-def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units) -> None:
+def _draw_signals(
+    panel: Axes, trajectory: xarray.Dataset, names: Sequence[str], unit: Units
+) -> None:
     """Draws signals one above the other. The last signal, of the front body, is on top."""
     signals, oscillators = trajectory.signal / unit.force, trajectory.oscillator.values
     largest = float(np.abs(signals.values).max())
@@ -127,34 +158,32 @@ def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units) -> None:
     for row, name in enumerate(oscillators):
         panel.axhline(row, color="0.8", linewidth=0.5)
         panel.plot(signals.time, row + scale * signals.sel(oscillator=name), **_LINE)
-    every = 1 + (len(oscillators) - 1) // _NAMED
-    panel.set_yticks(range(0, len(oscillators), every), own_words(oscillators)[::every])
+    _write_names(panel, names, range(len(names)))
     panel.set_ylim(-0.6, len(oscillators) - 0.4)
     panel.grid(visible=False, axis="y")
     name_panel(panel, f"actuation signals, up to {fixed(largest)} {unit.force_name}")
 
 
-def _draw_stance(panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float]) -> None:
-    """Draws stance bars. Each foot has its name and duty factor; with many feet, only bodies are
-    named."""
+def _draw_stance(
+    panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float], names: Mapping[str, float]
+) -> None:
+    """Draws stance bars beside `names`; see _named_rows(). If feet are named, they have their duty
+    factors, too."""
     each = len(rows) <= _NAMED
     times = stands.time.values
-    by_body: dict[str, list[float]] = {}
     for foot, row in rows.items():
         stance = stands.sel(contact=foot)
-        by_body.setdefault(str(stance.contact_body.values), []).append(row)
         spans = [(start, end - start) for start, end in measures.intervals(times, stance.values)]
         side = foot.rpartition("_")[2]
         colour = _STANCE.get(side, _OTHER_FOOT)
         panel.broken_barh(spans, (row - _BAR / 2, _BAR), facecolors=colour)
         if each:
             write_beside(panel, row, f"{fixed(100.0 * measures.share_of_time(stance), 0)} %")
+    _write_names(panel, list(names), names.values())
     if each:
-        panel.set_yticks(list(rows.values()), [foot_name(foot) for foot in rows])
         panel.set_title("duty factor", loc="right", fontsize=rcParams["ytick.labelsize"])
         name_panel(panel, "stance")
     else:
-        panel.set_yticks([float(np.mean(of)) for of in by_body.values()], list(by_body))
         has_sides = any(foot.endswith("_left") for foot in rows)
         name_panel(panel, "stance, left foot above right one" if has_sides else "stance")
     panel.tick_params(axis="y", length=0)

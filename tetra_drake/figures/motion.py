@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,10 +18,12 @@ from tetra_drake.figures.style import (
     Drawn,
     Page,
     figure_function,
+    folded,
     legend_below,
     line_style,
     name_panel,
     page_of,
+    page_width,
     panels_in_columns,
     set_title,
     shown_part,
@@ -68,16 +69,19 @@ def relative_distances(
     unit, trajectory = result.scenario.units, shown_part(result.trajectory, time)
     distances = measures.relative_distances(trajectory) / unit.length
     first, *names = distances.body.values
-    page = page_of(figure, height_in=np.clip(1.5 + 0.6 * len(names), 2.4, 6.5))
+    height = np.clip(1.5 + 0.6 * len(names), 2.4, 6.5)
+    page, width = page_of(figure, height_in=height), 0.3 * page_width(figure)
     panel = page.subplots()
     for i, name in enumerate(names):
         line = distances.sel(body=name)
         panel.axhline(float(line[0]), color="0.6", linewidth=0.7)
-        panel.plot(line.time, line, label=name, **line_style(i))
-    panel.set(xlabel="time (s)", ylabel=f"distance from {first} ({unit.length_name})")
+        panel.plot(line.time, line, label=folded(name, width), **line_style(i))
+    panel.set_xlabel("time (s)")
+    panel.set_ylabel(folded(f"distance from {first} ({unit.length_name})", 0.6 * height))
     if names:
         page.legend(loc="outside right upper", reverse=True, frameon=False)
-    set_title(page, f"Distance of each body from {first}")
+    title = f"Distance of each body from {first}"  # the legend is beside it
+    set_title(page, folded(title, 2.0 * width, size=rcParams["figure.titlesize"]))
     return page
 
 
@@ -94,16 +98,13 @@ def before_and_after(
     unit = best.scenario.units
     page = page_of(figure, height_in=3.8)
     panel = page.subplots()
-    points = 72.0 * page.bbox.width / page.figure.dpi
-    letters = int(1.6 * points / rcParams["legend.fontsize"]) - 8  # beside the line
     legend = {}
     for when, result, look in (("before", initial, _BEFORE), ("after", best, _AFTER)):
         part = shown_part(result.trajectory, time)
         walked = _distance_walked(result, unit).sel(time=part.time)
         panel.plot(walked.time, walked, **look)
         way = f"{fixed(float(walked[-1]), unit.decimals + 1)} {unit.length_name}"
-        text = f"{when}: {way}, {textwrap.shorten(result.name, 70)}"
-        legend[textwrap.fill(text, letters)] = look
+        legend[f"{when}: {way}, {result.name}"] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
     legend_below(page, legend)
     set_title(page, "Distance walked, before and after evolution")
@@ -346,17 +347,15 @@ def _fit(
     `wide` and `high` are the ranges that a picture shows. The pictures fill the caller's figure, or
     a page of the height `height_in`.
     """
-    page_width, page_height = rcParams["figure.figsize"][0], height_in
-    if figure is not None:
-        page_width = figure.bbox.width / figure.dpi
-        page_height = figure.bbox.height / figure.dpi
+    whole = page_width(figure)
+    page_height = height_in if figure is None else figure.bbox.height / figure.dpi
     ratio = (high[1] - high[0]) / (wide[1] - wide[0])
 
     def width(columns: int) -> float:
-        return min(page_width / columns, page_height / math.ceil(count / columns) / ratio)
+        return min(whole / columns, page_height / math.ceil(count / columns) / ratio)
 
     columns = max(range(1, count + 1), key=width)
-    row = (page_width / columns - _GAP) * ratio + _PANEL_NAME
+    row = (whole / columns - _GAP) * ratio + _PANEL_NAME
     return columns, row * math.ceil(count / columns)
 
 

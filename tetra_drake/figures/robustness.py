@@ -23,8 +23,11 @@ from tetra_drake.figures.style import (
     Drawn,
     Page,
     figure_function,
+    folded,
+    most_lines,
     name_panel,
     page_of,
+    page_width,
     save_findings,
     set_title,
     write_beside,
@@ -55,6 +58,7 @@ _BOX: Any = {
 _GREATEST: Any = {"color": "black", "linewidth": 1.0}
 
 _ROW = 0.22  # height of a row, in inches
+_NAMES = 0.3  # largest width of the names, as a share of the page's width
 
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
@@ -85,7 +89,10 @@ def robustness(judgement: Judgement, *, figure: Page | None = None) -> Drawn:
     unit = judgement.scenario.units
     gaits = by_gait(judgement).sort_values("kept", kind="stable")
     changes, count = by_change(judgement).iloc[::-1], judgement.draws["draw"].nunique()
-    rows = [max(len(gaits) + 1, 4), max(len(changes) + 1, 4)]
+    width = _NAMES * page_width(figure)
+    names = [folded(str(name), width) for name in gaits.index]
+    what = [folded(str(name), width) for name in changes.index]
+    rows = [max(most_lines(texts) * len(texts) + 1, 4) for texts in (names, what)]
     page = page_of(figure, height_in=_ROW * sum(rows) + 1.8)
     panels = page.subplot_mosaic(
         [["distances", "distances"], ["alone", "together"]], height_ratios=rows
@@ -93,6 +100,9 @@ def robustness(judgement: Judgement, *, figure: Page | None = None) -> Drawn:
     _draw_distances(panels["distances"], judgement, gaits)
     _draw_alone(panels["alone"], changes, unit)
     _draw_correlations(panels["together"], changes, chance(count))
+    panels["distances"].set_yticks(range(len(names)), names)
+    for name in ("alone", "together"):
+        panels[name].set_yticks(range(len(what)), what)
     panels["together"].tick_params(labelleft=False)
     set_title(page, f"Robustness under {count} draws of disturbances")
     return page
@@ -114,8 +124,6 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
     margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
     axes.set(
         xlabel="distance / undisturbed distance",
-        yticks=range(len(gaits)),
-        yticklabels=gaits.index,
         ylim=(-margin, len(gaits) - 1 + margin),
         xmargin=0.02,
     )
@@ -130,7 +138,7 @@ def _draw_alone(axes: Axes, changes: pandas.DataFrame, unit: Units) -> None:
     axes.barh(rows, changes["median"] / unit.length, height=0.6, color=OKABE_ITO["orange"])
     axes.set_xlabel(f"change of distance ({unit.length_name})")
     name_panel(axes, "one change alone")
-    _finish(axes, list(changes.index))
+    _finish(axes, len(changes))
 
 
 def _draw_correlations(axes: Axes, changes: pandas.DataFrame, noise: float) -> None:
@@ -139,11 +147,10 @@ def _draw_correlations(axes: Axes, changes: pandas.DataFrame, noise: float) -> N
     axes.barh(range(len(changes)), sizes, height=0.6, color=sky_blue)
     axes.set_xlabel("size of rank correlation")
     name_panel(axes, "all changes together")
-    _finish(axes, list(changes.index))
+    _finish(axes, len(changes))
 
 
-def _finish(axes: Axes, labels: list[str]) -> None:
-    axes.set_yticks(range(len(labels)), labels)
-    axes.set(xmargin=0.05, ylim=(-0.7, len(labels) - 0.3))
+def _finish(axes: Axes, rows: int) -> None:
+    axes.set(xmargin=0.05, ylim=(-0.7, rows - 0.3))
     axes.set_xlim(left=0.0)
     axes.grid(visible=False, axis="y")

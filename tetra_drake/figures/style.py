@@ -13,7 +13,8 @@ import inspect
 import io
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -73,6 +74,10 @@ USUAL = Look()
 FILE_KINDS = ("svg", "png")
 """Kinds of the files of a figure, by default."""
 
+
+_LETTERS_PER_SIZE = 1.6  # letters of mean width in the width of one size
+_FEWEST_LETTERS = 12  # texts are not folded into shorter lines
+_HANDLE = 5.0  # width of a line in a legend, with its margins, in sizes of letters
 
 SHADE = "0.9"
 """Grey behind marked intervals of time."""
@@ -177,6 +182,23 @@ def make_figure(
     return figure, figure.subplots(rows, columns, squeeze=False, **layout)
 
 
+def page_width(figure: Page | None) -> float:
+    """Width (in) of the page on which page_of() draws."""
+    return rcParams["figure.figsize"][0] if figure is None else figure.bbox.width / figure.dpi
+
+
+def folded(text: str, width_in: float, *, size: float | None = None) -> str:
+    """A text in lines of at most `width_in` inches, in letters of a size (points), by default the
+    legend's."""
+    letters = int(_LETTERS_PER_SIZE * 72.0 * width_in / (size or rcParams["legend.fontsize"]))
+    return textwrap.fill(text, max(letters, _FEWEST_LETTERS))
+
+
+def most_lines(texts: Iterable[str]) -> int:
+    """Number of lines of the text with the most lines; at least 1."""
+    return max((text.count("\n") + 1 for text in texts), default=1)
+
+
 def own_words(names: Sequence[str]) -> list[str]:
     """Names without the words that occur in all of them, such as "T1-T2 left" for "T1-T2 outer
     bottom_left". The first word of the first name is always kept."""
@@ -220,7 +242,9 @@ def write_beside(panel: Axes, height: float, text: str) -> None:
 def legend_below(page: Page, lines: Mapping[str, Any], *others: Any) -> None:
     """Adds a legend below all panels: line styles by label, and other artists. It has as many
     columns as fit on the page."""
-    handles = [*(Line2D([], [], label=text, **style) for text, style in lines.items()), *others]
+    width = page_width(page) - _HANDLE * rcParams["legend.fontsize"] / 72.0
+    texts = {folded(text, width): style for text, style in lines.items()}
+    handles = [*(Line2D([], [], label=text, **style) for text, style in texts.items()), *others]
     below: Any = {"handles": handles, "loc": "outside lower center", "frameon": False}
     columns, legend = len(handles), page.legend(ncols=len(handles), **below)
     while columns > 1 and legend.get_window_extent().width > page.bbox.width:

@@ -13,8 +13,6 @@ from tetra_drake.scenario.units import Units
 if TYPE_CHECKING:
     import pandas
 
-_LONGEST_NAME = 12  # letters; a longer name of a gait is cut
-
 
 def robustness_text(judgement: Judgement) -> str:
     """Tables of a judgement: distances of gaits on disturbed robots, and the most harmful
@@ -42,10 +40,7 @@ def _gaits_table(gaits: pandas.DataFrame, units: Units, *, with_missed: bool) ->
     counts = ["failed", "missed"] if with_missed else ["failed"]
     rows = []
     for gait, row in gaits.iterrows():
-        name = str(gait)
-        if len(name) >= _LONGEST_NAME:
-            name = f"{name[: _LONGEST_NAME - 1]}…"
-        cells = [name, *(rounded(row[length] / units.length) for length in shown)]
+        cells = [str(gait), *(rounded(row[length] / units.length) for length in shown)]
         lengths = row / units.length
         cells.append(ranged(lengths["mean"], lengths["mean_low"], lengths["mean_high"]))
         cells.append(percents(row["kept"], row["kept_low"], row["kept_high"]))

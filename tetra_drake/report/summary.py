@@ -110,7 +110,7 @@ def results(run: Run) -> list[tuple[str, str]]:
     evaluations = sum(status.evaluations for status in statuses)
     failures = sum(status.failures for status in statuses)
     wall_time = sum(status.wall_time for status in statuses)
-    count = f"{evaluations}, of which {failures} failed" if failures else f"{evaluations}"
+    count = f"{evaluations} ({failures} failed)" if failures else f"{evaluations}"
     effort = [("evaluations", count)]
     if evaluations:
         effort.append(("time per evaluation", _time(wall_time / evaluations)))

@@ -60,9 +60,7 @@ class Gait:
     def __str__(self) -> str:
         """Summary in a few lines. The weights are shown as a matrix if it fits."""
         lines = [f"{self.name}: tau_A {self.tau_a:.4g} s, tau_B {self.tau_b:.4g} s"]
-        if self.turn:
-            lines.append(f"turn {self.turn:.4g}")
-        lines += [f"gain of {name} {gain:.4g}" for name, gain in self.gains if gain]
+        lines += [f"{name} {number}" for name, number in self._further]
         texts = dict(zip(self.weight_names, [f"{x:.2f}" for x in self.weights], strict=False))
         count = max((int(name.split("->")[0]) for name in texts), default=0)
         if not 0 < count <= _MOST_COLUMNS:
@@ -82,11 +80,16 @@ class Gait:
 
     def _repr_html_(self) -> str:
         rows = [["τ_A", f"{self.tau_a:.4g} s"], ["τ_B", f"{self.tau_b:.4g} s"]]
-        rows += [["turn", f"{self.turn:.4g}"]] if self.turn else []
-        rows += [[f"gain of {name}", f"{gain:.4g}"] for name, gain in self.gains if gain]
+        rows += self._further
         least, most = min(self.weights, default=0.0), max(self.weights, default=0.0)
         rows.append([f"{len(self.weights)} weights", f"{least:.2f} to {most:.2f}"])
         return heading_html(self.name) + Table(["parameter", "value"], rows, (0, 1)).html()
+
+    @property
+    def _further(self) -> list[list[str]]:
+        """Names and values of the turn and the gains that are not 0."""
+        numbers = {"turn": self.turn, **{f"gain of {name}": gain for name, gain in self.gains}}
+        return [[name, f"{number:.4g}"] for name, number in numbers.items() if number]
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """Content of a gait file. The gait must fit `scenario`, which gives the names of the

@@ -74,8 +74,10 @@ class Robot:
 
     @property
     def driven(self) -> np.ndarray:
-        """Indices of the driven cables."""
-        return np.flatnonzero(self.structure.cables["signal"] != cable.PASSIVE)
+        """Indices of the driven cables, oscillator by oscillator in the order of the scenario.
+        Commands, actions and loads have this order."""
+        groups = self.structure.groups
+        return np.array([number for group in groups for number in group], dtype=np.int64)
 
     @property
     def ground(self) -> Ground:
@@ -154,7 +156,7 @@ class Robot:
         cpg, driven = self.scenario.cpg, self.structure.cables[self.driven]
         signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
         moved = cable.elastic_stretch(signal, cable.CableLaw.of(driven))
-        share = np.max(moved / self._starting_lengths())
+        share = np.max(moved / self._starting_lengths(driven))
         if share < LEAST_MOTION:
             problem = f"move no cable by more than {share:.2g} of its length"
         else:
@@ -163,25 +165,25 @@ class Robot:
         return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
 
     def starting_drives(self) -> np.ndarray:
-        """States of the actuators at t = 0 (drives,); see physics.actuator."""
-        drives: np.ndarray = self.scenario.actuation.drives(self.starting_cables())
+        """States of the actuators at t = 0 (drives,), in the order of the cables; see
+        physics.actuator."""
+        cables = self.structure.cables[np.sort(self.driven)]
+        drives: np.ndarray = self.scenario.actuation.drives(self._at_start(cables))
         return drives
 
     def starting_cables(self) -> DrivenCables:
         """Properties of the driven cables at t = 0."""
-        driven, length = self.structure.cables[self.driven], self._starting_lengths()
-        rate: Any = np.zeros(len(driven))
-        law, signal = cable.CableLaw.of(driven), rate
-        if len(self.commanded):
-            signal = self.commanded[0, driven["signal"]]
-        tension = np.maximum(cable.cable_tension(length, rate, signal, law), 0.0)
-        return DrivenCables(law, signal, length, rate, tension, law.free_length)
+        return self._at_start(self.structure.cables[self.driven])
 
-    def _starting_lengths(self) -> Any:
-        """Lengths of the driven cables (driven cables,) in m at t = 0."""
-        driven = self.structure.cables[self.driven]
+    def _at_start(self, driven: np.ndarray) -> DrivenCables:
+        commanded = self.commanded[0] if len(self.commanded) else np.zeros(self.structure.signals)
+        law, signal = cable.CableLaw.of(driven), commanded[driven["signal"]]
+        return DrivenCables.at_rest(law, self._starting_lengths(driven), signal)
+
+    def _starting_lengths(self, cables: np.ndarray) -> Any:
+        """Lengths of cables, records of physics.cable.CABLE, in m at t = 0."""
         p_WN = node_positions(self.structure, self.structure.initial_state)
-        return np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
+        return np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
 
     def starting_modes(self) -> np.ndarray:
         """Modes of the contact nodes at t = 0 (see physics.contact). A node that touches the ground

@@ -5,7 +5,7 @@ The kernels need numba, so functions import them.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -31,6 +31,15 @@ class DrivenCables(NamedTuple):
     tension: Any
     free_length: Any
     """Free length; winches change it."""
+
+    @classmethod
+    def at_rest(cls, law: CableLaw, length: Any, signal: Any) -> Self:
+        """Cables of these lengths (m) at rest, with signals (N), at their original free lengths."""
+        from tetra_drake.physics.cable import cable_tension
+
+        rate: Any = np.zeros(len(length))
+        tension = np.maximum(cable_tension(length, rate, signal, law), 0.0)
+        return cls(law, signal, length, rate, tension, law.free_length)
 
 
 class ActuatorKind(Section):

@@ -166,12 +166,12 @@ class Blueprint:
         return distances.reshape(count, count)
 
     def with_oscillator_per_cable(self, *, without_law: bool) -> Self:
-        """The robot with one oscillator for each driven cable.
+        """The robot with one oscillator for each driven cable, group by group.
 
         With `without_law`, the constants of driven cables are 0, so the force of a cable is its
         signal.
         """
-        driven = sorted(cable for group in self.groups for cable in group)
+        driven = [cable for group in self.groups for cable in group]
         laws = [
             dict.fromkeys(law, 0.0) if without_law and cable in driven else law
             for cable, law in enumerate(self.cable_laws)

@@ -284,12 +284,14 @@ class StructureFile(Section):
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
-        """Names of the bodies: the group of struts with the same nodes, or the nodes of the
-        body."""
-        groups: dict[frozenset[str], str] = {}
+        """Names of the bodies: the group of struts with the same nodes, the part of a structure of
+        NTRT with the same nodes, such as "vertebra1", or the nodes of the body."""
+        names: dict[frozenset[str], str] = {}
+        for part in {node.rpartition("/")[0] for node in self.nodes} - {""}:
+            names[frozenset(node for node in self.nodes if node.startswith(f"{part}/"))] = part
         for name, group in self.struts.items():
-            groups[frozenset(node for pair in group.pairs for node in pair)] = name
-        return tuple(groups.get(frozenset(body), " ".join(body)) for body in self.bodies)
+            names[frozenset(node for pair in group.pairs for node in pair)] = name
+        return tuple(names.get(frozenset(body), " ".join(body)) for body in self.bodies)
 
     @cached_property
     def body_of_node(self) -> dict[str, int]:

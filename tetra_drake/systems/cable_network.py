@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pydrake.geometry import SceneGraph
@@ -172,7 +171,9 @@ def AddCables(
     network = builder.AddNamedSystem(name, CableNetwork(model, signals=len(actuated)))
     Attach(builder, plant, network)
     if drives is None:
-        drives = actuation.drives(_cables_at_rest(table, _default_lengths(plant, cables)))
+        driven = np.flatnonzero(table["signal"] != cable.PASSIVE)
+        law, lengths = cable.CableLaw.of(table[driven]), _default_lengths(plant, cables)[driven]
+        drives = actuation.drives(DrivenCables.at_rest(law, lengths, np.zeros(driven.size)))
     if len(drives):
         actuators = builder.AddNamedSystem(f"{name}_actuators", Actuators(drives))
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.GetInputPort("rates"))
@@ -210,12 +211,3 @@ def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> np.ndarr
     return np.array(
         [np.linalg.norm(one.frame_b.CalcPose(context, one.frame_a).translation()) for one in cables]
     )
-
-
-def _cables_at_rest(table: np.ndarray, lengths: np.ndarray) -> DrivenCables:
-    """Properties of the driven cables at rest without signals."""
-    is_driven = table["signal"] != cable.PASSIVE
-    law, length = cable.CableLaw.of(table[is_driven]), lengths[is_driven]
-    none: Any = np.zeros(len(length))
-    tension = np.maximum(cable.cable_tension(length, none, none, law), 0.0)
-    return DrivenCables(law, none, length, none, tension, law.free_length)

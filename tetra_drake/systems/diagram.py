@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.geometry import Meshcat, MeshcatVisualizer
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
@@ -81,8 +81,13 @@ def MakeTensegrityDiagram(
     scenario, structure = robot.scenario, robot.structure
     builder = DiagramBuilder()
 
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    scene_graph = _AddSceneGraph(builder, plant, meshcat) if meshcat else None
+    plant, scene_graph = MultibodyPlant(time_step=0.0), None
+    plant.set_name("plant")
+    if meshcat is None:
+        builder.AddSystem(plant)
+    else:
+        _, scene_graph = AddMultibodyPlantSceneGraph(builder, plant)
+        MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     nodes = AddNodes(plant, structure, AddBodies(plant, structure))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
@@ -158,16 +163,6 @@ def _cables(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
             structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True
         )
     ]
-
-
-def _AddSceneGraph(builder: DiagramBuilder, plant: MultibodyPlant, meshcat: Meshcat) -> SceneGraph:
-    """Adds a SceneGraph of a plant, and its view in Meshcat."""
-    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
-    source = plant.RegisterAsSourceForSceneGraph(scene_graph)
-    pose_port = scene_graph.get_source_pose_port(source)
-    builder.Connect(plant.get_geometry_pose_output_port(), pose_port)
-    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
-    return scene_graph
 
 
 def _ConnectController(
