@@ -148,7 +148,9 @@ EXPERIMENTS = {
     "prism": Experiment("a prism of three struts", "prism", _STRUCTURE, film=True),
     "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE, film=True),
     "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE, film=True),
-    "pair": Experiment("two nested tetrahedra", "pair", _STRUCTURE),
+    "pair": Experiment(
+        "two nested tetrahedra, ten trials", "pair", _STRUCTURE | {"evolution.trials": 10}
+    ),
     "winch": Experiment("stiff cables on winches", "winch", _by(CmaEs(), 3, 1500), exported=True),
     "motors": Experiment(
         "the thesis's robot carries motors",

@@ -32,9 +32,9 @@ from tetra_drake.scenario.scenario import Scenario
 Array = np.ndarray
 
 INTEGRATOR = "Euler"
-"""Name of MuJoCo's integrator. The implicit ones know how a damper's force on a body depends on this
-body's velocity, but not on the other body's. So every damped cable would brake the robot as if its
-other end were fixed: with steps of 0.125 ms, the mast would fall with 0.76 g."""
+"""Name of MuJoCo's integrator. The implicit ones know how a damper's force on a body depends on the
+velocity of this body, but not of the other body. So every damped cable would brake the robot as if
+its other end were fixed: with steps of 0.125 ms, the mast would fall with 0.76 g."""
 _IMPRATIO = 1000.0
 """MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo a
 slipping node gets a part, 1 / impratio, of the force that would hold it as normal force. With the
