@@ -61,7 +61,7 @@ def why_outdated(name: str, experiment: Experiment, directory: Path) -> str:
 
 @dataclass
 class Reminded:
-    """Optimiser that is told recorded fitnesses in place of those of its evaluations."""
+    """Optimiser that is told the recorded fitnesses, not the fitnesses of its evaluations."""
 
     optimizer: Optimizer
     fitnesses: Sequence[float]
