@@ -21,6 +21,7 @@ from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.units import INCH, SYSTEMS, shown_in
 
 if TYPE_CHECKING:
+    from tetra_drake.figures.style import Print
     from tetra_drake.robot.gait import Gait
     from tetra_drake.scenario.scenario import Scenario
 
@@ -387,8 +388,7 @@ def _figures(
     """
     from tetra_drake.report.run_page import write_figures
 
-    drawn = _drawn(width, font, title=title, pdf=pdf)
-    written = write_figures(source, out, **drawn)
+    written = write_figures(source, out, _print(width, font, title=title, pdf=pdf))
     print(f"wrote {', '.join(str(path) for path in written)}")
 
 
@@ -480,8 +480,8 @@ def _compare(
         if out:
             from tetra_drake.figures.comparison import save_comparison
 
-            drawn = _drawn(width, font, title=title, pdf=pdf)
-            written = save_comparison(compared, out / name, **drawn)
+            printed = _print(width, font, title=title, pdf=pdf)
+            written = save_comparison(compared, out / name, printed)
             print(f"wrote {', '.join(written)} to {out / name}/")
     if scenarios:
         means = improvement_over(compared.trials for compared in by_scenario.values())
@@ -603,12 +603,12 @@ def _structure(
     print(text)
 
 
-def _drawn(width: float, font: float, *, title: bool, pdf: bool) -> dict[str, Any]:
-    """Look and kinds of files of figures with a width (m) and letters of a size (points)."""
-    from tetra_drake.figures.style import FILE_KINDS, Look
+def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
+    """Print of figures with a width (m) and letters of a size (points)."""
+    from tetra_drake.figures.style import FILE_KINDS, Look, Print
 
     look = Look(width_in=width / INCH, font_size=font, title=title)
-    return {"look": look, "kinds": [*FILE_KINDS, "pdf"] if pdf else FILE_KINDS}
+    return Print(look, kinds=[*FILE_KINDS, "pdf"] if pdf else FILE_KINDS)
 
 
 def _engine_change(engine: str | None) -> dict[str, Any]:

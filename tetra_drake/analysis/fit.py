@@ -115,12 +115,14 @@ class Fit:
             f"{self.start_misfit:.3g} at the start, {self.misfit:.3g} fitted",
             self.table.text(),
         ]
-        lines += [
-            f"clock of {name}: {1e3 * offset:+.2f} ms"
-            for name, offset in self.clock_offsets.items()
-            if offset
-        ]
-        return "\n".join([*lines, *(f"note: {warning}" for warning in self.warnings)])
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+    @property
+    def notes(self) -> list[str]:
+        """Warnings, and the offsets of clocks."""
+        offsets = {name: 1e3 * offset for name, offset in self.clock_offsets.items() if offset}
+        clocks = [f"the clock of {name} is ahead by {ms:.2f} ms" for name, ms in offsets.items()]
+        return [*self.warnings, *clocks]
 
     @property
     def table(self) -> Table:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +12,10 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.analysis.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
-    FILE_KINDS,
-    USUAL,
+    AS_USUAL,
     Drawn,
-    Look,
     Page,
+    Print,
     figure_function,
     legend_below,
     line_style,
@@ -29,19 +27,14 @@ from tetra_drake.figures.style import (
 _FIRST = 10  # simulations; the axes of costs begin here
 
 
-def save_comparison(
-    compared: Compared,
-    folder: Path,
-    *,
-    look: Look = USUAL,
-    kinds: Sequence[str] = FILE_KINDS,
-) -> list[str]:
+def save_comparison(compared: Compared, folder: Path, printed: Print = AS_USUAL) -> list[str]:
     """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to a folder.
 
     Returns the names of the files. Raises InputError if a file cannot be written.
     """
     tables = {"trials": compared.trials, "curves": compared.curves}
-    figure, summary = comparison(compared, **vars(look)), comparison_numbers(compared)
+    figure, summary = comparison(compared, **vars(printed.look)), comparison_numbers(compared)
+    kinds = printed.kinds
     return save_findings(figure, folder, "comparison", tables=tables, summary=summary, kinds=kinds)
 
 

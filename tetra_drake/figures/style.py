@@ -75,6 +75,17 @@ FILE_KINDS = ("svg", "png")
 """Kinds of the files of a figure, by default."""
 
 
+@dataclass(frozen=True)
+class Print:
+    """Print of figures: their look, and the kinds of their files; see save_figure()."""
+
+    look: Look = USUAL
+    kinds: Sequence[str] = FILE_KINDS
+
+
+AS_USUAL = Print()
+
+
 _LETTERS_PER_SIZE = 1.6  # letters of mean width in the width of one size
 _FEWEST_LETTERS = 12  # texts are not folded into shorter lines
 _HANDLE = 5.0  # width of a line in a legend, with its margins, in sizes of letters

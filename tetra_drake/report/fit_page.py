@@ -38,12 +38,7 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
 
 
 def _page(fit: Fit) -> str:
-    notes = [f"- {warning}" for warning in fit.warnings]
-    notes += [
-        f"- the clock of {name} is ahead by {1e3 * offset:.2f} ms"
-        for name, offset in fit.clock_offsets.items()
-        if offset
-    ]
+    notes = "\n".join(f"- {note}" for note in fit.notes)
     keys = [str(key) for key in fit.correlations]
     cells = fit.correlations.to_numpy().tolist()
     correlations = Table(
@@ -60,7 +55,7 @@ def _page(fit: Fit) -> str:
             "from the derivatives at the fitted values. Where the misfit exceeds 1, they are wider "
             "by its root.",
             fit.table.markdown(),
-            *(["\n".join(notes)] if notes else []),
+            *([notes] if notes else []),
             "![residuals](residuals.figure.svg)",
             correlations.markdown(),
             f"[{SCENARIO}]({SCENARIO}) has the fitted values.\n",

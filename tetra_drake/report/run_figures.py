@@ -19,7 +19,7 @@ from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.gait_map import map_of_gaits
-from tetra_drake.figures.style import FILE_KINDS, USUAL, Look, save_figure
+from tetra_drake.figures.style import AS_USUAL, Print, save_figure
 from tetra_drake.results.result import SimulationResult
 
 
@@ -83,11 +83,7 @@ def simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
 
 
 def draw_trajectory(
-    result: SimulationResult,
-    folder: Path,
-    *,
-    look: Look = USUAL,
-    kinds: Sequence[str] = FILE_KINDS,
+    result: SimulationResult, folder: Path, printed: Print = AS_USUAL
 ) -> dict[str, str]:
     """Writes the figures of one simulation. Returns captions by name of figure.
 
@@ -104,16 +100,10 @@ def draw_trajectory(
         pictures.append((forces.signals_and_tensions, result))
     if len(result.robot.structure.contacts):
         pictures.append((forces.ground_forces, result))
-    return _save(folder, *pictures, look=look, kinds=kinds)
+    return _save(folder, pictures, printed)
 
 
-def draw_run(
-    shown: ShownGaits,
-    folder: Path,
-    *,
-    look: Look = USUAL,
-    kinds: Sequence[str] = FILE_KINDS,
-) -> dict[str, str]:
+def draw_run(shown: ShownGaits, folder: Path, printed: Print = AS_USUAL) -> dict[str, str]:
     """Writes the figures of a run and of its best gait. Returns captions by name of figure."""
     run = shown.run
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
@@ -125,16 +115,15 @@ def draw_run(
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     pictures.append((motion.before_and_after, shown.initial.result, shown.best.result))
-    captions = _save(folder, *pictures, look=look, kinds=kinds)
-    return captions | draw_trajectory(shown.best.result, folder, look=look, kinds=kinds)
+    captions = _save(folder, pictures, printed)
+    return captions | draw_trajectory(shown.best.result, folder, printed)
 
 
-def _save(
-    folder: Path, *pictures: tuple[Any, ...], look: Look, kinds: Sequence[str]
-) -> dict[str, str]:
+def _save(folder: Path, pictures: Sequence[tuple[Any, ...]], printed: Print) -> dict[str, str]:
     """Draws and saves figures. A picture is a figure function and its arguments."""
     captions = {}
     for draw, *data in pictures:
-        save_figure(draw(*data, **vars(look)), folder, draw.__name__, kinds=kinds)
+        figure = draw(*data, **vars(printed.look))
+        save_figure(figure, folder, draw.__name__, kinds=printed.kinds)
         captions[draw.__name__] = " ".join((inspect.getdoc(draw) or "").split())
     return captions

@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import gait_label, load_run
-from tetra_drake.figures.style import FILE_KINDS, USUAL, Look
+from tetra_drake.figures.style import AS_USUAL, Print
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, listed, render, rounded
 from tetra_drake.machine import versions
@@ -52,21 +52,14 @@ _LONGEST_SETTING = 60  # letters; longer settings are not shown
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 
-def write_figures(
-    source: Path,
-    out: Path | None = None,
-    *,
-    look: Look = USUAL,
-    kinds: Sequence[str] = FILE_KINDS,
-) -> list[Path]:
+def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USUAL) -> list[Path]:
     """Writes the figures of a run or of a result folder. Returns the paths that were written.
 
     Args:
         source: folder of a run, or result folder.
         out: folder for the figures. By default figures/ in the source; then the report and the
             replay of a run are written again, too.
-        look: width, letters and titles of the figures.
-        kinds: kinds of files, see save_figure().
+        printed: width, letters and titles of the figures, and kinds of files.
 
     Raises:
         InputError: if `source` is neither, or `out` cannot be written to.
@@ -75,20 +68,18 @@ def write_figures(
     if os.path.exists(source / MANIFEST):
         check_folder(folder)
         if out is None:
-            return write_report(source, look=look, kinds=kinds)
-        draw_run(simulate_shown_gaits(load_run(source)), folder, look=look, kinds=kinds)
+            return write_report(source, printed)
+        draw_run(simulate_shown_gaits(load_run(source)), folder, printed)
     elif os.path.exists(source / RESULT):
         check_folder(folder)
-        draw_trajectory(load_result(source), folder, look=look, kinds=kinds)
+        draw_trajectory(load_result(source), folder, printed)
     else:
         problem = f"holds neither {MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
     return [folder]
 
 
-def write_report(
-    directory: Path, *, look: Look = USUAL, kinds: Sequence[str] = FILE_KINDS
-) -> list[Path]:
+def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
     """Writes figures/, replay.html and report.html into the folder of a run. Returns their paths.
 
     A run with a map also gets elites/. The run may be unfinished. Raises InputError if there is no
@@ -96,7 +87,7 @@ def write_report(
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     shown = simulate_shown_gaits(load_run(directory))
-    captions = draw_run(shown, figures, look=look, kinds=kinds)
+    captions = draw_run(shown, figures, printed)
     _write_map(shown, directory)
     shown.best.result.save_replay(replay)
     write_whole(report, render_report(shown, captions, folder=figures))

@@ -79,18 +79,13 @@ SYSTEMS = {
 _chosen: ContextVar[Units | None] = ContextVar("units", default=None)
 
 
-def units_named(name: str) -> Units:
-    """The units of a name in SYSTEMS. Raises InputError for another name."""
-    if name not in SYSTEMS:
-        raise InputError("units", "", f"found '{name}', expected one of {listed(list(SYSTEMS))}")
-    return SYSTEMS[name]
-
-
 @contextlib.contextmanager
 def shown_in(name: str | None) -> Iterator[None]:
     """Context manager: all numbers are shown in the units of a name in SYSTEMS. Without a name,
     each scenario keeps its own. Raises InputError for another name."""
-    token = _chosen.set(units_named(name) if name else _chosen.get())
+    if name and name not in SYSTEMS:
+        raise InputError("units", "", f"found '{name}', expected one of {listed(list(SYSTEMS))}")
+    token = _chosen.set(SYSTEMS[name] if name else _chosen.get())
     try:
         yield
     finally:
