@@ -35,7 +35,7 @@ from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS
-from tetra_drake.scenario.units import INCH, Units, units_named
+from tetra_drake.scenario.units import INCH, SYSTEMS, Units
 
 HERE = Path(__file__).parent
 FRONT = HERE.parent
@@ -138,7 +138,7 @@ def best_of_all(runs: Runs) -> dict[str, Best]:
     ways = {engine: policy["engines"][engine]["way_m"] for engine in ENGINES}
     kept = policy["rolls"] / policy["draws"]
     title = "a rover of six struts rolls by a feedback policy, in 20 s"
-    bests = {ROLLING: Best(title, f"{LAPSE}.svg", ways, kept, units_named("SI"))}
+    bests = {ROLLING: Best(title, f"{LAPSE}.svg", ways, kept, SYSTEMS["SI"])}
     for name, run in runs.items():
         trial = run.best_trial
         inches = run.undisturbed(trial), run.again(trial, TIGHT), run.again(trial, MUJOCO)
