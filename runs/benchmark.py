@@ -51,7 +51,7 @@ ROLLOUT_PERIODS = 50  # control periods that MuJoCo simulates
 ROUNDS = 3  # measurements; their medians count
 
 ENGINES = {
-    "engines": ["!Drake {}", "!Compiled {}", "!Mujoco {}", "!Mujoco {step: 1 ms}"],
+    "engines": ["!Drake {}", "!Compiled {}", "!Mujoco {}", "!Mujoco {step: 0.2 ms}"],
     "integrators": [
         "!Drake {}",
         "!Drake {look_ahead: 0 s}",
@@ -64,11 +64,11 @@ ENGINES = {
 """Engines of a table, written as in a scenario."""
 
 CONVERGED = "!Compiled {tolerance: 0.001 mm/s, max_step: 0.5 ms}"
-CONVERGED_MUJOCO = "!Mujoco {step: 0.0625 ms}"
+CONVERGED_MUJOCO = "!Mujoco {step: 0.0125 ms}"
 
 
 def with_engine(scenario: Scenario, engine: str) -> Scenario:
-    """The scenario with an engine written as in a file, such as "!Mujoco {step: 1 ms}"."""
+    """The scenario with an engine written as in a file, such as "!Mujoco {step: 0.2 ms}"."""
     tag, _, settings = engine.partition(" ")
     values = {f"engine.{key}": value for key, value in yaml.safe_load(settings).items()}
     return scenario.with_changes({"engine": tag} | values)
@@ -222,7 +222,7 @@ def rollout_row(scenario: Scenario) -> list[str]:
     import mujoco
     from mujoco.rollout import Rollout
 
-    robot = controlled_robot(with_engine(scenario, "!Mujoco {step: 1 ms}"))
+    robot = controlled_robot(with_engine(scenario, "!Mujoco {step: 0.2 ms}"))
     model = mujoco.MjModel.from_xml_string(make_mjcf(robot))
     data = [mujoco.MjData(model) for _ in range(available_cores())]
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS

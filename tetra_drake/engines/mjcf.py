@@ -31,10 +31,6 @@ from tetra_drake.scenario.scenario import Scenario
 
 Array = np.ndarray
 
-INTEGRATOR = "Euler"
-"""Name of MuJoCo's integrator. The implicit ones know how a damper's force on a body depends on the
-velocity of this body, but not of the other body. So every damped cable would brake the robot as if
-its other end were fixed: with steps of 0.125 ms, the mast would fall with 0.76 g."""
 _IMPRATIO = 1000.0
 """MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo a
 slipping node gets a part, 1 / impratio, of the force that would hold it as normal force. With the
@@ -66,7 +62,7 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     scenario = robot.scenario
     check_mjcf(scenario)
     model = Element("mujoco", model=scenario.name)
-    steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
+    steps = {"integrator": integrator_of(robot), "timestep": scenario.settings_of(Mujoco).step}
     add_element(model, "compiler", inertiafromgeom="false")
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     add_element(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
@@ -82,6 +78,17 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     _add_cables(model, robot)
     _add_pushes(model, world, robot.structure)
     return xml_text(model)
+
+
+def integrator_of(robot: Robot) -> str:
+    """Name of MuJoCo's integrator for a robot: implicit, unless its tendons are damped.
+
+    The implicit integrators know how a damper's force on a body depends on this body's velocity,
+    but not on the other body's. Damped tendons would brake the robot as if their other ends were
+    fixed: in steps of 0.125 ms, the mast would fall with 0.76 g.
+    """
+    has_dampers = robot.structure.cables["damping"].any() and not has_drive(robot.model.actuator)
+    return "Euler" if has_dampers else "implicitfast"
 
 
 def _add_floor(world: Element, robot: Robot) -> None:

@@ -30,7 +30,7 @@ import numpy as np
 
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
-from tetra_drake.engines.mjcf import INTEGRATOR, check_mjcf, make_mjcf
+from tetra_drake.engines.mjcf import check_mjcf, integrator_of, make_mjcf
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
@@ -221,7 +221,8 @@ class _Simulator:
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
         if fast.any():
-            reason = f"a body's velocity exceeds the limit of {self._max_speed:.3g} m/s"
+            limit = f"the limit of {self._max_speed:.3g} m/s"
+            reason = f"a body's velocity exceeds {limit}; try a shorter engine.step"
             raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
         # An unstable simulation starts again from time 0, or stops.
         times = self._step * (first + 1.0 + np.arange(len(states)))
@@ -361,7 +362,7 @@ class _MujocoWalk:
             self._simulator.motion(self.times, self._kept, self.signals, self._drives_kept),
             totals=totals,
             work=IntegratorWork(
-                scheme=INTEGRATOR,
+                scheme=integrator_of(robot),
                 accuracy=self.step,
                 steps=self.steps,
                 derivative_evaluations=self.steps,
