@@ -1,11 +1,8 @@
 """The notebook of the first tutorials: its cells are the scripts', and they run."""
 
-import re
-
 import nbformat
 import notebook
-
-FEW = r'(?<="evolution.evaluations": )\d+'
+from helpers.shorter import shortened
 
 IN_A_NOTEBOOK = """\
 import tetra_drake as td
@@ -32,7 +29,7 @@ def test_the_notebook_has_the_cells_of_the_scripts_and_their_outputs():
 def test_its_cells_run_and_values_are_shown_as_tables(tmp_path):
     made = notebook.make_notebook()
     for cell in made.cells:
-        cell["source"] = re.sub(FEW, "53", cell["source"])
+        cell["source"] = shortened(cell["source"])
     shown = ["scenario", "gait", "result", "result.metrics", "run"]
     wrong = 'td.load_scenario("nonsense")'
     for source in (IN_A_NOTEBOOK, *shown, wrong):

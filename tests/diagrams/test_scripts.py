@@ -1,6 +1,7 @@
 """The scripts in diagrams/ as they are run, and the tutorials, each with its picture beside it."""
 
-import re
+import ast
+import importlib
 import runpy
 import shutil
 from pathlib import Path
@@ -12,10 +13,11 @@ import settling_node
 import single_oscillator
 import sliding_tetrahedron
 import tetrahedron_on_incline
+from helpers.shorter import shortened
 from PIL import Image
 from pydrake.geometry import MeshcatParams
 
-from tetra_drake.engines.compiled import lane_pool, lane_stepper
+import tetra_drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.visualization.replay import quiet_meshcat
 
@@ -65,18 +67,30 @@ def test_there_are_sixteen_each_short_and_with_its_picture():
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_what_a_tutorial_imports_is_there(name):
+    for node in ast.walk(ast.parse((TUTORIALS / f"{name}.py").read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            module = importlib.import_module(node.module)
+            assert all(hasattr(module, alias.name) for alias in node.names), node.module
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "td":
+            assert hasattr(tetra_drake, node.attr), node.attr
+
+
+SLOW = ("10_cluster", "16_jumper")  # see test_cluster.py, test_measured.py
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in NAMES],
+)
 def test_a_tutorial_runs_and_draws_its_picture(name, tmp_path, monkeypatch):
     folder = tmp_path / "diagrams" / "tutorials"
     shutil.copytree(TUTORIALS, folder, ignore=shutil.ignore_patterns("*.png"))
     (tmp_path / "runs").symlink_to(CHECKOUT / "runs")
     monkeypatch.chdir(tmp_path)
-    # As it stands, but for the numbers of gaits; so few need no kernel for several lanes.
-    for module in (lane_pool, lane_stepper):
-        monkeypatch.setattr(module, "lanes_for", lambda walks: 1)
-    text, few = (folder / f"{name}.py").read_text("utf-8"), r'(?<="evolution.evaluations": )\d+'
-    text = re.sub(r"(?<=generations, most = )\d+", "1", re.sub(few, "53", text))
-    (folder / f"{name}.py").write_text(text, "utf-8")
-    runpy.run_path(str(folder / f"{name}.py"), run_name="__main__")
+    script = folder / f"{name}.py"
+    script.write_text(shortened(script.read_text("utf-8")), "utf-8")
+    runpy.run_path(str(script), run_name="__main__")
     with (
         Image.open(tmp_path / f"{name}.png") as drawn,
         Image.open(TUTORIALS / f"{name}.png") as kept,

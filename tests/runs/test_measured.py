@@ -18,7 +18,10 @@ def test_the_measured_heights_of_the_simplex_tell_its_free_lengths():
     found = measured.fitted_free_lengths("top", "vertical").parameters
     assert ((found["low"] < found["start"]) & (found["start"] < found["high"])).all()
     np.testing.assert_allclose(found["value"], found["start"], atol=5e-4)
-    # Longer bottom cables lower the upper nodes as longer top cables do.
+
+
+@pytest.mark.slow
+def test_longer_bottom_cables_lower_the_upper_nodes_as_longer_top_cables_do():
     all_groups = measured.fitted_free_lengths("bottom", "top", "vertical").parameters
     assert all_groups["determined"].to_list() == [False, False, True]
 

@@ -297,7 +297,10 @@ def test_a_still_hides_no_instant_by_another(browser, trajectory, tmp_path, spee
         assert not page.locator("#bar, #heading, #legend").filter(visible=True).count()
 
 
-@pytest.mark.parametrize(("name", "view"), [("talk.mp4", "side"), ("talk.gif", "top")])
+@pytest.mark.parametrize(
+    ("name", "view"),
+    [("talk.mp4", "side"), pytest.param("talk.gif", "top", marks=pytest.mark.slow)],
+)
 def test_a_video_has_its_size_rate_and_speed(replay, tmp_path, name, view):
     """The motion of 5 s takes 0.5 s at ten times its speed."""
     reader = pytest.importorskip("imageio_ffmpeg").read_frames
