@@ -3,7 +3,7 @@
     python runs/outdated.py [NAME ...]
 
 A recorded run is outdated if its experiment in record.py has another scenario, or if trial 0 does
-not begin as recorded. Its first 600 evaluations are repeated, on the Drake diagram 20. The search
+not begin as recorded. Its first 600 evaluations are repeated, on the Drake diagram 60. The search
 is told the recorded fitnesses: it must ask for the recorded parameters. Each gait that is kept with
 its parameters must go as far as recorded.
 
@@ -37,7 +37,7 @@ from tetra_drake.optimizers.base import Evaluation, Iteration, Optimizer
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.common_sections import EvolutionSection
 
-EVALUATIONS, ON_DIAGRAM = 600, 20
+EVALUATIONS, ON_DIAGRAM = 600, 60
 """Numbers of evaluations that are repeated, on the fast engines and on the Drake diagram."""
 
 PARAMETERS = 1e-9
