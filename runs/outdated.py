@@ -10,6 +10,8 @@ its parameters must go as far as recorded.
 Last digits do not count, as processors and versions round differently: parameters may differ by
 1e-9 of their values, distances by what a displacement by 1 nm changes (see analyse.ROUNDINGS). A
 thinned run keeps six digits of most fitnesses, so gaits that are equal in these may change places.
+CMA-ES and maps may search elsewhere on another processor, as eigenvectors of equal eigenvalues are
+arbitrary; the reason says with what the run was recorded, where that is not what is installed.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.formatting import fixed, listed
-from tetra_drake.machine import available_cores
+from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, Iteration, Optimizer
 from tetra_drake.robot.gait import ParameterSpace, Vector
@@ -56,12 +58,17 @@ def why_outdated(name: str, experiment: Experiment, directory: Path) -> str:
     if differences := experiment.scenario(name).differences(run.scenario):
         return f"scenario differs in {listed([key for key, _ in differences])}"
     with tempfile.TemporaryDirectory() as scratch:
-        return first_difference(run, begun_again(run, Path(scratch)))
+        difference = first_difference(run, begun_again(run, Path(scratch)))
+    then, now = run.manifest.versions, versions(run.scenario.engine.packages)
+    others = [f"{part} {then.get(part)}" for part in now if then.get(part) != now[part]]
+    if difference and others:
+        return f"{difference} (recorded with {listed(others)})"
+    return difference
 
 
 @dataclass
 class Reminded:
-    """Optimiser that is told the recorded fitnesses, not the fitnesses of its evaluations."""
+    """Optimiser that is told recorded fitnesses in place of simulated ones."""
 
     optimizer: Optimizer
     fitnesses: Sequence[float]
