@@ -44,7 +44,7 @@ class Page(HTMLParser):
         elif tag in ("td", "th"):
             self.table[-1].append("")
             self.cells.append((dict(attributes), self.table[-1], len(self.table[-1]) - 1))
-        if tag not in ("meta", "img", "br"):
+        if tag not in ("meta", "link", "img", "br"):
             self.open.append(tag)
             self.texts[tag].append("")
 

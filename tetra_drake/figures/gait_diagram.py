@@ -140,7 +140,7 @@ def _rows_of_names(names: Iterable[str]) -> float:
 def _write_names(panel: Axes, names: Sequence[str], rows: Iterable[float]) -> None:
     """Writes names beside rows; if they have too many lines, only every second, or fewer."""
     every = 1 + (len(names) - 1) // max(1, _NAMED // most_lines(names))
-    panel.set_yticks(list(rows)[::every], names[::every])
+    panel.set_yticks(list(rows)[:: max(1, every)], names[:: max(1, every)])
 
 
 def foot_name(node: str) -> str:
