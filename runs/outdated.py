@@ -33,7 +33,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.formatting import fixed, listed
-from tetra_drake.machine import available_cores, versions
+from tetra_drake.machine import available_cores
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, Iteration, Optimizer
 from tetra_drake.robot.gait import ParameterSpace, Vector
@@ -59,8 +59,7 @@ def why_outdated(name: str, experiment: Experiment, directory: Path) -> str:
         return f"scenario differs in {listed([key for key, _ in differences])}"
     with tempfile.TemporaryDirectory() as scratch:
         difference = first_difference(run, begun_again(run, Path(scratch)))
-    then, now = run.manifest.versions, versions(run.scenario.engine.packages)
-    others = [f"{part} {then.get(part)}" for part in now if then.get(part) != now[part]]
+    others = run.manifest.other_versions
     if difference and others:
         return f"{difference} (recorded with {listed(others)})"
     return difference

@@ -23,7 +23,7 @@ from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
 from tetra_drake.files import check_folder, given_path
-from tetra_drake.machine import available_cores, versions
+from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
@@ -245,11 +245,9 @@ def _draw_again(directory: Path) -> str:
 
 
 def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
-    then, now = manifest.versions, versions(manifest.scenario.engine.packages)
-    changed = [f"{name} {then.get(name)}" for name in now if then.get(name) != now[name]]
-    if changed:
+    if others := manifest.other_versions:
         progress.warn(
-            f"the run was begun with {', '.join(changed)}; with other versions its record may "
+            f"the run was begun with {', '.join(others)}; with other versions its record may "
             "differ from the record of an uninterrupted run"
         )
 

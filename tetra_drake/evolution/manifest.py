@@ -108,6 +108,13 @@ class Manifest:
         parts = (dump_scenario(scenario), seed, now, vars(method))
         return cls(scenario, seed, now, method, _sha256(json.dumps(parts))[:_NAME])
 
+    @property
+    def other_versions(self) -> list[str]:
+        """Recorded versions that are not installed here, such as "numpy 1.26"."""
+        now = versions(self.scenario.engine.packages)
+        recorded = {name: self.versions.get(name) for name in now}
+        return [f"{name} {then}" for name, then in recorded.items() if then != now[name]]
+
     def gait(self, vector: Vector, *, trial: int, index: int) -> Gait:
         """The gait of a recorded evaluation."""
         name = f"{self.scenario.name}, seed {self.seed}, trial {trial}, evaluation {index}"
