@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -139,8 +140,9 @@ def _rows_of_names(names: Iterable[str]) -> float:
 
 def _write_names(panel: Axes, names: Sequence[str], rows: Iterable[float]) -> None:
     """Writes names beside rows; if they have too many lines, only every second, or fewer."""
-    every = 1 + (len(names) - 1) // max(1, _NAMED // most_lines(names))
-    panel.set_yticks(list(rows)[:: max(1, every)], names[:: max(1, every)])
+    fitting = max(1, _NAMED // most_lines(names))
+    every = max(1, math.ceil(len(names) / fitting))
+    panel.set_yticks(list(rows)[::every], names[::every])
 
 
 def foot_name(node: str) -> str:

@@ -129,7 +129,7 @@ def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
 def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
     """Free lengths of the cables (k, cables) in m; winches change them."""
     lengths = np.tile(robot.structure.cables["free_length"], (len(motion.times), 1))
-    actuator, driven = robot.model.actuator, np.sort(robot.driven)
+    actuator, driven = robot.model.actuator, robot.cables_of_drives
     if has_drive(actuator):
         lengths[:, driven] = wound(actuator, motion.drives, lengths[:, driven])
     return lengths

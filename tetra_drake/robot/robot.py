@@ -80,6 +80,12 @@ class Robot:
         return np.array([number for group in groups for number in group], dtype=np.int64)
 
     @property
+    def cables_of_drives(self) -> np.ndarray:
+        """Indices of the driven cables in the order of the structure's cables, as states of the
+        actuators have it."""
+        return np.sort(self.driven)
+
+    @property
     def ground(self) -> Ground:
         """The ground under the robot."""
         return self.model.ground
@@ -165,9 +171,9 @@ class Robot:
         return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
 
     def starting_drives(self) -> np.ndarray:
-        """States of the actuators at t = 0 (drives,), in the order of the cables; see
-        physics.actuator."""
-        cables = self.structure.cables[np.sort(self.driven)]
+        """States of the actuators at t = 0 (drives,); see physics.actuator and
+        cables_of_drives."""
+        cables = self.structure.cables[self.cables_of_drives]
         drives: np.ndarray = self.scenario.actuation.drives(self._at_start(cables))
         return drives
 
