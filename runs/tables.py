@@ -13,6 +13,7 @@ The rover's numbers are from rolling.py.
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 import sys
@@ -35,6 +36,7 @@ from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH, SYSTEMS, Units
 
 HERE = Path(__file__).parent
@@ -96,19 +98,25 @@ def load_all(directory: Path = HERE) -> dict[str, Analysis]:
 
 def shown(name: str, file: str, about: str) -> str:
     """A picture of a run, HEIGHT high. Its width is given, as pages make wide pictures narrower."""
-    if file.endswith(".svg"):
-        text = read_text(HERE / name / file, "picture")
-        wide, high = re.findall(r'(?:width|height)="([\d.]+)pt"', text)
-    else:
-        with Image.open(HERE / name / file) as picture:
-            wide, high = picture.size
-    width = round(HEIGHT * float(wide) / float(high))
+    width = round(HEIGHT * aspect(HERE / name / file))
     return f'<img src="{name}/{file}" width="{width}" alt="{about}">'
 
 
-def units_of(name: str) -> Units:
-    """Units of the scenario of a run."""
-    return load_scenario(HERE / name / SCENARIO).units
+def aspect(picture: Path) -> float:
+    """Width of a picture over its height. Raises InputError if a drawing cannot be read."""
+    if picture.suffix == ".svg":
+        text = read_text(picture, "picture")
+        width, height = map(float, re.findall(r'(?:width|height)="([\d.]+)pt"', text)[:2])
+    else:
+        with Image.open(picture) as opened:
+            width, height = opened.size
+    return width / height
+
+
+@functools.cache
+def scenario_of(name: str) -> Scenario:
+    """Scenario of a run."""
+    return load_scenario(HERE / name / SCENARIO)
 
 
 @dataclass(frozen=True)
@@ -134,19 +142,37 @@ class Best:
 
 def best_of_all(runs: Runs) -> dict[str, Best]:
     """The rover's policy, then the best gaits of the runs, by name of the folder."""
+    return {name: best_in(name, runs) for name in (ROLLING, *runs)}
+
+
+def best_in(name: str, runs: Runs) -> Best:
+    """The best gait or policy of the folder of this name."""
+    return best_policy() if name == ROLLING else best_gait(name, runs[name])
+
+
+def best_policy() -> Best:
+    """The rover's best policy."""
     policy = best_of(load_policies())
     ways = {engine: policy["engines"][engine]["way_m"] for engine in ENGINES}
     kept = policy["rolls"] / policy["draws"]
     title = "a rover of six struts rolls by a feedback policy, in 20 s"
-    bests = {ROLLING: Best(title, f"{LAPSE}.svg", ways, kept, SYSTEMS["SI"])}
-    for name, run in runs.items():
-        trial = run.best_trial
-        inches = run.undisturbed(trial), run.again(trial, TIGHT), run.again(trial, MUJOCO)
-        distances = {engine: INCH * x for engine, x in zip(ENGINES, inches, strict=True)}
-        kept = float(run.disturbed.loc[trial, "kept"])
-        title = EXPERIMENTS[name].title
-        bests[name] = Best(title, f"{DIAGRAM}.svg", distances, kept, units_of(name))
-    return bests
+    return Best(title, f"{LAPSE}.svg", ways, kept, SYSTEMS["SI"])
+
+
+def best_gait(name: str, run: Analysis) -> Best:
+    """The best gait of a run."""
+    trial = run.best_trial
+    distances = dict(zip(ENGINES, distances_of(run, trial), strict=True))
+    kept = float(run.disturbed.loc[trial, "kept"])
+    title, units = EXPERIMENTS[name].title, scenario_of(name).units
+    return Best(title, f"{DIAGRAM}.svg", distances, kept, units)
+
+
+def distances_of(run: Analysis, trial: int) -> np.ndarray:
+    """Distances (m) of a trial's fittest gait, in the order of ENGINES; NaN if not simulated."""
+    return INCH * np.array(
+        [run.undisturbed(trial), run.again(trial, TIGHT), run.again(trial, MUJOCO)]
+    )
 
 
 def gallery_table(runs: Runs) -> str:
@@ -175,12 +201,10 @@ def trust_table(runs: Runs) -> str:
         under_law = [
             run
             for name, run in runs.items()
-            if isinstance(load_scenario(HERE / name / SCENARIO).friction, Coulomb) == is_coulomb
+            if isinstance(scenario_of(name).friction, Coulomb) == is_coulomb
         ]
         gaits = [(run, trial) for run in under_law for trial in run.best_gaits.index]
-        inches = np.array(
-            [(run.undisturbed(i), run.again(i, TIGHT), run.again(i, MUJOCO)) for run, i in gaits]
-        )
+        inches = np.array([distances_of(run, trial) for run, trial in gaits]) / INCH
         compiled, diagram, mujoco = inches.T
         apart = np.abs(diagram - compiled)
         judged = (np.abs(compiled) >= FAR) & np.isfinite(mujoco)
@@ -198,12 +222,11 @@ def trust_table(runs: Runs) -> str:
 def films(names: Mapping[str, str], runs: Runs, *, distances: bool) -> str:
     """A row of films for README.md, of one height, with what moves. With `distances`, with the
     distances and times of the best gaits."""
-    bests, width = best_of_all(runs), ROW // len(names)
-    pictures, captions = [], []
+    width, pictures, captions = ROW // len(names), [], []
     for name, words in names.items():
         folder = f"{HERE.name}/{name}"
         pictures.append(f'<img src="{folder}/{FILM}" width="{width}" alt="{words}">')
-        far = f": {bests[name].text('compiled', 1)}" if distances else ""
+        far = f": {best_in(name, runs).text('compiled', 1)}" if distances else ""
         captions.append(f"[{words}]({folder}/{README}){far}")
     lines = [pictures, [":-:" for _ in names], captions]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
@@ -217,26 +240,25 @@ def gallery_page(runs: Runs) -> str:
     return template.render(bests=bests, replay=REPLAY, picture=PICTURE, measured=MEASURED)
 
 
-def trials_table(run: Analysis, units: Units) -> str:
-    """Table of the fittest gait of each trial on all engines and on disturbed robots. Below it, the
-    trials with different distances on the engines."""
+def trials_table(name: str, runs: Runs) -> str:
+    """Table of the fittest gait of each trial of a run, on all engines and on disturbed robots.
+    Below it, the trials with different distances on the engines."""
+    run, units = runs[name], scenario_of(name).units
     of_metrics = {name: units.of(UNITS[name]) for name in SHOWN}
     rows, apart = [], []
     for trial, gait in run.best_gaits.iterrows():
-        compiled, tight = run.undisturbed(trial), run.again(trial, TIGHT)
-        if not INCH * abs(compiled - tight) <= APART:
+        compiled, diagram, mujoco = distances_of(run, trial)
+        if not abs(compiled - diagram) <= APART:
             apart.append(trial)
         judged = run.disturbed.loc[trial]
-        inches = np.array([compiled, tight, run.again(trial, MUJOCO), judged["mean"] / INCH])
-        distances = inches * INCH / units.length
+        distances = np.array([compiled, diagram, mujoco, judged["mean"]]) / units.length
         share, low, high = 100.0 * judged[["kept", "kept_low", "kept_high"]]
         kept = f"{share:.0f} ({low:.0f}–{high:.0f})"
         metrics = [gait[name] / size for name, (size, _) in of_metrics.items()]
         counts = [f"{trial}", f"{gait['evaluations']:.0f}", fixed(gait["fitness"])]
         rows.append([*counts, *map(fixed, distances), kept, *map(fixed, metrics)])
     headings = ["trial", "gaits", "fitness"]
-    for engine in ("compiled", "diagram", "MuJoCo", "disturbed"):
-        headings.append(f"{engine} ({units.length_name})")
+    headings += [f"{where} ({units.length_name})" for where in (*ENGINES, "disturbed")]
     headings.append("keeps (%)")
     for name, (_, unit) in of_metrics.items():
         title = name.replace("_", " ")
@@ -263,7 +285,7 @@ def made_again(page: Path, runs: Runs) -> str:
             "small-films": lambda: films(SMALL_FILMS, runs, distances=False),
             "gallery": lambda: gallery_table(runs),
             "trust": lambda: trust_table(runs),
-            "trials": lambda: trials_table(runs[page.parent.name], units_of(page.parent.name)),
+            "trials": lambda: trials_table(page.parent.name, runs),
         }
         return tables[name]()
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
 from record import EXPERIMENTS
+from tables import aspect
 
 import tetra_drake as td
 from tetra_drake.cli import main, make_parser
@@ -179,17 +179,6 @@ def test_links_lead_somewhere(page: str) -> None:
         target = file.parent / path if path else file
         assert target.exists(), link
         assert not anchor or anchor in anchors(target), link
-
-
-def aspect(picture: Path) -> float:
-    """Width of a picture over its height."""
-    if picture.suffix == ".svg":
-        text = picture.read_text(encoding="utf-8")
-        width, height = map(float, re.findall(r'(?:width|height)="([\d.]+)pt"', text)[:2])
-    else:
-        with Image.open(picture) as opened:
-            width, height = opened.size
-    return width / height
 
 
 @pytest.mark.parametrize("page", PAGES)
