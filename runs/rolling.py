@@ -329,7 +329,7 @@ each trial. It knows nothing of the ground.
 
 {networks}
 
-{turning} of {trials} networks make a turn in 20 s, the best {most} turns. In single trials of
+Networks that make a turn in 20 s: {turning} of {trials}. The best makes {most}. In single trials of
 another length and objective, smaller signals (`cpg.gain` of 100 and 200 N) did not tip the rover at
 all, 600 N gave 0.94 turns, and 200 N with feedback of length, load and pitch to the oscillators
 0.83 turns.
