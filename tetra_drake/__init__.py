@@ -5,7 +5,7 @@
     >>> run = td.evolve(scenario, "runs/mine", overwrite=True)
     >>> result = td.simulate(scenario, run.best_gait(), record=True)
     >>> print(result)
-    >>> result.trajectory.tension.sel(cable_bodies="T1-T2").max().item()
+    >>> print(f"{result.trajectory.tension.sel(cable_bodies='T1-T2').max():.2f} N")
     >>> result.show()  # in a notebook
     >>> metrics = td.sweep(scenario, run.gaits(), {"robot.cables.outer_stiffness": ["30 N/m"]})
 

@@ -1,5 +1,6 @@
 """Robots at rest: statics, balance, frequencies, and what is printed and written of them."""
 
+import dataclasses
 import math
 
 import pytest
@@ -13,6 +14,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.scenario.units import shown_in
 
 
 def test_two_bars_side_by_side_bounce_as_masses_on_springs():
@@ -65,6 +67,12 @@ def test_text_page_and_model_are_of_the_structure(tmp_path):
     assert "60.83 g" in text  # 3 bars of 20.277 g
     for name in ("n0 n4", "bottom", "side", "4.23"):  # N
         assert name in text
+    sides = study.cables["group"] == "side"
+    free = study.cables["free_length"].where(~sides, [0.04] * 8 + [0.09])
+    uneven = dataclasses.replace(study, cables=study.cables.assign(free_length=free))
+    assert "4.00 to 9.00" in structure_text(uneven)  # cm
+    with shown_in("SI"):
+        assert "0.0000 to 0.1735" in structure_text(study)  # heights, 0.00 to 17.35 in cm
     save_structure_page(study, tmp_path / "prism.html")
     assert "prism at rest" in (tmp_path / "prism.html").read_text()
     mujoco = pytest.importorskip("mujoco")

@@ -62,6 +62,11 @@ def test_people_read_numbers_of_the_same_size(system, unit, read):
     assert units.shown(2.5 * size, unit) == f"2.5 {read}"
 
 
+@pytest.mark.parametrize("units", SYSTEMS.values(), ids=SYSTEMS)
+def test_a_distance_in_a_sentence_tells_about_a_millimetre_in_all_units(units):
+    assert 0.5e-3 < units.length * 10.0**-units.decimals < 3e-3
+
+
 @pytest.mark.parametrize(
     ("base", "changes", "expected"),
     [

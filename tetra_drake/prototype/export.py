@@ -114,4 +114,5 @@ def _played(scenario: Scenario, file: Path) -> str:
 
 def _distance(result: SimulationResult) -> str:
     units = result.scenario.units
-    return f"{fixed(result.metrics.distance / units.length)} {units.length_name}"
+    distance = fixed(result.metrics.distance / units.length, units.decimals + 1)
+    return f"{distance} {units.length_name}"

@@ -55,7 +55,8 @@ def _changes_table(changes: pandas.DataFrame, units: Units) -> Table:
         correlation, size = signed(row["correlation"]), fixed(row["correlation_size"])
         if math.isnan(row["correlation"]):
             correlation, size = "", ""
-        median, worst = fixed(row["median"] / units.length), signed(row["worst"] / units.length)
+        lengths, digits = row[["median", "worst"]] / units.length, units.decimals + 1
+        median, worst = fixed(lengths["median"], digits), signed(lengths["worst"], digits)
         rows.append([str(what), median, worst, f"{row['failed']:.0f}", correlation, size])
     headings = ["disturbance", "median change", "worst", "failed", "correlation", "|correlation|"]
     return Table(headings, rows)

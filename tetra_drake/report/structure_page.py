@@ -96,7 +96,8 @@ def _bodies_table(study: EquilibriumStudy) -> Table:
     rows, structure, units = [], study.robot.structure, study.robot.scenario.units
     for body, mass in zip(structure.bodies, structure.mass, strict=True):
         nodes = study.nodes[study.nodes["body"] == body]
-        heights = _range(nodes["z"] / units.length, fixed)
+        digits = units.decimals + 1
+        heights = _range(nodes["z"] / units.length, lambda z: fixed(z, digits))
         load = rounded(nodes["load"].sum() / units.force)
         rows.append([body, rounded(1e3 * mass, 4), heights, load])
     heights, load = (
@@ -118,9 +119,9 @@ def _anchors_table(study: EquilibriumStudy) -> Table:
 def _cables_table(study: EquilibriumStudy) -> Table:
     rows, units = [], study.robot.scenario.units
     for group, cables in study.cables.groupby("group", sort=False):
-        free = rounded(cables["free_length"].mean() / units.length)
-        lengths, tensions = cables["length"] / units.length, cables["tension"] / units.force
-        rows.append([str(group), str(len(cables)), free, _range(lengths), _range(tensions)])
+        lengths = (_range(cables[name] / units.length) for name in ("free_length", "length"))
+        tension = _range(cables["tension"] / units.force)
+        rows.append([str(group), str(len(cables)), *lengths, tension])
     length, force = units.length_name, units.force_name
     names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
     return Table(["cables", "number", *names], rows)

@@ -29,8 +29,6 @@ class Units:
     length_name: str
     length_word: str
     """Name of the unit of length in a sentence."""
-    decimals: int
-    """Number of decimals of a distance in a sentence; figures have one more."""
     square: float
     """Side of a square on the floor of a replay, in m."""
     squares: int
@@ -38,6 +36,12 @@ class Units:
     force: float = 1.0
     """Size in N."""
     force_name: str = "N"
+
+    @property
+    def decimals(self) -> int:
+        """Number of decimals of a distance in a sentence, which then tells about 1 mm. Tables and
+        figures have one more."""
+        return round(math.log10(self.length / 0.001))
 
     def of(self, unit: str) -> tuple[float, str]:
         """Unit in place of an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name. A
@@ -66,12 +70,12 @@ class Units:
         return f"{number / size:.4g} {name}".rstrip()
 
 
-INCHES = Units(INCH, "in", "inches", 1, INCH, 6, POUND_FORCE, "lbf")
+INCHES = Units(INCH, "in", "inches", INCH, 6, POUND_FORCE, "lbf")
 
 SYSTEMS = {
-    "cm": Units(0.01, "cm", "cm", 1, 0.02, 5),
-    "mm": Units(0.001, "mm", "mm", 0, 0.02, 5),
-    "SI": Units(1.0, "m", "m", 2, 0.1, 10),
+    "cm": Units(0.01, "cm", "cm", 0.02, 5),
+    "mm": Units(0.001, "mm", "mm", 0.02, 5),
+    "SI": Units(1.0, "m", "m", 0.1, 10),
     "in": INCHES,
 }
 """Units by name."""

@@ -6,7 +6,7 @@
 //                               follows the robot, or stands and sees it at all `times`;
 //                               `from`: direction in World from the robot to the camera
 //   film.still(times)           the last instant, the earlier ones faded, with path and distance
-//   film.dress(on)              shows or hides heading, legend, bar and names
+//   film.dress(on)              shows or hides heading, legend, bar (none at rest) and names
 window.addEventListener("load", () => {
   const {Color, CylinderGeometry, ConeGeometry, BufferGeometry, Fog, Group, Line} = MeshCat.THREE;
   const {LineBasicMaterial, Mesh, MeshPhongMaterial, Quaternion, Raycaster, Vector3} = MeshCat.THREE;
@@ -372,8 +372,10 @@ window.addEventListener("load", () => {
     show_labels();
   }
   function dress(on) {
-    for (const id of ["heading", "legend", "bar", "labels"]) element(id).hidden = !on;
-    document.documentElement.style.setProperty("--bar", on ? null : "0px");
+    for (const id of ["heading", "legend", "labels"]) element(id).hidden = !on;
+    const bar = on && !recording.rests;
+    element("bar").hidden = !bar;
+    document.documentElement.style.setProperty("--bar", bar ? null : "0px");
     arrange();
   }
   // On a narrow screen, heading and legend have room of their own, so that they hide nothing.
@@ -391,8 +393,8 @@ window.addEventListener("load", () => {
   viewer.renderer.domElement.setAttribute("aria-label", document.title);
   viewer.set_3d_pane_size();
   aim(middle());
-  arrange();
-  set_playing(true);
+  dress(true);
+  set_playing(!recording.rests);
   requestAnimationFrame(tick);
   const play = () => set_playing(true), pause = () => set_playing(false);
   window.film = {duration, play, pause, show, camera, still, dress};

@@ -123,6 +123,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     return {
         "times": frames["time"].values.round(5).tolist(),
         "resolution": RESOLUTION,
+        "rests": bool((poses == poses[0]).all()),
         "bodies": bodies,
         "named": len(bodies) <= MOST_NAMES and not any(" " in name for name in bodies),
         "nodes": [
