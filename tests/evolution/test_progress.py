@@ -56,6 +56,20 @@ def test_plain_lines_come_now_and_then_and_at_the_end_with_one_time_left(monkeyp
     assert lines[4:] == ["best gaits: 0 of 3", "best gaits: 3 of 3"]
 
 
+def test_the_time_left_counts_no_compilation_and_waits_until_it_is_known(monkeypatch):
+    now, compiled = [0.0], [0.0]
+    monkeypatch.setattr("tetra_drake.evolution.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("tetra_drake.evolution.progress.compiling_time", lambda: compiled[0])
+    stream = io.StringIO()
+    moments = [(0, 0, 0), (38, 30, 8), (51, 30, 20), (101, 75, 20), (125, 75, 50)]
+    with Display(stream) as progress:
+        for now[0], compiled[0], done in moments:
+            progress.stage("gaits", done, 100)
+    left = [line.partition("of 100")[2] for line in stream.getvalue().splitlines()]
+    # 20 gaits in 21 s, then 50 in 50 s.
+    assert left == ["", "", ", 0:01:24 left", ", 0:00:50 left"]
+
+
 def test_a_terminal_shows_one_bar_for_the_run_and_one_per_stage(monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     stream = Terminal()

@@ -2,6 +2,7 @@
 file where its cache folder would be: unwritable even for root."""
 
 import logging
+import math
 import os
 import shutil
 import subprocess
@@ -13,7 +14,7 @@ import pytest
 
 import tetra_drake
 from tetra_drake.simd import compiling
-from tetra_drake.simd.compiling import LOGGER, announce, compiled
+from tetra_drake.simd.compiling import LOGGER, compiled, compiling_time
 
 PROGRAM = """
 import numpy as np
@@ -200,13 +201,16 @@ def test_values_of_a_closure_are_never_those_of_an_earlier_one(folder):
     assert [make(factor)(2.0) for factor in (3.0, 5.0)] == [6.0, 10.0]
 
 
-@pytest.mark.parametrize(("moment", "times"), [(0.0, 1), (600.0, 0)])
-def test_compilation_that_takes_longer_than_a_moment_is_announced_once(
-    folder, monkeypatch, caplog, moment, times
+@pytest.mark.parametrize(("moment", "minute", "times"), [(0, 60, 1), (0, 0, 2), (600, 0, 0)])
+def test_compilation_that_takes_longer_than_a_moment_is_announced_once_in_a_minute(
+    folder, monkeypatch, caplog, moment, minute, times
 ):
-    monkeypatch.setattr(compiling, "_MOMENT", moment)
-    announce.cache_clear()
+    settings = {"_MOMENT": moment, "_MINUTE": minute, "_told": -math.inf}
+    for name, value in settings.items():
+        monkeypatch.setattr(compiling, name, value)
+    before = compiling_time()
     for kernel in (compiled(twice), compiled(half)):
         kernel(0.25)
     told = [(record.name, record.levelno) for record in caplog.records]
     assert told == [(LOGGER, logging.WARNING)] * times
+    assert compiling_time() > before

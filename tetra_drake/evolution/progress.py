@@ -7,16 +7,18 @@ import sys
 import time
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import duration, rounded
+from tetra_drake.simd.compiling import compiling_time
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
 _LINE_PERIOD = 10.0  # s, between plain lines
-_FIRST_ESTIMATE = 5  # tasks; the time left is estimated after these
+_FIRST_ESTIMATE = 5  # tasks; the time left is estimated after these, and after a line's period
 
 
 class Progress:
@@ -58,11 +60,9 @@ class Display(Progress):
             progress.TextColumn("{task.fields[text]}"),
             console=Console(file=stream),
             refresh_per_second=4,
-            speed_estimate_period=math.inf,  # one evaluation may take minutes
-            get_time=lambda: time.monotonic(),
             disable=self._plain,
         )
-        self._tasks: dict[str, TaskID] = {}
+        self._stages: dict[str, _Stage] = {}
         self._printed = -math.inf
         """Time at which the last plain line was printed."""
         self._line = ""
@@ -92,23 +92,43 @@ class Display(Progress):
 
     def stage(self, title: str, done: int, total: int, text: str = "") -> None:
         """Moves the bar of the stage, or prints a line if one is due."""
-        begins = title not in self._tasks
+        now, begins = time.monotonic(), title not in self._stages
         if begins:
-            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text="")
-        task = self._bars.tasks[self._tasks[title]]
-        self._bars.update(task.id, completed=done, total=total)
+            bar = self._bars.add_task(title, total=total, text="")
+            self._stages[title] = _Stage(bar, done, done, now - compiling_time())
+        stage = self._stages[title]
         parts = [text] if text else []
-        if task.time_remaining and done >= _FIRST_ESTIMATE:
-            parts.append(f"{duration(task.time_remaining)} left")
-        self._bars.update(task.id, text=", ".join(parts))
+        if left := stage.time_left(done, total, now - compiling_time()):
+            parts.append(f"{duration(left)} left")
+        self._bars.update(stage.bar, completed=done, total=total, text=", ".join(parts))
         if not self._plain:
             return
         line = ", ".join([f"{title}: {done} of {total}", *parts])
-        now = time.monotonic()
         due = begins or done == total or now - self._printed >= _LINE_PERIOD
         if due and line != self._line:
             self._printed, self._line = now, line
             self.say(line)
+
+
+@dataclass
+class _Stage:
+    """One stage of a run: its bar, and what the time left is estimated from."""
+
+    bar: TaskID
+    first: int
+    """Number of tasks that were done when it began."""
+    done: int
+    began: float
+    """Time (s) on a clock that stands still while kernels are compiled."""
+    per_task: float = math.nan
+    """Time (s) per task, up to the last one."""
+
+    def time_left(self, done: int, total: int, now: float) -> float:
+        """Time (s) for the tasks that are not done; 0 if it cannot be estimated yet."""
+        made, passed = done - self.first, now - self.began
+        if done > self.done and made >= _FIRST_ESTIMATE and passed >= _LINE_PERIOD:
+            self.done, self.per_task = done, passed / made
+        return 0.0 if math.isnan(self.per_task) else (total - done) * self.per_task
 
 
 def overview(statuses: Sequence[TrialStatus]) -> str:

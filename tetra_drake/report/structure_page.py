@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -94,10 +95,10 @@ def _faults(study: EquilibriumStudy) -> list[str]:
 
 def _bodies_table(study: EquilibriumStudy) -> Table:
     rows, structure, units = [], study.robot.structure, study.robot.scenario.units
+    height = functools.partial(fixed, digits=units.decimals + 1)
     for body, mass in zip(structure.bodies, structure.mass, strict=True):
         nodes = study.nodes[study.nodes["body"] == body]
-        digits = units.decimals + 1
-        heights = _range(nodes["z"] / units.length, lambda z: fixed(z, digits))
+        heights = _range(nodes["z"] / units.length, height)
         load = rounded(nodes["load"].sum() / units.force)
         rows.append([body, rounded(1e3 * mass, 4), heights, load])
     heights, load = (

@@ -8,14 +8,17 @@ import functools
 import hashlib
 import inspect
 import logging
+import math
 import pickle
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, NullCache
 from numba.core.serialize import dumps
 from numba.extending import overload
@@ -26,14 +29,23 @@ from tetra_drake.files import write_whole
 F = TypeVar("F", bound=Callable[..., object])
 
 LOGGER = "tetra_drake"
-"""Name of the logger that gets a warning, once, when compilation takes long."""
+"""Name of the logger that gets a warning when compilation takes long."""
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract"},
     "no_cfunc_wrapper": True,  # only C code would call the wrapper
 }
-_MOMENT = 2.0
-"""Time (s) after which a compilation is announced."""
+_MOMENT, _MINUTE = 2.0, 60.0
+"""Time (s) after which a compilation is announced, and time for which no other one is."""
+_told = -math.inf
+"""Time of the last announcement."""
+_TIMES = event.TimingListener()
+event.register("numba:compile", _TIMES)
+
+
+def compiling_time() -> float:
+    """Time (s) that this process has spent on compilations that are finished."""
+    return _TIMES.duration if _TIMES.done else 0.0
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
@@ -166,10 +178,13 @@ def _read(path: Path) -> tuple[bytes, bytes]:
     return file[:size], file[size:]
 
 
-@functools.cache
 def announce(kept: bool) -> None:
-    """Logs, once per process, that kernels are being compiled. `kept` is True if the machine code
-    will be cached."""
+    """Logs that kernels are being compiled, at most once in _MINUTE. `kept` is True if the machine
+    code will be cached."""
+    global _told
+    if time.monotonic() < _told + _MINUTE:
+        return
+    _told = time.monotonic()
     often = "once" if kept else "each time, as no folder can be written to: set NUMBA_CACHE_DIR"
     logging.getLogger(LOGGER).warning(
         "tetra_drake is compiling for this processor, which may take a minute, %s", often
