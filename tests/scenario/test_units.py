@@ -89,6 +89,28 @@ def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, 
     assert scenario.units == SYSTEMS[expected]
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        "unit: mm\nnodes: {a: [0, 0, 0], b: [300, 0, 100]}",
+        "nodes: {a: [0 mm, 0 mm, 0 mm], b: [300 mm, 0 mm, 100 mm]}",
+    ],
+)
+def test_a_structure_given_in_mm_is_shown_in_mm(given, tmp_path):
+    strut = "{pairs: [[a, b]], diameter: 6 mm, density: 2.7 g/cm^3, node_diameter: 6 mm}"
+    (tmp_path / "small.yaml").write_text(f"{given}\nstruts: {{rod: {strut}}}")
+    robot = f"robot: !Structure {{file: {tmp_path / 'small.yaml'}}}"
+    own = "base: prism\ngait_bounds: {turn: 0}\n" + robot
+    (tmp_path / "own.yaml").write_text(own)
+    scenario = load_scenario(tmp_path / "own.yaml")
+    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))
+    recorded = load_scenario(tmp_path / "record.yaml")
+    changed = scenario.with_changes({"robot.gravity": "9 m/s^2"})
+    for shown in (scenario, recorded, changed):
+        assert shown.units == SYSTEMS["mm"]
+    assert recorded == scenario
+
+
 def test_a_structure_given_in_metres_is_shown_in_metres(tmp_path):
     text = """
     nodes: {a: [0 m, 0 m, 0 m], b: [3 m, 0 m, 1 m]}

@@ -139,9 +139,10 @@ class Scenario(Section):
 
     @property
     def units(self) -> Units:
-        """Units of this scenario in texts, pages and figures: those that need the fewest digits for
-        the long lengths of its robot, or the units of units.shown_in()."""
-        return units_for(self.robot.lengths)
+        """Units of this scenario in texts, pages and figures: the units of units.shown_in(); mm if
+        its robot is given in mm; otherwise those that need the fewest digits for the long lengths
+        of its robot."""
+        return units_for(self.robot.lengths, self.robot.unit)
 
     @property
     def oscillators(self) -> int:

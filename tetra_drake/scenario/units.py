@@ -96,9 +96,10 @@ def shown_in(name: str | None) -> Iterator[None]:
         _chosen.reset(token)
 
 
-def units_for(lengths: tuple[float, ...]) -> Units:
-    """The units of shown_in(); otherwise the units of a robot with these lengths (m)."""
-    return current(_fitting(lengths))
+def units_for(lengths: tuple[float, ...], unit: str | None) -> Units:
+    """The units of shown_in(); otherwise the units of a robot that is given in `unit`, or without
+    it, of a robot with these lengths (m)."""
+    return current(SYSTEMS[unit] if unit else _fitting(lengths))
 
 
 def current(own: Units) -> Units:
