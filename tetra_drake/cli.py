@@ -73,7 +73,7 @@ def make_parser() -> Command:
         "--units",
         choices=[*SYSTEMS],
         help="units of lengths and forces in texts, pages and figures (default: the units in which "
-        "the robot's lengths are round)",
+        "the robot's lengths are round, or mm if it is given in mm)",
     )
     parser.add_commands(
         [

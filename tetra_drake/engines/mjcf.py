@@ -155,7 +155,7 @@ def _contact(robot: Robot, mass: float) -> dict:
     """Contact settings for the floor and a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
-    borne = robot.weight / _feet(robot)
+    borne = robot.weight / (robot.structure.feet or max(1, robot.equilibrium.feet))
     rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo's numbers are per mass, divided by 1 - impedance, and for friction multiplied by
     # impratio. Negative numbers mean stiffness and damping.
@@ -186,11 +186,6 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
             "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
         }
         add_element(pairs, "pair", geom1=f"strut {i}", geom2=f"strut {j}", **contact)
-
-
-def _feet(robot: Robot) -> int:
-    """Number of nodes that bear the weight: from the blueprint, or in equilibrium."""
-    return robot.structure.feet or max(1, robot.equilibrium.feet)
 
 
 def _add_cables(model: Element, robot: Robot) -> None:

@@ -170,8 +170,8 @@ class StructureFile(Section):
     nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
     """Coordinates [x, y, z] of each node, near an equilibrium."""
     unit: str | None = Field(default=None, exclude_if=lambda unit: unit is None)
-    """Unit of coordinates that are bare numbers, such as cm. A robot with coordinates in mm is shown
-    in mm."""
+    """Unit of coordinates that are bare numbers, such as cm. A robot with coordinates in mm is
+    shown in mm."""
     struts: dict[Name, StrutGroup] = Field(min_length=1)
     cables: dict[Name, CableGroup] = Field(default={})
     spheres: dict[Name, SphereGroup] = Field(default={})
