@@ -59,7 +59,7 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     (13 bodies,) at `rest`, there is a key frame of this name. Raises InputError if MuJoCo does not
     know the terrain or the friction.
     """
-    scenario = robot.scenario
+    scenario, structure = robot.scenario, robot.structure
     check_mjcf(scenario)
     model = Element("mujoco", model=scenario.name)
     steps = {"integrator": integrator_of(robot), "timestep": scenario.settings_of(Mujoco).step}
@@ -69,14 +69,17 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
         _add_floor(world, robot)
-    _add_fixed_nodes(world, robot.structure)
+    for node in range(structure.first_node[-1], len(structure.node_names)):  # fixed nodes
+        add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
     _add_bodies(model, world, robot)
     if rest is not None:
-        _add_key_frame(model, robot.structure, rest)
+        poses = rest[: 7 * len(structure.bodies)].reshape(-1, 7)
+        qpos = np.hstack([poses[:, 4:], poses[:, :4]])
+        add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
     if robot.model.strut_contact.acts:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot)
-    _add_pushes(model, world, robot.structure)
+    _add_pushes(model, world, structure)
     return xml_text(model)
 
 
@@ -99,12 +102,6 @@ def _add_floor(world: Element, robot: Robot) -> None:
     add_element(
         world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE
     )
-
-
-def _add_fixed_nodes(world: Element, structure: Structure) -> None:
-    """Adds a site of the world for each fixed node."""
-    for node in range(structure.first_node[-1], len(structure.node_names)):
-        add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
@@ -142,13 +139,6 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             size = structure.strut_radius[strut]
             geom = {"name": f"strut {strut}", "type": "capsule", "fromto": ends, "size": size}
             add_element(body, "geom", **geom, rgba=STRUT_COLOUR, **_ALONE)
-
-
-def _add_key_frame(model: Element, structure: Structure, state: Array) -> None:
-    """Adds the key frame "rest" with the poses of a state."""
-    poses = state[: 7 * len(structure.bodies)].reshape(-1, 7)
-    qpos = np.hstack([poses[:, 4:], poses[:, :4]])
-    add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
 
 
 def _contact(robot: Robot, mass: float) -> dict:

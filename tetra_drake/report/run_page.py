@@ -39,15 +39,16 @@ from tetra_drake.scenario.units import Units
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites.csv"
 
-_OF_THE_GAIT = ("gait_diagram", "time_lapse")
-_OF_EVOLUTION = (
-    "fitness_of_trials",
-    "before_and_after",
-    "initial_distances",
-    "initial_fitness",
-    "map_of_gaits",
-)
-"""Names of the figures in each part of the report; other figures are in the part "forces"."""
+_PARTS = {
+    "gait_diagram": "gait",
+    "time_lapse": "gait",
+    "fitness_of_trials": "evolution",
+    "before_and_after": "evolution",
+    "initial_distances": "evolution",
+    "initial_fitness": "evolution",
+    "map_of_gaits": "evolution",
+}
+"""Parts of the report by names of figures; other figures are in the part "forces"."""
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
@@ -232,11 +233,8 @@ def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple
     """The figures of each part of the report: image URL, file and caption."""
     parts: dict[str, list[tuple[str, str, str]]] = {"gait": [], "evolution": [], "forces": []}
     for name, caption in captions.items():
-        part = "gait" if name in _OF_THE_GAIT else "forces"
-        if name in _OF_EVOLUTION:
-            part = "evolution"
-        file = f"{name}.svg"
-        parts[part].append((_embedded(folder / file), f"{FIGURES}/{file}", caption))
+        picture = _embedded(folder / f"{name}.svg"), f"{FIGURES}/{name}.svg", caption
+        parts[_PARTS.get(name, "forces")].append(picture)
     return parts
 
 

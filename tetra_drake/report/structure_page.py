@@ -101,10 +101,8 @@ def _bodies_table(study: EquilibriumStudy) -> Table:
         heights = _range(nodes["z"] / units.length, height)
         load = rounded(nodes["load"].sum() / units.force)
         rows.append([body, rounded(1e3 * mass, 4), heights, load])
-    heights, load = (
-        f"heights of nodes ({units.length_name})",
-        f"load on the ground ({units.force_name})",
-    )
+    heights = f"heights of nodes ({units.length_name})"
+    load = f"load on the ground ({units.force_name})"
     return Table(["body", "mass (g)", heights, load], rows)
 
 

@@ -143,15 +143,18 @@ def trials_table(run: Run) -> Table:
     Gaits are described by the main metric of the objective. "in Drake" is the final best gait,
     evaluated again on the Drake diagram. Columns without values are left out.
     """
-    size, title = _size_and_title(_about(run), run.scenario.units)
-    best = {row["trial"]: row for _, row in run.best().iterrows()}
+    name = _about(run)
+    size, title = _size_and_title(name, run.scenario.units)
+    best = run.best().set_index("trial")
     in_drake = run.reevaluations.set_index(["trial", "index"])
     columns = ["trial", f"initial {title}", "best", "in Drake", "evaluations", "failed", "end"]
     rows = []
     for status in run.statuses:
         values = [math.nan] * 3
-        if status.number in best:
-            values = _course(run, best[status.number], in_drake)
+        if status.number in best.index:
+            values[:2] = run.initial_best(status.number)[name], best.loc[status.number, name]
+            key = status.number, best.loc[status.number, "index"]
+            values[2] = in_drake.loc[key, name] if key in in_drake.index else math.nan
         cells = [rounded(value / size) for value in values]
         counts = [f"{status.evaluations}", f"{status.failures or ''}"]
         end = "not finished" if status.stop is None else status.stop.replace(ALL_DONE, "")
@@ -160,15 +163,6 @@ def trials_table(run: Run) -> Table:
     rows = [[row[i] for i in shown] for row in rows]
     names = [columns[i] for i in shown]
     return Table(names, rows, text_columns=(0, names.index("end") if "end" in names else 0))
-
-
-def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[float]:
-    """Main metric (SI) of three gaits for trials_table(): initial gait, best gait, and best gait
-    evaluated again on the Drake diagram."""
-    name, key = _about(run), (best["trial"], best["index"])
-    initial = run.initial_best(best["trial"])
-    again = in_drake.loc[key, name] if key in in_drake.index else math.nan
-    return [initial[name], best[name], float(again)]
 
 
 def _about(run: Run) -> str:
