@@ -94,8 +94,8 @@ def check(drawn_texts, request):
             figure = draw(*data)
             assert figure.get_figwidth() == Look.width_in and figure.get_figheight() <= 10.0
         elif request.param == "column":
-            figure = draw(*data, width_in=3.4, font_size=7.0, title=False)
-            assert figure.get_figwidth() == 3.4 and not figure.get_suptitle()
+            figure = draw(*data, width_in=3.4)
+            assert figure.get_figwidth() == 3.4
         else:
             figure = Figure(figsize=request.param)
             assert draw(*data, figure=figure) is None

@@ -1,8 +1,9 @@
 """The look that figures share, and how they are written."""
 
 import matplotlib
+from matplotlib.figure import Figure
 
-from tetra_drake.figures.style import figure_function, page_of, save_figure
+from tetra_drake.figures.style import common_style, figure_function, page_of, save_figure
 
 
 @figure_function
@@ -50,3 +51,10 @@ def test_ticks_have_the_common_look_whoever_draws_them():
     assert {(tick.label1.get_fontsize(), tick.gridline.get_color()) for tick in ticks} == {
         (8.5, "0.86")
     }
+
+
+def test_a_name_is_no_formula_but_a_text_in_the_common_style_may_be():
+    named = figure_function(lambda: page_of(None, height_in=1.0).suptitle("$x^2$").figure)()
+    assert not named.texts[0].get_parse_math()
+    with common_style():
+        assert Figure().text(0.0, 0.0, "$x^2$").get_parse_math()
