@@ -77,7 +77,15 @@ SHOWN = ("cost_of_transport", "tension", "clearance")
 
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
-    "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN, "sensitivity_in", TURNED),
+    "best_gaits": (
+        "trial",
+        "evaluation",
+        "evaluations",
+        "fitness",
+        *SHOWN,
+        "sensitivity_in",
+        TURNED,
+    ),
     "resimulations": ("trial", "setting", "distance_in", TURNED),
     "unseen": ("trial", "seed", "distance_in", "met"),
     "disturbed": ("gait", "undisturbed", *_MEAN, *_KEPT, "failed", "missed"),

@@ -3,7 +3,13 @@
 import matplotlib
 from matplotlib.figure import Figure
 
-from tetra_drake.figures.style import common_style, figure_function, page_of, save_figure
+from tetra_drake.figures.style import (
+    common_style,
+    figure_function,
+    legend_below,
+    page_of,
+    save_figure,
+)
 
 
 @figure_function
@@ -32,6 +38,18 @@ def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
     assert set(files) == {"line.svg", "line.png"}
     assert b"<svg" in files["line.svg"] and b"<dc:date>" not in files["line.svg"]
     assert files["line.png"].startswith(b"\x89PNG")
+
+
+def test_a_legend_is_read_row_by_row():
+    page = Figure(figsize=(6.0, 2.0))
+    with common_style():
+        names = [f"a line of this name, {i}" for i in range(5)]
+        legend_below(page, {name: {} for name in names})
+        page.draw_without_rendering()
+    places = {text.get_text(): text.get_window_extent() for text in page.legends[0].get_texts()}
+    rows = {round(place.y0) for place in places.values()}
+    assert 1 < len(rows) < 5
+    assert sorted(names, key=lambda name: (-round(places[name].y0), places[name].x0)) == names
 
 
 def test_a_figure_can_be_a_pdf(tmp_path):
