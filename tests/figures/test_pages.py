@@ -147,11 +147,8 @@ def test_a_narrow_comparison_has_numbers_of_simulations(tmp_path):
     figure = comparison(compare([path], reach=0.01), width_in=3.4)
     for panel in figure.axes:
         low, high = panel.get_xlim()
-        shown = [label.get_text() for label in panel.get_xticklabels()]
-        assert [shown[i] for i, x in enumerate(panel.get_xticks()) if low <= x <= high] == [
-            "10",
-            "20",
-        ]
+        numbers = zip(panel.get_xticks(), panel.get_xticklabels(), strict=True)
+        assert [text.get_text() for x, text in numbers if low <= x <= high] == ["10", "20"]
 
 
 def test_one_body_has_no_distances_to_others(check):
