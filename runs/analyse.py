@@ -36,6 +36,7 @@ from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.metrics import looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.scenario.units import INCH
@@ -68,17 +69,28 @@ for rounding. Rounding is then a draw like those thirty. Of sixty draws for each
 one in two thousand exceeds three times the largest of thirty others.
 """
 
+TURNED = "heading_change"
+"""Metric that is also recorded if the objective is about turning."""
+
 SHOWN = ("cost_of_transport", "tension", "clearance")
 """Metrics of the best gaits that are shown on pages."""
 
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
-    "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN, "sensitivity_in"),
-    "resimulations": ("trial", "setting", "distance_in"),
+    "best_gaits": (
+        "trial",
+        "evaluation",
+        "evaluations",
+        "fitness",
+        *SHOWN,
+        "sensitivity_in",
+        TURNED,
+    ),
+    "resimulations": ("trial", "setting", "distance_in", TURNED),
     "unseen": ("trial", "seed", "distance_in", "met"),
     "disturbed": ("gait", "undisturbed", *_MEAN, *_KEPT, "failed", "missed"),
 }
-_NUMBERS = [*SHOWN, "sensitivity_in", "distance_in"]
+_NUMBERS = [*SHOWN, "sensitivity_in", "distance_in", TURNED]
 """Columns with numbers that may all be null."""
 
 
@@ -88,10 +100,11 @@ class Analysis:
 
     best_gaits: pandas.DataFrame
     """The fittest gait of each trial. Index: trial. Columns: evaluation, evaluations (of the whole
-    trial), fitness, the metrics SHOWN in SI units, and sensitivity_in (see sensitivity())."""
+    trial), fitness, the metrics SHOWN in SI units, sensitivity_in (see sensitivity()), and TURNED
+    (rad; NaN if the objective is not about turning)."""
     resimulations: pandas.DataFrame
     """Fittest gaits with other engines and laws of friction. Columns: trial, setting, distance_in
-    (NaN if the simulation failed)."""
+    (NaN if the simulation failed), and TURNED as in best_gaits."""
     unseen: pandas.DataFrame
     """Fittest gaits on random ground with UNSEEN seeds, if the scenario has random ground. Columns:
     trial, seed, distance_in (NaN if the simulation failed), met (True if the scenario's
@@ -105,10 +118,11 @@ class Analysis:
         """The trial with the fittest gait."""
         return int(self.best_gaits["fitness"].idxmax())
 
-    def again(self, trial: int, setting: str) -> float:
-        """Distance (in) of a trial's fittest gait with a setting; NaN if it was not simulated."""
+    def again(self, trial: int, setting: str, what: str = "distance_in") -> float:
+        """Distance (in) or TURNED of a trial's fittest gait with a setting; NaN if it was not
+        simulated."""
         rows = self.resimulations.query("trial == @trial and setting == @setting")
-        return float(rows["distance_in"].iloc[0]) if len(rows) else math.nan
+        return float(rows[what].iloc[0]) if len(rows) else math.nan
 
     def undisturbed(self, trial: int) -> float:
         """Distance (in) of a trial's fittest gait on the compiled engine."""
@@ -123,7 +137,8 @@ def load_analysis(directory: Path) -> Analysis:
         frames = {}
         for key, names in _COLUMNS.items():
             # Without rows there are no columns either.
-            frames[key] = pandas.DataFrame(raw[key], columns=None if raw[key] else list(names))
+            rows = [{TURNED: None} | row for row in raw[key]]
+            frames[key] = pandas.DataFrame(rows, columns=None if rows else list(names))
             frames[key] = frames[key][list(names)]
         for frame in frames.values():
             numbers = frame.columns.intersection(_NUMBERS)
@@ -171,9 +186,15 @@ def best_gaits(run: Run) -> list[dict[str, Any]]:
     for _, gait in run.best().iterrows():
         trial = int(gait["trial"])
         row = {"trial": trial, "evaluation": int(gait["index"]), "evaluations": made[trial]}
-        numbers = {name: json_number(float(gait[name])) for name in ("fitness", *SHOWN)}
+        names = ("fitness", *SHOWN, *_turned(run.scenario))
+        numbers = {name: json_number(float(gait[name])) for name in names}
         rows.append(row | numbers)
     return rows
+
+
+def _turned(scenario: Scenario) -> list[str]:
+    """TURNED if the objective is about turning."""
+    return [TURNED] if looks_for_turns(scenario.objective) else []
 
 
 def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list[float]:
@@ -218,6 +239,8 @@ def resimulate(
         for trial in gaits:
             distance = json_number(evaluations[trial].metrics.get("distance", math.nan) / INCH)
             outcome = {"distance_in": distance, "failure": evaluations[trial].failure}
+            for metric in _turned(scenario):
+                outcome[metric] = json_number(evaluations[trial].metrics.get(metric, math.nan))
             rows.append({"trial": trial, "setting": name} | outcome)
     return rows
 

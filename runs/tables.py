@@ -23,7 +23,7 @@ from pathlib import Path
 
 import jinja2
 import numpy as np
-from analyse import MUJOCO, SHOWN, TIGHT, Analysis, load_analysis
+from analyse import MUJOCO, SHOWN, TIGHT, TURNED, Analysis, load_analysis
 from PIL import Image
 from record import DIAGRAM, EXPERIMENTS, FILM, PICTURE, load_times
 from rolling import LAPSE, ROLLING, best_of, load_policies
@@ -35,7 +35,7 @@ from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
-from tetra_drake.scenario.metrics import UNITS
+from tetra_drake.scenario.metrics import UNITS, looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH, SYSTEMS, Units
 
@@ -126,18 +126,22 @@ class Best:
     title: str
     diagram: str
     """File of the picture beside PICTURE."""
-    distances: Mapping[str, float]
-    """Distances (m) by ENGINES; NaN if not simulated."""
+    reached: Mapping[str, float]
+    """Distances (m) by ENGINES, or angles (rad) if the objective is about turning; NaN if not
+    simulated."""
     kept: float
-    """Share of disturbed robots on which it does as well."""
+    """Share of disturbed robots on which it does as well; NaN if it turns."""
     units: Units
+    turns: bool = False
 
     def text(self, engine: str, digits: int = 2) -> str:
-        """The distance on an engine."""
-        distance = self.distances[engine]
-        if math.isnan(distance):
+        """The distance, or the angle, on an engine."""
+        reached = self.reached[engine]
+        if math.isnan(reached):
             return "-"
-        return f"{fixed(distance / self.units.length, digits)} {self.units.length_name}"
+        if self.turns:
+            return f"{math.degrees(reached):.0f}°"
+        return f"{fixed(reached / self.units.length, digits)} {self.units.length_name}"
 
 
 def best_of_all(runs: Runs) -> dict[str, Best]:
@@ -161,11 +165,14 @@ def best_policy() -> Best:
 
 def best_gait(name: str, run: Analysis) -> Best:
     """The best gait of a run."""
-    trial = run.best_trial
-    distances = dict(zip(ENGINES, distances_of(run, trial), strict=True))
-    kept = float(run.disturbed.loc[trial, "kept"])
-    title, units = EXPERIMENTS[name].title, scenario_of(name).units
-    return Best(title, f"{DIAGRAM}.svg", distances, kept, units)
+    trial, title, scenario = run.best_trial, EXPERIMENTS[name].title, scenario_of(name)
+    reached, kept = distances_of(run, trial), float(run.disturbed.loc[trial, "kept"])
+    turns = looks_for_turns(scenario.objective)
+    if turns:
+        again = [run.again(trial, setting, TURNED) for setting in (TIGHT, MUJOCO)]
+        reached, kept = np.array([run.best_gaits.loc[trial, TURNED], *again]), math.nan
+    by_engine = dict(zip(ENGINES, reached, strict=True))
+    return Best(title, f"{DIAGRAM}.svg", by_engine, kept, scenario.units, turns)
 
 
 def distances_of(run: Analysis, trial: int) -> np.ndarray:
@@ -176,7 +183,7 @@ def distances_of(run: Analysis, trial: int) -> np.ndarray:
 
 
 def gallery_table(runs: Runs) -> str:
-    """Table of all runs with the distances of their best gaits, and the work of two cores."""
+    """Table of all runs with what their best gaits reach, and the work of two cores."""
     minutes = {
         name: sum(stage["cores_s"] for stage in stages.values()) / (2 * 60)
         for name, stages in load_times(HERE).items()
@@ -187,9 +194,9 @@ def gallery_table(runs: Runs) -> str:
         diagram = shown(name, best.diagram, f"how {name} moves")
         title = f"[`{name}`]({name}/{README}): {best.title}"
         title += f"<br>{picture} {diagram} [replay]({name}/{REPLAY})"
-        distances = [best.text(engine) for engine in ENGINES]
-        work = fixed(minutes.get(name, math.nan), 0)
-        rows.append([title, *distances, f"{100.0 * best.kept:.0f} %", work])
+        reached = [best.text(engine) for engine in ENGINES]
+        keeps = "-" if math.isnan(best.kept) else f"{100.0 * best.kept:.0f} %"
+        rows.append([title, *reached, keeps, fixed(minutes.get(name, math.nan), 0)])
     rows.append(["all", *["" for _ in ENGINES], "", fixed(sum(minutes.values()), 0)])
     return Table(["experiment", *ENGINES, "keeps", "minutes"], rows).markdown()
 

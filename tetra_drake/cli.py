@@ -483,7 +483,7 @@ def _compare(
             printed = _print(width, font, title=title, pdf=pdf)
             written = save_comparison(compared, out / name, printed)
             print(f"wrote {', '.join(written)} to {out / name}/")
-    if scenarios:
+    if len(by_scenario) > 1:
         means = improvement_over(compared.trials for compared in by_scenario.values())
         print(f"\nMean over {len(by_scenario)} scenarios:\n\n{improvement_text(means)}")
 

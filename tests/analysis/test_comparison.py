@@ -71,7 +71,8 @@ def test_the_interval_of_separated_trials_has_no_width_and_a_single_trial_has_no
     assert found.improvement.loc["b", "a"].tolist() == [0.0, 0.0, 0.0]
     single = found.improvement.loc["a", "c"]
     assert single["probability"] == 1.0 and single[["low", "high"]].isna().all()
-    assert "1.00 (-)" in comparison_text(found)
+    text = comparison_text(found)
+    assert "1.00 (1.00 to 1.00)" in text and text.count("1.00 (") == 1, "c has a single trial"
     assert compare(paths[:1]).improvement.empty
 
 
@@ -113,6 +114,8 @@ def test_runs_are_compared_within_their_scenarios(run, refused):
     assert improvement_over(c.trials for c in found.values()).loc[("x", "y"), "probability"] == 0.75
     with refused("compare", "labels", "expected 4"):
         compare_scenarios(paths, labels=["x"])
+    with refused("compare", "labels", "expected 1"):
+        compare(["no run, which is not read yet"], labels=["x", "y"])
 
 
 def test_the_curve_of_a_run_that_goes_on_ends_with_its_first_trial(run):

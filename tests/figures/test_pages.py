@@ -94,8 +94,8 @@ def check(drawn_texts, request):
             figure = draw(*data)
             assert figure.get_figwidth() == Look.width_in and figure.get_figheight() <= 10.0
         elif request.param == "column":
-            figure = draw(*data, width_in=3.4, font_size=7.0, title=False)
-            assert figure.get_figwidth() == 3.4 and not figure.get_suptitle()
+            figure = draw(*data, width_in=3.4)
+            assert figure.get_figwidth() == 3.4
         else:
             figure = Figure(figsize=request.param)
             assert draw(*data, figure=figure) is None
@@ -140,6 +140,15 @@ def test_figures_of_analyses(check, tmp_path):
     check(comparison, compare(runs, reach=0.01))
     check(map_of_gaits, load_run(write_map(tmp_path / "map", {0: 1.0, 1: 0.4})))
     check(robustness, judgement_by_hand())
+
+
+def test_a_narrow_comparison_has_numbers_of_simulations(tmp_path):
+    path = write_run(tmp_path / "run", [[[(float(i), 0) for i in range(40)]]])
+    figure = comparison(compare([path], reach=0.01), width_in=3.4)
+    for panel in figure.axes:
+        low, high = panel.get_xlim()
+        numbers = zip(panel.get_xticks(), panel.get_xticklabels(), strict=True)
+        assert [text.get_text() for x, text in numbers if low <= x <= high] == ["10", "20"]
 
 
 def test_one_body_has_no_distances_to_others(check):

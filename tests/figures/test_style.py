@@ -1,8 +1,15 @@
 """The look that figures share, and how they are written."""
 
 import matplotlib
+from matplotlib.figure import Figure
 
-from tetra_drake.figures.style import figure_function, page_of, save_figure
+from tetra_drake.figures.style import (
+    common_style,
+    figure_function,
+    legend_below,
+    page_of,
+    save_figure,
+)
 
 
 @figure_function
@@ -33,6 +40,18 @@ def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
     assert files["line.png"].startswith(b"\x89PNG")
 
 
+def test_a_legend_is_read_row_by_row():
+    page = Figure(figsize=(6.0, 2.0))
+    with common_style():
+        names = [f"a line of this name, {i}" for i in range(5)]
+        legend_below(page, {name: {} for name in names})
+        page.draw_without_rendering()
+    places = {text.get_text(): text.get_window_extent() for text in page.legends[0].get_texts()}
+    rows = {round(place.y0) for place in places.values()}
+    assert 1 < len(rows) < 5
+    assert sorted(names, key=lambda name: (-round(places[name].y0), places[name].x0)) == names
+
+
 def test_a_figure_can_be_a_pdf(tmp_path):
     for folder in ("a", "b"):
         save_figure(draw(1.0), tmp_path / folder, "line", kinds=["pdf"])
@@ -50,3 +69,10 @@ def test_ticks_have_the_common_look_whoever_draws_them():
     assert {(tick.label1.get_fontsize(), tick.gridline.get_color()) for tick in ticks} == {
         (8.5, "0.86")
     }
+
+
+def test_a_name_is_no_formula_but_a_text_in_the_common_style_may_be():
+    named = figure_function(lambda: page_of(None, height_in=1.0).suptitle("$x^2$").figure)()
+    assert not named.texts[0].get_parse_math()
+    with common_style():
+        assert Figure().text(0.0, 0.0, "$x^2$").get_parse_math()

@@ -34,12 +34,15 @@ def test_the_metrics_are_printed_in_the_units_of_people_the_objectives_first(tin
     assert next(iter(shown)) == "heading change (deg)"
 
 
-def test_metrics_that_are_zero_or_missing_have_no_row(result):
-    nothing = dict.fromkeys(("twist", "lifted"), 0.0) | {"tension": math.nan, "clearance": 1e-9}
-    metrics = dataclasses.replace(result.metrics, **nothing)
-    shown = numbers(result_text(dataclasses.replace(result, metrics=metrics)))
-    assert "speed (in/s)" in shown
-    assert not shown.keys() & {"twist (in)", "lifted (%)", "tension (lbf)", "clearance (in)"}
+def test_metrics_that_are_zero_or_missing_have_no_row_unless_the_scenario_is_about_them(result):
+    nothing = dict.fromkeys(("distance", "twist", "lead", "lifted", "clearance"), 0.0)
+    metrics = dataclasses.replace(result.metrics, **nothing, tension=math.nan)
+    about = result.scenario.with_changes({"require": {"clearance": "0 in"}})
+    changed = dataclasses.replace(result, metrics=metrics, scenario=about, fitness=0.0)
+    shown = numbers(result_text(changed))
+    zero = {"distance (in)", "fitness", "twist (in)", "clearance (in)"}
+    assert {"speed (in/s)", *zero} <= shown.keys()
+    assert not shown.keys() & {"lead (in)", "lifted (%)", "tension (lbf)"}
 
 
 def test_requirements_that_are_not_met_are_named(tiny, result):

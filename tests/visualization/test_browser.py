@@ -302,13 +302,13 @@ def test_a_still_hides_no_instant_by_another(browser, trajectory, tmp_path, spee
     [("talk.mp4", "side"), pytest.param("talk.gif", "top", marks=pytest.mark.slow)],
 )
 def test_a_video_has_its_size_rate_and_speed(replay, tmp_path, name, view):
-    """The motion of 5 s takes 0.5 s at ten times its speed."""
+    """The motion of 5 s takes 0.5 s at ten times its speed. The page's texts would fill it."""
     reader = pytest.importorskip("imageio_ffmpeg").read_frames
-    settings = {"size": (320, 240), "fps": 10.0, "view": view, "speed": 10.0}
+    settings = {"size": (320, 180), "fps": 10.0, "view": view, "speed": 10.0}
     with ThreadPoolExecutor(1) as pool:  # this thread may have the browser of other tests
         pool.submit(make_video, replay, tmp_path / name, **settings).result()
     about, *frames = reader(str(tmp_path / name))
-    assert about["size"] == (320, 240) and about["fps"] == pytest.approx(10.0)
+    assert about["size"] == (320, 180) and about["fps"] == pytest.approx(10.0)
     assert len(frames) == 5 and frames[0] != frames[-1]
 
 

@@ -103,6 +103,7 @@ def compare(
     Raises:
         InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
     """
+    _check_labels(labels, len(directories))
     return _compared(_labelled([load_run(directory) for directory in directories], labels), reach)
 
 
@@ -148,8 +149,8 @@ def compare_scenarios(
     labels: Sequence[str] | None = None,
 ) -> dict[str, Compared]:
     """Compares the runs of each scenario, by the name of the scenario; see compare()."""
+    _check_labels(labels, len(directories))
     names = labels or [Path(directory).resolve().name for directory in directories]
-    _check_labels(names, len(directories))
     groups: dict[str, list[tuple[Run, str]]] = {}
     for directory, label in zip(directories, names, strict=True):
         run = load_run(directory)
@@ -202,8 +203,8 @@ def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
     return pandas.DataFrame(rows, columns=columns).set_index(["run", "other"])
 
 
-def _check_labels(labels: Sequence[str], count: int) -> None:
-    if len(labels) != count:
+def _check_labels(labels: Sequence[str] | None, count: int) -> None:
+    if labels and len(labels) != count:
         raise InputError("compare", "labels", f"found {len(labels)}, expected {count}")
 
 
@@ -285,7 +286,6 @@ def _labelled(runs: Sequence[Run], given: Sequence[str] | None) -> dict[str, Run
     """Runs by their given labels; otherwise by the name of the folder, or by path if two folders
     have the same name."""
     labels = list(given or [run.directory.resolve().name for run in runs])
-    _check_labels(labels, len(runs))
     if given is None and len({*labels}) < len(labels):
         labels = [str(run.directory) for run in runs]
     labelled: dict[str, Run] = {}

@@ -7,24 +7,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.analysis.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
     AS_USUAL,
     Drawn,
+    Look,
     Page,
     Print,
     figure_function,
     legend_below,
     line_style,
     page_of,
+    page_width,
     save_findings,
     set_title,
 )
 
 _FIRST = 10  # simulations; the axes of costs begin here
+_POWERS = 10.0 ** np.arange(9)
+_BESIDE = 5.5  # least width (in) of two panels side by side, with letters of the usual size
 
 
 def save_comparison(compared: Compared, folder: Path, printed: Print = AS_USUAL) -> list[str]:
@@ -45,28 +50,32 @@ def comparison(compared: Compared, *, figure: Page | None = None) -> Drawn:
 
     If a distance to reach was given, a second panel shows the share of trials that have reached it.
     Finished trials keep their last values. A dot marks the end of a run."""
-    columns, unit = 1 if compared.reach is None else 2, compared.scenario.units
+    kinds, unit = 1 if compared.reach is None else 2, compared.scenario.units
     labels = []
     for label, count in compared.runs["trials"].items():
         labels.append(f"{label} (1 trial)" if count == 1 else f"{label} ({count} trials)")
-    page = page_of(figure, height_in=3.4 + 0.1 * len(labels))
-    row = page.subplots(1, columns, squeeze=False)[0]
+    is_narrow = page_width(figure) < _BESIDE * rcParams["font.size"] / Look.font_size
+    rows, columns = (kinds, 1) if is_narrow else (1, kinds)
+    page = page_of(figure, height_in=1.2 + 2.2 * rows + 0.1 * len(labels))
+    panels = page.subplots(rows, columns, squeeze=False).ravel()
     ends = compared.curves.groupby("run", sort=False)["cost"].max()
     first = min(_FIRST, ends.min())
     for series, label in enumerate(compared.runs.index):
         style = {**line_style(series), "drawstyle": "steps-post", "marker": "o", "markevery": [-1]}
-        _draw_best(row[0], compared, label, first, style)
+        _draw_best(panels[0], compared, label, first, style)
         if compared.reach is not None:
-            _draw_reached(row[1], compared, label, ends[label], style)
+            _draw_reached(panels[1], compared, label, ends[label], style)
             reached = f"{compared.reach / unit.length:.4g} {unit.length_name}"
-            row[1].set_ylabel(f"{reached} reached (% of trials)")
-    ticks = (1.0, 3.0) if ends.max() > 100 * first else (1.0, 2.0, 5.0)
-    for panel in row:
+            panels[1].set_ylabel(f"{reached} reached (% of trials)")
+    decades = math.log10(ends.max() / first)
+    ticks = (1.0, 2.0, 5.0) if decades < 2.0 else (1.0, 3.0) if decades < 3.0 else (1.0,)
+    for panel in panels:
         panel.set(xlabel="simulations", xscale="log", xlim=(first, 1.1 * ends.max()))
-        panel.xaxis.set_major_locator(LogLocator(subs=ticks))
+        # A locator that counts ticks by the width leaves a narrow panel without any.
+        panel.xaxis.set_major_locator(FixedLocator(np.outer(_POWERS, ticks).ravel().tolist()))
         panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         panel.xaxis.set_minor_formatter(NullFormatter())
-    row[0].set_ylabel("best fitness so far")
+    panels[0].set_ylabel("best fitness so far")
     legend_below(page, {label: line_style(series) for series, label in enumerate(labels)})
     set_title(page, "How well runs search: median and quartiles over trials")
     return page

@@ -80,8 +80,7 @@ def relative_distances(
     panel.set_ylabel(folded(f"distance from {first} ({unit.length_name})", 0.6 * height))
     if names:
         page.legend(loc="outside right upper", reverse=True, frameon=False)
-    title = f"Distance of each body from {first}"  # the legend is beside it
-    set_title(page, folded(title, 2.0 * width, size=rcParams["figure.titlesize"]))
+    set_title(page, f"Distance of each body from {first}", share=0.6)  # beside the legend
     return page
 
 

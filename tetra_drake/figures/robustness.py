@@ -127,7 +127,7 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
         ylim=(-margin, len(gaits) - 1 + margin),
         xmargin=0.02,
     )
-    name_panel(axes, "distance in each draw, by gait")
+    name_panel(axes, "distance in each draw")
     axes.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
     axes.grid(visible=False, axis="y")
 
@@ -136,21 +136,20 @@ def _draw_alone(axes: Axes, changes: pandas.DataFrame, unit: Units) -> None:
     rows, worst = range(len(changes)), changes["worst"].clip(upper=0.0).abs() / unit.length
     axes.hlines(rows, 0.0, worst, **_GREATEST)
     axes.barh(rows, changes["median"] / unit.length, height=0.6, color=OKABE_ITO["orange"])
-    axes.set_xlabel(f"change of distance ({unit.length_name})")
     name_panel(axes, "one change alone")
-    _finish(axes, len(changes))
+    _finish(axes, len(changes), f"change of distance ({unit.length_name})")
 
 
 def _draw_correlations(axes: Axes, changes: pandas.DataFrame, noise: float) -> None:
     axes.axvspan(0.0, noise, color=SHADE, linewidth=0.0, zorder=0)
     sizes, sky_blue = changes["correlation_size"], OKABE_ITO["sky_blue"]
     axes.barh(range(len(changes)), sizes, height=0.6, color=sky_blue)
-    axes.set_xlabel("size of rank correlation")
     name_panel(axes, "all changes together")
-    _finish(axes, len(changes))
+    _finish(axes, len(changes), "size of rank correlation")
 
 
-def _finish(axes: Axes, rows: int) -> None:
+def _finish(axes: Axes, rows: int, label: str) -> None:
+    axes.set_xlabel(folded(label, _NAMES * page_width(axes.get_figure(root=False))))
     axes.set(xmargin=0.05, ylim=(-0.7, rows - 0.3))
     axes.set_xlim(left=0.0)
     axes.grid(visible=False, axis="y")

@@ -149,6 +149,7 @@ def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
     def drawn(*args: Any, units: str | None = None, **kwargs: Any) -> Drawn:
         look = Look(**{name: kwargs.pop(name) for name in vars(Look()) if name in kwargs})
         with shown_in(units), common_style(look):
+            rcParams["text.parse_math"] = False  # a name may hold a dollar sign
             page = draw(*args, **kwargs)
         if not look.title:
             page.suptitle("").set_in_layout(False)
@@ -234,9 +235,10 @@ def panels_in_columns(
     return list(grid[:count])
 
 
-def set_title(page: Page, title: str) -> None:
-    """Writes the title of a figure at the upper left."""
-    page.suptitle(title, x=0.01, ha="left")
+def set_title(page: Page, title: str, *, share: float = 1.0) -> None:
+    """Writes the title of a figure at the upper left, in lines of a share of the page's width."""
+    text = folded(title, share * page_width(page), size=rcParams["figure.titlesize"])
+    page.suptitle(text, x=0.01, ha="left")
 
 
 def name_panel(panel: Axes, name: str) -> None:
@@ -252,16 +254,18 @@ def write_beside(panel: Axes, height: float, text: str) -> None:
 
 def legend_below(page: Page, lines: Mapping[str, Any], *others: Any) -> None:
     """Adds a legend below all panels: line styles by label, and other artists. It has as many
-    columns as fit on the page."""
+    columns as fit on the page, and is read row by row."""
     width = page_width(page) - _HANDLE * rcParams["legend.fontsize"] / 72.0
     texts = {folded(text, width): style for text, style in lines.items()}
     handles = [*(Line2D([], [], label=text, **style) for text, style in texts.items()), *others]
-    below: Any = {"handles": handles, "loc": "outside lower center", "frameon": False}
-    columns, legend = len(handles), page.legend(ncols=len(handles), **below)
-    while columns > 1 and legend.get_window_extent().width > page.bbox.width:
-        legend.remove()
-        columns -= 1
+    for columns in range(len(handles), 0, -1):
+        # Matplotlib fills column by column.
+        by_column = [handle for column in range(columns) for handle in handles[column::columns]]
+        below: Any = {"handles": by_column, "loc": "outside lower center", "frameon": False}
         legend = page.legend(ncols=columns, **below)
+        if columns == 1 or legend.get_window_extent().width <= page.bbox.width:
+            return
+        legend.remove()
 
 
 def save_findings(

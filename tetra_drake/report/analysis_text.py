@@ -75,8 +75,10 @@ def comparison_text(compared: Compared) -> str:
             "median (quartiles) over trials."
         )
     texts = [
-        f"Best fitness of each trial after {compared.common} simulations, where the shortest run "
-        "ends, and at its end:\ninterquartile mean over trials (95 % confidence interval).",
+        f"Best fitness of each trial after {compared.common} simulations, where the first run "
+        "ends, and at its end:\ninterquartile mean over trials (95 % confidence interval). A run "
+        "ends with its longest trial,\nor with the first unfinished one. Simulations: median over "
+        "trials.",
         _fitness_table(compared).text(),
         *([] if compared.improvement.empty else [improvement_text(compared.improvement)]),
         distances,
@@ -90,13 +92,13 @@ def improvement_text(improvement: pandas.DataFrame) -> str:
     """Table of the probabilities of improvement, with their intervals. See Compared.improvement."""
     cells = {}
     for pair, row in improvement.iterrows():
-        interval = "-" if math.isnan(row["low"]) else f"{fixed(row['low'])} to {fixed(row['high'])}"
-        cells[pair] = f"{fixed(row['probability'])} ({interval})"
+        probability, low, high = (fixed(row[name]) for name in ("probability", "low", "high"))
+        cells[pair] = "-" if math.isnan(row["low"]) else f"{probability} ({low} to {high})"
     labels = list(dict.fromkeys(run for run, _ in cells))
     rows = [[run, *(cells.get((run, other), "") for other in labels)] for run in labels]
     return (
         "Probability that a trial of the row's run ends fitter than a trial of the column's run\n"
-        "(95 % confidence interval, - where a run has a single trial).\n"
+        "(95 % confidence interval); - where a run has a single trial.\n"
         + Table(["run", *labels], rows).text()
     )
 

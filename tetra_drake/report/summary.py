@@ -30,7 +30,7 @@ _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
 """Notes on numbers, by name."""
 
 _NOTHING = 5e-4
-"""Threshold for a row of a table: a row is left out if all its numbers, as shown, are smaller."""
+"""Threshold for a row of a table: it may be left out if all its numbers, as shown, are smaller."""
 
 
 def metrics_table(
@@ -39,16 +39,18 @@ def metrics_table(
     """Table of fitness and metrics, with a column per gait. A gait is a row of `Run.evaluations`.
 
     The first row is the main metric of the objective. Numbers that are zero for all gaits are left
-    out.
+    out, unless the scenario's objective or requirements name them.
     """
     *_, last = gaits.values()
     first = headline_metric(scenario.objective, last)
     names = dict.fromkeys([first, "fitness", "worst_distance", *METRICS, "kept"])
+    always = {"fitness", "distance", *scenario.objective, *scenario.require}
     rows = []
     for name in names:
         size, title = _size_and_title(name, scenario.units)
         values = [gait.get(name, math.nan) / size for gait in gaits.values()]
-        if any(math.isfinite(value) and abs(value) >= _NOTHING for value in values):
+        has_some = any(math.isfinite(value) and abs(value) >= _NOTHING for value in values)
+        if has_some or name in always:
             digits = [fixed(x, 0) if name in _SHARES else rounded(x) for x in values]
             rows.append([title, *digits, _NOTES.get(name, "")])
     return Table(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))

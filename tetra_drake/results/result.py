@@ -119,7 +119,7 @@ class SimulationResult:
 class ReplayFrame:
     """Replay page in a notebook, shown by IPython's rich display."""
 
-    page: str
+    page: str = field(repr=False)
     height: int
 
     def _repr_html_(self) -> str:

@@ -354,3 +354,8 @@ _WALKED = ("distance", "steady_distance", "speed")
 def looks_for_distance(objective: Mapping[str, float]) -> bool:
     """True if an objective rewards long distances."""
     return any(objective.get(name, 0.0) > 0.0 for name in _WALKED)
+
+
+def looks_for_turns(objective: Mapping[str, float]) -> bool:
+    """True if an objective is about turning, not about distances."""
+    return "heading_change" in objective and not looks_for_distance(objective)

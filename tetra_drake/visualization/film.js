@@ -179,6 +179,8 @@ window.addEventListener("load", () => {
   }
   let standing = null;  // times at which a standing camera sees the robot
   function frame_picture() {
+    // In a window too low for a picture; no camera fits, and none would come back from infinity.
+    if (viewer.dom_element.offsetHeight <= 0) return;
     const back = time;
     viewer.camera.updateProjectionMatrix();
     if (standing) {

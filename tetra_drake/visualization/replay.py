@@ -24,7 +24,7 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.path import follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
-from tetra_drake.scenario.metrics import looks_for_distance
+from tetra_drake.scenario.metrics import looks_for_turns
 from tetra_drake.scenario.units import Units
 from tetra_drake.visualization.scene import (
     COLOURS,
@@ -183,8 +183,7 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     """The robot's distance in each frame. If the objective is about turning, its change of
     heading."""
     structure, objective = robot.structure, robot.scenario.objective
-    turns = "heading_change" in objective and not looks_for_distance(objective)
-    if structure.points_ahead and turns:
+    if structure.points_ahead and looks_for_turns(objective):
         poses = np.concatenate([frames["q_WB"].values, frames["p_WB"].values], axis=-1)
         heading = np.rad2deg(follow(frames["time"].values, poses, structure).heading)
         values, what, unit, digits = heading - heading[0], "turned", "°", 0

@@ -31,6 +31,7 @@ KINDS: dict[str, Any] = {
     ".gif": {
         "codec": "gif",
         "pix_fmt_out": "rgb8",
+        "ffmpeg_log_level": "error",  # else a line for every equal pair of colours
         "output_params": ["-filter_complex", "split[a][b];[a]palettegen[p];[b][p]paletteuse"],
     },
 }
