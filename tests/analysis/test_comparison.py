@@ -113,6 +113,8 @@ def test_runs_are_compared_within_their_scenarios(run, refused):
     assert improvement_over(c.trials for c in found.values()).loc[("x", "y"), "probability"] == 0.75
     with refused("compare", "labels", "expected 4"):
         compare_scenarios(paths, labels=["x"])
+    with refused("compare", "scenarios", "tiny, other", "two of one scenario"):
+        compare_scenarios(paths[1:3])
 
 
 def test_the_curve_of_a_run_that_goes_on_ends_with_its_first_trial(run):
