@@ -259,6 +259,10 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
     weight = Robot.of(hung()).weight
     assert fitted.stiffness == pytest.approx(weight / 0.017, rel=1e-5)
     assert f"{fitted.stiffness:.1f} ± " in printed
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(FIT_FILE.replace("100 N/m", "300 N/m"))
+    assert main(["fit", str(wrong), "--out", str(out)]) == 2
+    assert f"{wrong}: parameters.{STIFFNESS}: " in capsys.readouterr().err
     assert pandas.read_csv(out / "parameters.csv")["value"][0] == pytest.approx(fitted.stiffness)
     assert json.loads((out / "summary.json").read_text())["evaluations"] > 3
     page = (out / "README.md").read_text()
@@ -283,9 +287,9 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
 )
 def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, tmp_path, refused):
     (case, *_) = pulled_down(210.0, 0.39, np.zeros(4))
-    source = "fit" if named == "parameters" else "scenario anchored"
-    with refused(source, named):
-        fit(hung(), [case], parameters, out=tmp_path / "fit")
+    key = named if named == "parameters" else f"parameters.{named}"
+    with refused("fit.yaml", key):
+        fit(hung(), [case], parameters, out=tmp_path / "fit", source="fit.yaml")
     assert not (tmp_path / "fit").exists()
 
 
