@@ -127,7 +127,13 @@ def test_predictions_that_are_not_smooth_have_no_intervals(monkeypatch):
     monkeypatch.setattr(measurements._MeasuredRest, "predict", rough)
     found = fit_values(hung(), cases, BOUNDS)
     assert found.parameters["determined"].all() and found.parameters["low"].isna().all()
-    assert any(STIFFNESS in warning for warning in found.warnings)
+    (warning,) = [each for each in found.warnings if STIFFNESS in each and "smooth" in each]
+    # Whether the values may be far off follows from the misfit.
+    assert found.misfit < 1.0 and "explain" in warning and "better" not in warning
+    false = [case.model_copy(update={"position_uncertainty": NOISE / 100.0}) for case in cases]
+    found = fit_values(hung(), false, BOUNDS)
+    (warning,) = [each for each in found.warnings if STIFFNESS in each and "smooth" in each]
+    assert found.misfit > 10.0 and "better" in warning and "explain" not in warning
 
 
 def test_a_search_finds_the_deepest_of_many_minima(monkeypatch):

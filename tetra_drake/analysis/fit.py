@@ -45,6 +45,8 @@ NORMAL = 1.96
 """Half width of a 95 % interval in standard deviations."""
 SAME_DIRECTION = 1e-10
 """Singular value, as a share of the greatest, below which the data say nothing of a direction."""
+LIKELY = 3.0
+"""Excess of the misfit over 1, in standard deviations, up to which a fit explains the data."""
 STRONG = 0.95
 """Correlation above which two parameters are named."""
 HUGE = 1e200
@@ -424,6 +426,7 @@ def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: floa
     misfit = problem.misfit(last)
     half, correlation = _uncertainty(problem, x, misfit)
     determined, smooth = np.isfinite(half), problem.roughness(x) < ROUGH
+    explained = misfit <= 1.0 + LIKELY * math.sqrt(2.0 / max(1, last.size - x.size))
     known = determined & (smooth | ~determined).all()
     values, given = x * problem.scale, pandas.DataFrame(problem.parameters).set_index("key")
     table = pandas.DataFrame(
@@ -453,7 +456,7 @@ def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: floa
         },
         misfit=misfit,
         start_misfit=problem.misfit(first),
-        warnings=_warnings(table, correlations),
+        warnings=_warnings(table, correlations, explained=explained),
         evaluations=problem.evaluations,
         wall_time=wall_time,
     )
@@ -478,8 +481,11 @@ def _uncertainty(problem: _Problem, x: np.ndarray, misfit: float) -> tuple[np.nd
     return half, covariance / np.outer(spread, spread)
 
 
-def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[str]:
-    """What a reader of a fit has to know."""
+def _warnings(
+    table: pandas.DataFrame, correlations: pandas.DataFrame, *, explained: bool
+) -> list[str]:
+    """What a reader of a fit has to know. `explained` is True if the residuals are as small as the
+    uncertainties."""
     warnings = []
     for key, row in table.iterrows():
         value, width = row["value"], row["most"] - row["least"]
@@ -496,7 +502,8 @@ def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[s
             warnings.append(f"the data hardly tell {one} from {listed(others)}")
     rough = [str(key) for key in determined if not table["smooth"][key]]
     if rough:
-        problem = f"the predictions are not smooth in {listed(rough)}"
-        advice = "a shorter motion, or a larger uncertainty, may help"
-        warnings.append(f"{problem}: the values may be far off, and have no intervals; {advice}")
+        problem = f"the predictions are not smooth in {listed(rough)}, so intervals are unknown"
+        better = "a search of all values, a shorter motion, or a larger uncertainty may help"
+        meaning = "the values explain the data" if explained else f"better ones may exist; {better}"
+        warnings.append(f"{problem}; {meaning}")
     return warnings
