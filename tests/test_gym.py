@@ -1,5 +1,8 @@
 """Environments of Gymnasium."""
 
+import importlib
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
@@ -115,3 +118,25 @@ def test_robots_side_by_side_begin_again_when_they_end(short):
     assert not np.array_equal(begun, start), "another draw"
     assert many.step(still)[3].sum() == 0
     assert np.array_equal(many.reset(seed=5)[0], start)
+
+
+@pytest.mark.parametrize("action", [np.zeros(3), np.zeros((2, 4)), 0.0, "left"])
+def test_an_action_of_wrong_shape_is_refused(short, action, refused):
+    env = TensegrityEnv(short, grouped=True)
+    env.reset(seed=0)
+    with refused("tetra_drake.gym", "actions", "found", "(4,)"):
+        env.step(action)
+
+
+def test_actions_of_wrong_shape_are_refused(short, refused):
+    many = TensegrityVectorEnv(WIDEST, short)
+    many.reset(seed=0)
+    with refused("tetra_drake.gym", "actions", f"found the shape (8,), expected ({WIDEST}, 8)"):
+        many.step(np.zeros(8))
+
+
+def test_without_gymnasium_the_import_tells_what_to_install(monkeypatch, refused):
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    monkeypatch.delitem(sys.modules, "tetra_drake.gym")
+    with refused("tetra_drake.gym", "", "tetra_drake[gym]"):
+        importlib.import_module("tetra_drake.gym")

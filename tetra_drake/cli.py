@@ -526,6 +526,7 @@ def _fit(
             search=search,
             out=out,
             say=_say,
+            source=source,
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None

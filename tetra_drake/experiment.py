@@ -135,6 +135,7 @@ def fit(
     search: bool = False,
     out: str | Path | None = None,
     say: Say | None = None,
+    source: object = "fit",
 ) -> Fit:
     """Fits values of a scenario to measurements of a robot, by bounded least squares.
 
@@ -158,6 +159,7 @@ def fit(
         out: a folder for the fitted scenario, tables, figure and page. It also keeps each
             evaluation, so that an interrupted fit goes on where it was.
         say: is told of each iteration.
+        source: file with the parameters, for errors.
 
     Raises:
         InputError: names what cannot be used.
@@ -174,6 +176,7 @@ def fit(
         search=search,
         folder=folder,
         say=say,
+        source=source,
     )
     if folder is not None:
         from tetra_drake.report.fit_page import save_fit

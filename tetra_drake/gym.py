@@ -31,19 +31,25 @@ from __future__ import annotations
 
 from typing import Any
 
-import gymnasium
 import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 
-from tetra_drake.engines.simulation import Simulation
-from tetra_drake.errors import SimulationFailure
+from tetra_drake.engines.simulation import Simulation, checked_actions
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.metrics import pose_fitness, poses_of
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import AMPLITUDE, Robot
 from tetra_drake.scenario.load import GivenScenario
 from tetra_drake.scenario.scenario import Scenario
+
+try:
+    import gymnasium
+    from gymnasium import spaces
+    from gymnasium.vector import AutoresetMode, VectorEnv
+    from gymnasium.vector.utils import batch_space
+except ImportError:
+    raise InputError(
+        "tetra_drake.gym", "", "needs Gymnasium: pip install 'tetra_drake[gym]'"
+    ) from None
 
 Info = dict[str, Any]
 
@@ -136,9 +142,11 @@ class _Episodes:
 
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators for actions of the environment."""
+        shape = self.simulation.count, *self.action_space.shape
+        actions = checked_actions(actions, shape, source="tetra_drake.gym")
         cpg = self._scenario.cpg
         amplitude = abs(cpg.gain) * AMPLITUDE * abs(cpg.external_input)
-        signals = amplitude * np.asarray(actions, dtype=float)[:, self._groups]
+        signals = amplitude * actions[:, self._groups]
         setpoints: np.ndarray = self._scenario.actuation.commands(
             self._cables._replace(signal=signals)
         )
@@ -191,8 +199,7 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._episodes.reset(draw, np.array([0]))[0], {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        given = np.asarray(action)[np.newaxis]
-        observations, rewards, terminated, truncated = self._episodes.step(given)
+        observations, rewards, terminated, truncated = self._episodes.step(action)
         return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), {}
 
 

@@ -116,6 +116,8 @@ def test_runs_are_compared_within_their_scenarios(run, refused):
         compare_scenarios(paths, labels=["x"])
     with refused("compare", "labels", "expected 1"):
         compare(["no run, which is not read yet"], labels=["x", "y"])
+    with refused("compare", "scenarios", "tiny, other", "two of one scenario"):
+        compare_scenarios(paths[1:3])
 
 
 def test_the_curve_of_a_run_that_goes_on_ends_with_its_first_trial(run):

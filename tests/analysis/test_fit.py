@@ -127,7 +127,13 @@ def test_predictions_that_are_not_smooth_have_no_intervals(monkeypatch):
     monkeypatch.setattr(measurements._MeasuredRest, "predict", rough)
     found = fit_values(hung(), cases, BOUNDS)
     assert found.parameters["determined"].all() and found.parameters["low"].isna().all()
-    assert any(STIFFNESS in warning for warning in found.warnings)
+    (warning,) = [each for each in found.warnings if STIFFNESS in each and "smooth" in each]
+    # Whether the values may be far off follows from the misfit.
+    assert found.misfit < 1.0 and "explain" in warning and "better" not in warning
+    false = [case.model_copy(update={"position_uncertainty": NOISE / 100.0}) for case in cases]
+    found = fit_values(hung(), false, BOUNDS)
+    (warning,) = [each for each in found.warnings if STIFFNESS in each and "smooth" in each]
+    assert found.misfit > 10.0 and "better" in warning and "explain" not in warning
 
 
 def test_a_search_finds_the_deepest_of_many_minima(monkeypatch):
@@ -259,6 +265,10 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
     weight = Robot.of(hung()).weight
     assert fitted.stiffness == pytest.approx(weight / 0.017, rel=1e-5)
     assert f"{fitted.stiffness:.1f} ± " in printed
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(FIT_FILE.replace("100 N/m", "300 N/m"))
+    assert main(["fit", str(wrong), "--out", str(out)]) == 2
+    assert f"{wrong}: parameters.{STIFFNESS}: " in capsys.readouterr().err
     assert pandas.read_csv(out / "parameters.csv")["value"][0] == pytest.approx(fitted.stiffness)
     assert json.loads((out / "summary.json").read_text())["evaluations"] > 3
     page = (out / "README.md").read_text()
@@ -283,9 +293,9 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
 )
 def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, tmp_path, refused):
     (case, *_) = pulled_down(210.0, 0.39, np.zeros(4))
-    source = "fit" if named == "parameters" else "scenario anchored"
-    with refused(source, named):
-        fit(hung(), [case], parameters, out=tmp_path / "fit")
+    key = named if named == "parameters" else f"parameters.{named}"
+    with refused("fit.yaml", key):
+        fit(hung(), [case], parameters, out=tmp_path / "fit", source="fit.yaml")
     assert not (tmp_path / "fit").exists()
 
 

@@ -144,3 +144,40 @@ def test_the_rates_of_the_cables_are_the_slopes_of_their_lengths(robot):
     assert cables.HasDirectFeedthrough(
         inputs["signals"], cables.GetOutputPort("tensions").get_index()
     )
+
+
+class Ports(LeafSystem):
+    """A controller with output ports of these names and sizes, which are 1 where they count."""
+
+    def __init__(self, inputs: dict[str, int], outputs: dict[str, int]) -> None:
+        super().__init__()
+        for name, size in inputs.items():
+            self.DeclareVectorInputPort(name, size)
+        for name, size in outputs.items():
+            ones = np.ones(size)
+            self.DeclareVectorOutputPort(
+                name, size, lambda _, out, ones=ones: out.SetFromVector(ones)
+            )
+
+
+def test_a_controller_may_have_further_outputs(walking):
+    diagram = MakeTensegrityDiagram(
+        controlled_robot(walking), None, controller=Ports({}, {"errors": 2, "signals": 8})
+    )
+    signals = diagram.GetOutputPort("signals").Eval(diagram.CreateDefaultContext())
+    assert signals.tolist() == [1.0] * 8
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "facts"),
+    [
+        ({}, {}, ("no output ports", "'signals'", "8")),
+        ({}, {"y": 8}, ("found y", "'signals'", "8")),
+        ({}, {"signals": 7}, ("'signals'", "size 7", "8")),
+        ({"lengths": 23}, {"signals": 8}, ("'lengths'", "size 23", "24")),
+        ({"state": 12}, {"signals": 8}, ("'state'", "size 12", "65")),
+    ],
+)
+def test_a_controller_of_other_ports_is_refused(walking, refused, inputs, outputs, facts):
+    with refused("MakeTensegrityDiagram", "controller", *facts):
+        MakeTensegrityDiagram(controlled_robot(walking), None, controller=Ports(inputs, outputs))

@@ -107,3 +107,15 @@ def test_an_error_of_an_objective_in_lanes_ends_the_run(tiny, vectors):
     evaluate = GaitEvaluation(tiny.with_changes({"engine": "!Compiled"}), objective)
     with InLanes(evaluate, LanePool(1)) as lanes, pytest.raises(ZeroDivisionError, match="mine"):
         evaluated(lanes, tasks_of(vectors))
+
+
+@pytest.mark.parametrize("returned", ["far", "3.2", None, [1.0], np.zeros(2), 1j])
+def test_an_objective_that_returns_no_number_is_named_with_what_it_returned(
+    tiny, vectors, refused, monkeypatch, returned
+):
+    def judge(result):
+        return returned
+
+    monkeypatch.setattr("tetra_drake.evolution.evaluation.simulate", lambda **_: None)
+    with refused("objective", f"{__name__}.{judge.__qualname__}", f"returned {returned!r}"):
+        GaitEvaluation(tiny, judge)(Task(vectors[0]))

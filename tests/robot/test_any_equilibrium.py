@@ -276,17 +276,40 @@ def test_stiffness_is_how_forces_change_where_struts_touch(c, d):
         assert 0.5 * (behind - ahead) @ motion == pytest.approx(expected, abs=error)
 
 
-def test_a_structure_file_may_have_struts_that_overlap(tmp_path):
-    text = """
+def test_struts_whose_axes_meet_have_a_finite_stiffness():
+    tree = {
+        "nodes": {"a": [-0.1, 0, 0.1], "b": [0.1, 0, 0.1], "c": [0, -0.1, 0.1], "d": [0, 0.1, 0.1]},
+        "struts": {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}},
+        "cables": {"slack": LOOSE | {"pairs": [["a", "c"]]}},
+    }
+    touching = {"strut_contact": "!HuntCrossley {stiffness: 1 MN/m, dissipation: 1 s/m}"}
+    scenario = scenario_of(tree | {"gravity": 0.0}, **touching)
+    structure = Structure.of(scenario.robot.blueprint())
+    resting = Unactuated.of(make_model(scenario, structure))
+    assert not force_at_rest(resting, structure.initial_state).any()
+    assert np.isfinite(stiffness_at_rest(resting)).all()
+
+
+CROSSED = """
 unit: m
-nodes: {a: [-0.1, 0, 0], b: [0.1, 0, 0], c: [0, -0.1, 0.005], d: [0, 0.1, 0.005]}
+nodes: {a: [-0.1, 0, 0], b: [0.1, 0, 0], c: [0, -0.1, HEIGHT], d: [0, 0.1, HEIGHT]}
 struts:
   bar: {pairs: [[a, b], [c, d]], diameter: 8 mm, density: 1200 kg/m^3, node_diameter: 0 m}
 cables:
   tie: {pairs: [[a, c], [b, d]], stiffness: 100 N/m, damping: 0 N*s/m, free_length: 0.5 m}
 """
-    (tmp_path / "crossed.yaml").write_text(text)
+
+
+def test_a_structure_file_may_have_struts_that_overlap(tmp_path):
+    (tmp_path / "crossed.yaml").write_text(CROSSED.replace("HEIGHT", "0.005"))
     robot = robot_of_file(str(tmp_path / "crossed.yaml"))
     nodes = moved_nodes(robot.structure, robot.equilibrium.state)
     pressed = robot.weight / robot.scenario.strut_contact.stiffness
     assert find_touch(robot.model.struts, nodes, 0, 1).depth < pressed
+
+
+@pytest.mark.parametrize("height", ["0", "1e-16"])
+def test_a_structure_file_may_not_have_struts_whose_axes_meet(height, tmp_path, refused):
+    (tmp_path / "crossed.yaml").write_text(CROSSED.replace("HEIGHT", height))
+    with refused("crossed", "strut_contact", "'a b'", "'c d'", "meet"):
+        robot_of_file(str(tmp_path / "crossed.yaml"))

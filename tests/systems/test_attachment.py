@@ -22,6 +22,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from tetra_drake.physics.cable import CableLaw
+from tetra_drake.physics.contact import NormalForce
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot
@@ -167,6 +168,50 @@ def test_an_unknown_cable_and_a_frame_of_the_world_are_refused(refused):
     ground = make_surface(GroundSection(stiffness=1e3, damping=0.0), Coulomb(), Flat())
     with refused("AddGroundContact", "frames", "world"):
         AddGroundContact(builder, plant, frames=[cables[0].frame_a], ground=ground)
+
+
+@pytest.mark.parametrize(
+    ("constant", "value"),
+    [
+        ("stiffness", -1.0),
+        ("stiffness", 0.0),
+        ("damping", -1e-9),
+        ("free_length", -0.1),
+        ("free_length", math.nan),
+        ("damping", math.inf),
+        ("stiffness", "60 N/m"),
+    ],
+)
+def test_constants_that_no_cable_has_are_refused(constant, value, refused):
+    builder = DiagramBuilder()
+    plant, tip = hinged_rod(builder)
+    cables = tendons(plant, tip, LAW._replace(**{constant: value}))
+    plant.Finalize()
+    with refused("AddCables", f"cables.left.{constant}", str(value)):
+        AddCables(builder, plant, cables=cables)
+
+
+def test_two_cables_of_one_name_are_refused(refused):
+    builder = DiagramBuilder()
+    plant, tip = hinged_rod(builder)
+    cables = tendons(plant, tip)
+    plant.Finalize()
+    with refused("AddCables", "cables.left", "twice"):
+        AddCables(builder, plant, cables=[*cables, cables[0]])
+
+
+@pytest.mark.parametrize(
+    ("constant", "force"),
+    [("stiffness", NormalForce(-1.0, 0.0)), ("damping", NormalForce(1e3, math.nan))],
+)
+def test_constants_that_no_ground_has_are_refused(constant, force, refused):
+    builder = DiagramBuilder()
+    plant, tip = hinged_rod(builder)
+    plant.Finalize()
+    ground = make_surface(GroundSection(stiffness=1e3, damping=0.0), Coulomb(), Flat())
+    with refused("AddGroundContact", f"ground.{constant}"):
+        wrong = ground._replace(normal=np.array(force))
+        AddGroundContact(builder, plant, frames=[tip], ground=wrong)
 
 
 def test_forces_add_to_what_is_connected_to_the_plant(scenario):

@@ -148,13 +148,19 @@ def compare_scenarios(
     reach: float | None = None,
     labels: Sequence[str] | None = None,
 ) -> dict[str, Compared]:
-    """Compares the runs of each scenario, by the name of the scenario; see compare()."""
+    """Compares the runs of each scenario, by the name of the scenario; see compare().
+
+    Raises InputError also if no scenario has two of the runs.
+    """
     _check_labels(labels, len(directories))
     names = labels or [Path(directory).resolve().name for directory in directories]
     groups: dict[str, list[tuple[Run, str]]] = {}
     for directory, label in zip(directories, names, strict=True):
         run = load_run(directory)
         groups.setdefault(run.scenario.name, []).append((run, label))
+    if all(len(group) == 1 for group in groups.values()):
+        found = f"found one run of each scenario: {', '.join(groups)}"
+        raise InputError("compare", "scenarios", f"{found}; expected two of one scenario at least")
     return {
         name: _compared(_labelled([run for run, _ in group], [own for _, own in group]), reach)
         for name, group in groups.items()

@@ -45,6 +45,8 @@ NORMAL = 1.96
 """Half width of a 95 % interval in standard deviations."""
 SAME_DIRECTION = 1e-10
 """Singular value, as a share of the greatest, below which the data say nothing of a direction."""
+LIKELY = 3.0
+"""Excess of the misfit over 1, in standard deviations, up to which a fit explains the data."""
 STRONG = 0.95
 """Correlation above which two parameters are named."""
 HUGE = 1e200
@@ -156,6 +158,7 @@ def fit_values(
     search: bool = False,
     folder: Path | None = None,
     say: Say | None = None,
+    source: object = "fit",
 ) -> Fit:
     """Values of a scenario's keys within bounds for which it meets measurements best.
 
@@ -166,6 +169,7 @@ def fit_values(
         search: searches all values within the bounds for a better start, by CMA-ES.
         folder: keeps each evaluation; another fit to the same data takes them from there.
         say: is told of each iteration.
+        source: file with the parameters, for errors.
 
     Raises:
         InputError: if an argument cannot be used, or the start cannot be simulated.
@@ -173,17 +177,17 @@ def fit_values(
     from scipy.optimize import least_squares
 
     began = time.perf_counter()
-    fitted = [_parameter(scenario, key, bounds) for key, bounds in parameters.items()]
+    fitted = [_parameter(scenario, key, bounds, source) for key, bounds in parameters.items()]
     measured = [
         each.read(scenario, f"measurement {number}")
         for number, each in enumerate(measurements, start=1)
     ]
     numbers = sum(len(each.numbers) for each in measured)
     if not fitted:
-        raise InputError("fit", "parameters", "is empty, expected a key with bounds")
+        raise InputError(source, "parameters", "is empty, expected a key with bounds")
     if numbers < len(fitted):
         found = f"found {len(fitted)} keys and {numbers} measured numbers"
-        raise InputError("fit", "parameters", f"{found}, expected at least a number for each key")
+        raise InputError(source, "parameters", f"{found}, expected at least a number for each key")
     digest = _digest(scenario, measurements)
     problem = _Problem(scenario, fitted, measured, digest, folder, say)
     start = np.array([parameter.start / parameter.scale for parameter in fitted])
@@ -204,42 +208,46 @@ def fit_values(
     return _result(problem, start, solution.x, time.perf_counter() - began)
 
 
-def _parameter(scenario: Scenario, key: str, bounds: Bounds) -> Parameter:
-    """The parameter of a key. Raises InputError if key or bounds cannot be used."""
-    source = f"scenario {scenario.name}"
+def _parameter(scenario: Scenario, key: str, bounds: Bounds, source: object) -> Parameter:
+    """The parameter of a key. Raises InputError, naming `source`, if key or bounds cannot be
+    used."""
+    place = f"parameters.{key}"
     values = scenario.model_dump()
     starts = [value_at(values, each) for each in separate(key)]
     for start in starts:
         if isinstance(start, bool) or not isinstance(start, float):
             what = "no value" if start is None else f"{start!r:.40}"
-            raise InputError(source, key, f"found {what}, expected the key of a number to fit")
+            raise InputError(source, place, f"found {what}, expected the key of a number to fit")
     start = starts[0]
     if any(other != start for other in starts):
         found = " and ".join(f"{each:g}" for each in starts)
-        raise InputError(source, key, f"found {found}, expected joined keys of the same value")
+        raise InputError(source, place, f"found {found}, expected joined keys of the same value")
     unit = start.unit if isinstance(start, Quantity) else ""
     if isinstance(bounds, str) or not isinstance(bounds, Sequence) or len(bounds) != 2:
-        raise InputError(source, key, f"found {bounds!r:.40}, expected bounds: least and most")
-    least, most = (_bound(bound, unit, source, key) for bound in bounds)
+        raise InputError(source, place, f"found {bounds!r:.40}, expected bounds: least and most")
+    least, most = (_bound(bound, unit, source, place) for bound in bounds)
     if not least < most:
-        raise InputError(source, key, f"found bounds {least:g} to {most:g}, expected least first")
+        raise InputError(source, place, f"found bounds {least:g} to {most:g}, expected least first")
     if not least <= start <= most:
         problem = f"found bounds {least:g} to {most:g} {unit}".rstrip()
-        raise InputError(source, key, f"{problem}, expected them around the start, {start:g}")
+        raise InputError(source, place, f"{problem}, expected them around the start, {start:g}")
     parameter = Parameter(key, unit, float(start), least, most)
-    for bound in (least, most):  # a scenario may have limits of its own
-        scenario.with_changes(parameter.changes(bound))
+    try:
+        for bound in (least, most):  # a scenario may have limits of its own
+            scenario.with_changes(parameter.changes(bound))
+    except InputError as error:
+        raise InputError(source, place, error.problem) from error
     return parameter
 
 
-def _bound(bound: str | float, unit: str, source: str, key: str) -> float:
+def _bound(bound: str | float, unit: str, source: object, place: str) -> float:
     if isinstance(bound, str):
         try:
             return quantity_to_si(bound, unit)
         except ValueError as error:
-            raise InputError(source, key, str(error)) from error
+            raise InputError(source, place, str(error)) from error
     if isinstance(bound, bool) or not isinstance(bound, int | float) or not math.isfinite(bound):
-        raise InputError(source, key, f"found the bound {bound!r:.40}, expected a number")
+        raise InputError(source, place, f"found the bound {bound!r:.40}, expected a number")
     return float(bound)
 
 
@@ -418,6 +426,7 @@ def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: floa
     misfit = problem.misfit(last)
     half, correlation = _uncertainty(problem, x, misfit)
     determined, smooth = np.isfinite(half), problem.roughness(x) < ROUGH
+    explained = misfit <= 1.0 + LIKELY * math.sqrt(2.0 / max(1, last.size - x.size))
     known = determined & (smooth | ~determined).all()
     values, given = x * problem.scale, pandas.DataFrame(problem.parameters).set_index("key")
     table = pandas.DataFrame(
@@ -447,7 +456,7 @@ def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: floa
         },
         misfit=misfit,
         start_misfit=problem.misfit(first),
-        warnings=_warnings(table, correlations),
+        warnings=_warnings(table, correlations, explained=explained),
         evaluations=problem.evaluations,
         wall_time=wall_time,
     )
@@ -472,8 +481,11 @@ def _uncertainty(problem: _Problem, x: np.ndarray, misfit: float) -> tuple[np.nd
     return half, covariance / np.outer(spread, spread)
 
 
-def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[str]:
-    """What a reader of a fit has to know."""
+def _warnings(
+    table: pandas.DataFrame, correlations: pandas.DataFrame, *, explained: bool
+) -> list[str]:
+    """What a reader of a fit has to know. `explained` is True if the residuals are as small as the
+    uncertainties."""
     warnings = []
     for key, row in table.iterrows():
         value, width = row["value"], row["most"] - row["least"]
@@ -490,7 +502,8 @@ def _warnings(table: pandas.DataFrame, correlations: pandas.DataFrame) -> list[s
             warnings.append(f"the data hardly tell {one} from {listed(others)}")
     rough = [str(key) for key in determined if not table["smooth"][key]]
     if rough:
-        problem = f"the predictions are not smooth in {listed(rough)}"
-        advice = "a shorter motion, or a larger uncertainty, may help"
-        warnings.append(f"{problem}: the values may be far off, and have no intervals; {advice}")
+        problem = f"the predictions are not smooth in {listed(rough)}, so intervals are unknown"
+        better = "a search of all values, a shorter motion, or a larger uncertainty may help"
+        meaning = "the values explain the data" if explained else f"better ones may exist; {better}"
+        warnings.append(f"{problem}; {meaning}")
     return warnings

@@ -196,16 +196,7 @@ class Simulation:
 
     def _to_signals(self, actions: npt.ArrayLike, goes: np.ndarray) -> np.ndarray:
         """Signals (N, m) in N of actions. Actions of robots that do not go may be anything."""
-        try:
-            given = np.asarray(actions, dtype=float)
-        except (TypeError, ValueError) as error:
-            problem = f"found {actions!r:.60}, expected numbers of shape {self.rest.shape}"
-            raise InputError("Simulation", "actions", problem) from error
-        if self.count == 1 and given.ndim == 1:
-            given = given[np.newaxis]
-        if given.shape != self.rest.shape:
-            problem = f"found the shape {np.shape(actions)}, expected {self.rest.shape}"
-            raise InputError("Simulation", "actions", problem)
+        given = checked_actions(actions, self.rest.shape, source="Simulation")
         bad = goes & ~np.isfinite(given).all(axis=1)
         if bad.any():
             robot = int(bad.argmax())
@@ -245,6 +236,20 @@ class Simulation:
             raise InputError("Simulation", "indices", problem)
         found: list[int] = places.astype(int).tolist()
         return found
+
+
+def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
+    """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, naming
+    `source`, if they have another shape."""
+    least = shape[1:] if shape[0] == 1 else shape
+    try:
+        given = np.asarray(actions, dtype=float)
+    except (TypeError, ValueError) as error:
+        problem = f"found {actions!r:.60}, expected numbers of shape {least}"
+        raise InputError(source, "actions", problem) from error
+    if given.shape not in (shape, least):
+        raise InputError(source, "actions", f"found the shape {given.shape}, expected {least}")
+    return given.reshape(shape)
 
 
 def simulate_controlled(

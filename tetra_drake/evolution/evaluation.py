@@ -11,7 +11,9 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, SupportsFloat
+
+import numpy as np
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
@@ -23,6 +25,7 @@ from tetra_drake.errors import (
     TimeBudgetExceeded,
 )
 from tetra_drake.evolution.draws import combine
+from tetra_drake.evolution.manifest import Method
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
@@ -149,12 +152,16 @@ class GaitEvaluation:
         if self.objective is None:
             return result.fitness
         try:
-            return float(self.objective(result))
+            fitness: object = self.objective(result)
         except InputError as error:
             if result.recorded is not None or error.key != "trajectory":
                 raise
             problem = "reads the trajectory, expected its attribute needs_trajectory to be True"
             raise InputError("objective", "", problem) from error
+        if isinstance(fitness, SupportsFloat) and np.size(fitness) == 1:
+            return float(fitness)
+        name = Method.of(self.scenario, objective=self.objective).objective
+        raise InputError("objective", name, f"returned {fitness!r:.60}, expected a number")
 
 
 _KINDS: dict[type[Exception], str] = {

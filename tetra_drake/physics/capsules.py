@@ -50,7 +50,7 @@ from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum,
 PARALLEL = 0.01
 """Angle (rad) of two struts at which their contact is halfway between the nearest points and the
 middle. A strut of 0.5 m that is pressed by 0.4 mm touches along its length up to this angle."""
-_LEAST_SQUARE = 1e-30
+LEAST_SQUARE = 1e-30
 """Lower limit (m²) of squared distances, for axes that meet. The force is zero there."""
 
 
@@ -198,7 +198,7 @@ def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
     s, t = contact_places(axes)
     between = vector_between(axes, s, t)
     square = dot(between, between)
-    per_distance = inverse_sqrt(maximum(square, _LEAST_SQUARE))
+    per_distance = inverse_sqrt(maximum(square, LEAST_SQUARE))
     depth = struts.radius[i] + struts.radius[j] - square * per_distance
     return Touch(s, t, scaled(per_distance, between), depth)
 

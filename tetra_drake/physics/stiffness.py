@@ -7,6 +7,7 @@ directions.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -97,6 +98,7 @@ def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Spri
         if touch.depth > 0.0:
             axes = capsules.axes_of(struts, nodes, i, j)
             distance = struts.radius[i] + struts.radius[j] - touch.depth
+            distance = max(distance, math.sqrt(capsules.LEAST_SQUARE))  # as in find_touch()
             stiffness.append(_stiffness_of_touch(touch, axes, distance, law.stiffness))
             ends.append([struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]])
     of_touch = np.array(ends, dtype=int).reshape(-1, 4)

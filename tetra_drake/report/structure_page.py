@@ -88,7 +88,7 @@ def _faults(study: EquilibriumStudy) -> list[str]:
         lines.append(f"Below the ground, which does not touch them: {listed(depths)}.")
     through = overlaps(robot.scenario, structure, robot.equilibrium.state)
     if through:
-        pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), depth in through.items()]
+        pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), (depth, _) in through.items()]
         lines.append(f"Struts that pass through each other: {listed(pairs)}.")
     return lines
 

@@ -41,6 +41,8 @@ MOST_CORRECTIONS = 100
 """Upper limit of the corrections of the lengths of elastic struts."""
 SAME_LENGTH = 1e-10
 """Change (m) of a strut's length below which its correction ends."""
+MEETING = 1e-12
+"""Distance (m) of the axes of two struts up to which they meet, except for rounding."""
 SteeringSignal = Callable[[float], float]
 """Function from time (s) to the turn, -1 to 1."""
 
@@ -226,8 +228,7 @@ def undisturbed_structure(scenario: Scenario, *, may_overlap: bool = False) -> S
     if not scenario.terrain.is_ground:
         blueprint = dataclasses.replace(blueprint, contacts=np.array([], dtype=np.int64))
     placed = Structure.of(blueprint)
-    if not may_overlap:
-        check_apart(scenario, placed)
+    check_apart(scenario, placed, may_overlap=may_overlap)
     if not blueprint.settles:
         return placed
     up = np.array([0.0, 0.0, _lift(scenario, placed)])
@@ -279,22 +280,30 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
     return 0.0 if placed.held.any() else float(depth)
 
 
-def check_apart(scenario: Scenario, structure: Structure) -> None:
+def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:
     """Raises InputError if struts that touch overlap in the initial pose of a structure, by more
-    than the robot's weight would press them."""
+    than the robot's weight would press them. With `may_overlap`, only if their axes meet, as no
+    direction leads them apart then."""
     if not scenario.strut_contact.law(structure.strut_search).acts:
         return
-    for (first, second), depth in overlaps(scenario, structure, structure.initial_state).items():
-        found = f"struts '{first}' and '{second}' overlap by {1e3 * depth:.3g} mm at the start"
-        advice = "move their nodes, make them thinner, or set strut_contact to !Nothing"
-        raise InputError(scenario.name, "strut_contact", f"{found}; {advice}")
+    found = overlaps(scenario, structure, structure.initial_state)
+    for (first, second), (depth, distance) in found.items():
+        struts = f"struts '{first}' and '{second}'"
+        if distance <= MEETING:
+            problem = f"the axes of {struts} meet at the start; move their nodes"
+            raise InputError(scenario.name, "strut_contact", problem)
+        if not may_overlap:
+            advice = "move their nodes, make them thinner, or set strut_contact to !Nothing"
+            problem = f"{struts} overlap by {1e3 * depth:.3g} mm at the start; {advice}"
+            raise InputError(scenario.name, "strut_contact", problem)
 
 
 def overlaps(
     scenario: Scenario, structure: Structure, state: np.ndarray
-) -> dict[tuple[str, str], float]:
-    """Depths (m) by which struts of different bodies overlap in a state (13 bodies,), by their
-    names; those by which the robot's weight presses touching struts do not count."""
+) -> dict[tuple[str, str], tuple[float, float]]:
+    """Struts of different bodies that overlap in a state (13 bodies,), by their names: depths and
+    distances of their axes, in m. Depths by which the robot's weight presses touching struts do not
+    count."""
     struts, contact = structure.strut_table, scenario.strut_contact.law(structure.strut_search)
     allowed = START_DEPTH
     if contact.acts:
@@ -302,12 +311,13 @@ def overlaps(
         allowed += weight / NormalForce(*contact.normal).stiffness
     near, nodes = NearStruts.of(struts), moved_nodes(structure, state)
     find_near_struts(struts, contact, structure.radius, state, nodes, near)
-    depths = {}
+    found = {}
     for i, j in near.pairs[: near.count[0]].tolist():
         depth = find_touch(struts, nodes, i, j).depth
         if depth > allowed:
-            depths[structure.strut_name(i), structure.strut_name(j)] = depth
-    return depths
+            names = structure.strut_name(i), structure.strut_name(j)
+            found[names] = depth, struts.radius[i] + struts.radius[j] - depth
+    return found
 
 
 def equilibrium_of(

@@ -141,7 +141,8 @@ class CableGroup(CableConstants):
 
         if self.free_length is not None:
             return self.free_length
-        return length - elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))
+        stretch = elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))
+        return max(0.0, length - stretch)
 
 
 class Member(NamedTuple):

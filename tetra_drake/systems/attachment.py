@@ -7,8 +7,10 @@ generalized force; otherwise BodyStates and BodyForces translate.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NamedTuple, Self
+import math
+import numbers
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +34,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import Adder
 
+from tetra_drake.errors import InputError
 from tetra_drake.scenario.blueprint import WORLD
 
 
@@ -138,6 +141,16 @@ def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
     applied.body_index = BodyIndex(body - WORLD)
     applied.F_Bq_W = SpatialForce(force)
     return applied
+
+
+def CheckConstants(source: str, key: str, constants: Mapping[str, Any]) -> None:
+    """Raises InputError that names `source` and `key` unless the constants of a law are numbers
+    that it can have: finite, none negative, and a stiffness."""
+    for name, value in constants.items():
+        is_number = isinstance(value, numbers.Real) and math.isfinite(value)
+        if not is_number or value < 0.0 or (value == 0.0 and name == "stiffness"):
+            expected = "more than 0" if name == "stiffness" else "0 or more"
+            raise InputError(source, f"{key}.{name}", f"found {value!r}, expected {expected}")
 
 
 def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:

@@ -20,7 +20,7 @@ from tetra_drake.scenario.refusals import hint
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.actuators import Actuators
-from tetra_drake.systems.attachment import Attach, Nodes
+from tetra_drake.systems.attachment import Attach, CheckConstants, Nodes
 from tetra_drake.systems.cable_geometry import AddCableGeometry
 
 
@@ -156,7 +156,8 @@ def AddCables(
         name: name of the system.
 
     Raises:
-        InputError: `actuated` has an unknown cable.
+        InputError: `actuated` has an unknown cable, two cables have one name, or a constant of a
+            cable is negative or not finite.
     """
     actuated, actuation = actuated or {}, actuation or Force()
     nodes = Nodes.of(plant, (frame for one in cables for frame in (one.frame_a, one.frame_b)))
@@ -189,7 +190,11 @@ def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
     """Records of the cables, of dtype CABLE."""
-    places = {one.name: place for place, one in enumerate(cables)}
+    places: dict[str, int] = {}
+    for place, one in enumerate(cables):
+        CheckConstants("AddCables", f"cables.{one.name}", one.law._asdict())
+        if places.setdefault(one.name, place) != place:
+            raise InputError("AddCables", f"cables.{one.name}", "is given twice")
     table = np.zeros(len(cables), dtype=cable.CABLE)
     table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]
     table["node_b"] = [nodes.of_frame[one.frame_b.index()] for one in cables]
@@ -197,11 +202,11 @@ def _cable_table(
     for constant in cable.CableLaw._fields:
         table[constant] = [getattr(one.law, constant) for one in cables]
     for signal, (group, driven) in enumerate(actuated.items()):
-        for one in driven:
-            if one not in places:
-                problem = f"found unknown cable '{one}'; {hint(one, [*places])}"
+        for cable_name in driven:
+            if cable_name not in places:
+                problem = f"found unknown cable '{cable_name}'; {hint(cable_name, [*places])}"
                 raise InputError("AddCables", f"actuated.{group}", problem)
-            table["signal"][places[one]] = signal
+            table["signal"][places[cable_name]] = signal
     return table
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
+from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
@@ -64,10 +64,10 @@ def MakeTensegrityDiagram(
     - cables_actuators: only if the kind of actuators has states, as winches have
     - strut_contact: only if struts touch
     - anchors, loads: only if nodes of bodies are held, or loaded
-    - controller: in place of cpg and start_up, a system with the output port `signals`. Its input
-      ports may be `state` and any output port of cables and ground, such as `lengths`, `rates`,
-      `tensions` and `normal_forces`: ports of the same name are connected. See SampledController
-      and robot.command.controlled_robot().
+    - controller: in place of cpg and start_up, a system with the output port `signals`, and any
+      others. Its input ports may be `state` and any output port of cables and ground, such as
+      `lengths`, `rates`, `tensions` and `normal_forces`: ports of the same name are connected. See
+      SampledController and robot.command.controlled_robot().
 
     `steering` replaces the gait's turn. Input port: turn (of a live network). Output ports: state
     (from plant), signals (start_up or controller), drives (actuators), tensions and lengths
@@ -76,7 +76,7 @@ def MakeTensegrityDiagram(
     simulation; pages and films are made from trajectories.
 
     Raises InputError if there is neither a gait nor a controller, or a port of the controller has
-    another name.
+    another name or size.
     """
     scenario, structure = robot.scenario, robot.structure
     builder = DiagramBuilder()
@@ -94,9 +94,9 @@ def MakeTensegrityDiagram(
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
     if controller is not None:
-        source = builder.AddNamedSystem("controller", controller)
+        signals = _AddController(builder, controller, size=structure.signals)
     elif gait is not None:
-        source = _AddSignals(builder, robot, gait, steering)
+        signals = _AddSignals(builder, robot, gait, steering).get_output_port()
     else:
         raise InputError("MakeTensegrityDiagram", "gait", "is needed, or a controller")
     cables = AddCables(
@@ -126,7 +126,7 @@ def MakeTensegrityDiagram(
     if structure.loads.nodes.size:
         Attach(builder, plant, builder.AddNamedSystem("loads", Loads(robot)))
 
-    state, signals = plant.get_state_output_port(), source.get_output_port()
+    state = plant.get_state_output_port()
     if structure.signals:
         builder.Connect(signals, cables.GetInputPort("signals"))
     if builder.HasSubsystemNamed("cables_actuators"):
@@ -165,6 +165,19 @@ def _cables(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
     ]
 
 
+def _AddController(builder: DiagramBuilder, controller: System, *, size: int) -> OutputPort:
+    """Adds `controller`. Returns its port `signals`, and raises InputError if there is none."""
+    if not controller.HasOutputPort("signals"):
+        ports = [
+            controller.get_output_port(i).get_name() for i in range(controller.num_output_ports())
+        ]
+        found = ", ".join(ports) or "no output ports"
+        problem = f"found {found}, expected an output port 'signals' of size {size}"
+        raise InputError("MakeTensegrityDiagram", "controller", problem)
+    _CheckSize(controller.GetOutputPort("signals"), size)
+    return builder.AddNamedSystem("controller", controller).GetOutputPort("signals")
+
+
 def _ConnectController(
     builder: DiagramBuilder, controller: System, state: OutputPort, sources: tuple[System, ...]
 ) -> None:
@@ -177,7 +190,16 @@ def _ConnectController(
         if name != "state" and not having:
             problem = f"found the input port '{name}', expected a port of cables or ground"
             raise InputError("MakeTensegrityDiagram", "controller", problem)
-        builder.Connect(state if name == "state" else having[0].GetOutputPort(name), port)
+        given = state if name == "state" else having[0].GetOutputPort(name)
+        _CheckSize(port, given.size())
+        builder.Connect(given, port)
+
+
+def _CheckSize(port: InputPort | OutputPort, size: int) -> None:
+    """Raises InputError unless a port of a controller has a size."""
+    if port.size() != size:
+        problem = f"found size {port.size()} of port '{port.get_name()}', expected {size}"
+        raise InputError("MakeTensegrityDiagram", "controller", problem)
 
 
 def _AddSignals(

@@ -26,7 +26,7 @@ from tetra_drake.physics.mode_change import mode_margin, modes_after_step, next_
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
-from tetra_drake.systems.attachment import Attach, Nodes
+from tetra_drake.systems.attachment import Attach, CheckConstants, Nodes
 
 
 class GroundContact(LeafSystem):
@@ -156,7 +156,12 @@ def AddGroundContact(
     The plant must be finalized, may have any joints, and should be continuous. `ground` is by
     robot.ground.make_surface(), or a robot's, whose own contact nodes do not count. For `witness`
     see GroundContact. The ports have the contact nodes in the order of `frames`.
+
+    Raises InputError for a frame of the world, and for a constant of the normal force that is
+    negative or not finite.
     """
+    normal = contact.NormalForce(*ground.normal.tolist())
+    CheckConstants("AddGroundContact", "ground", normal._asdict())
     if any(frame.body() is plant.world_body() for frame in frames):
         raise InputError("AddGroundContact", "frames", "found a frame of the world")
     nodes = Nodes.of(plant, frames)
