@@ -9,6 +9,9 @@ import rolling
 from tetra_drake.engines.simulation import Simulation
 
 
+pytestmark = pytest.mark.usefixtures("one_lane")
+
+
 @pytest.fixture(scope="module")
 def best():
     return rolling.best_of(rolling.load_policies())
