@@ -8,7 +8,6 @@ import rolling
 
 from tetra_drake.engines.simulation import Simulation
 
-
 pytestmark = pytest.mark.usefixtures("one_lane")
 
 
