@@ -68,6 +68,14 @@ def few_widths() -> Iterator[None]:
 
 
 @pytest.fixture
+def one_lane(monkeypatch) -> None:
+    """One lane for any number of robots, as a structure in which bodies are coupled otherwise than
+    in the row has kernels of its own."""
+    for module in (lane_pool, lane_stepper):
+        monkeypatch.setattr(module, "lanes_for", lambda walks: 1)
+
+
+@pytest.fixture
 def run_small(tmp_path):
     """run_small(name, ...): a small run in threads; its directory."""
 

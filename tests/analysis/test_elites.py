@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 from pandas import DataFrame
-from ribs.archives import GridArchive
 
 from tetra_drake.analysis.elites import CELLS, elites, judge_elites, kept_gaits, notable_gaits
 from tetra_drake.analysis.robustness import Judgement
@@ -42,6 +41,8 @@ def keys(gaits):
 
 
 def test_the_map_is_that_of_pyribs(run_of):
+    from ribs.archives import GridArchive  # which takes seconds to load
+
     generator = np.random.default_rng(4)
     fitnesses = generator.normal(2.0, 2.0, 200).tolist()
     # Some on the borders of cells, some beyond the map.

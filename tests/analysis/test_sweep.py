@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from helpers.anchored import supported_prism
+from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.analysis.sweep import sweep
 from tetra_drake.engines.simulate import simulate
@@ -26,11 +26,11 @@ def short() -> Scenario:
 
 
 def test_a_load_is_an_axis() -> None:
-    supported = supported_prism(duration=0.5)
-    changes = {"robot.loads.n3[2]": ["-0.1 N", "-0.4 N"]}
-    found = sweep(supported, seeded_gait(supported, 3), changes, workers=1)
-    assert found["n3[2]"].values.tolist() == [-0.1, -0.4]
-    assert found["n3[2]"].units == "N"
+    loaded = scenario_of(HUNG | {"loads": {"a": [0.0, 0.0, -0.1]}}, duration=0.5)
+    changes = {"robot.loads.a[2]": ["-0.1 N", "-0.4 N"]}
+    found = sweep(loaded, seeded_gait(loaded, 3), changes, workers=1)
+    assert found["a[2]"].values.tolist() == [-0.1, -0.4]
+    assert found["a[2]"].units == "N"
     assert float(found.tension[0, 0]) != float(found.tension[1, 0])
 
 

@@ -135,9 +135,10 @@ def test_a_floating_prism_keeps_its_momentum():
 
 
 def test_draws_with_other_loads_and_places_move_side_by_side_as_each_alone():
+    loaded = HUNG | {"loads": {"b": [0.1, 0.0, 0.0]}}
     scenarios = [
-        supported_prism(**{"robot.loads.n3[2]": f"{-force} N", "robot.nodes.n0[0]": f"{x} m"})
-        for force, x in ((0.1, 0.1), (0.2, 0.101), (0.3, 0.102))
+        scenario_of(loaded, **{"robot.loads.b[0]": f"{force} N", "robot.nodes.top[0]": f"{x} m"})
+        for force, x in ((0.1, 0.0), (0.2, 0.001), (0.3, 0.002))
     ]
     gaits = [seeded_gait(scenario, 3) for scenario in scenarios]
     together = simulate_many(scenario=scenarios, gaits=gaits, workers=1)
