@@ -125,7 +125,7 @@ class Tetrahedra(Section):
     """The tetrahedra with their initial positions (thesis section 2.1, appendix C.1)."""
 
     unit: ClassVar[None] = None
-    """Unit in which coordinates are given; there are none."""
+    """Unit of coordinates; it has none."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
     """Properties that some metrics need and this robot does not have."""
