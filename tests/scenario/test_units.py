@@ -89,16 +89,11 @@ def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, 
     assert scenario.units == SYSTEMS[expected]
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        "unit: mm\nnodes: {a: [0, 0, 0], b: [300, 0, 100]}",
-        "nodes: {a: [0 mm, 0 mm, 0 mm], b: [300 mm, 0 mm, 100 mm]}",
-    ],
-)
-def test_a_structure_given_in_mm_is_shown_in_mm(given, tmp_path):
+def test_a_structure_given_in_mm_is_shown_in_mm(tmp_path):
     strut = "{pairs: [[a, b]], diameter: 6 mm, density: 2.7 g/cm^3, node_diameter: 6 mm}"
-    (tmp_path / "small.yaml").write_text(f"{given}\nstruts: {{rod: {strut}}}")
+    (tmp_path / "small.yaml").write_text(
+        f"unit: mm\nnodes: {{a: [0, 0, 0], b: [300, 0, 100]}}\nstruts: {{rod: {strut}}}"
+    )
     robot = f"robot: !Structure {{file: {tmp_path / 'small.yaml'}}}"
     own = "base: prism\ngait_bounds: {turn: 0}\n" + robot
     (tmp_path / "own.yaml").write_text(own)

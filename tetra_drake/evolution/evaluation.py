@@ -3,6 +3,7 @@ scenario's disturbances."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import itertools
@@ -12,8 +13,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, SupportsFloat
-
-import numpy as np
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
@@ -158,8 +157,9 @@ class GaitEvaluation:
                 raise
             problem = "reads the trajectory, expected its attribute needs_trajectory to be True"
             raise InputError("objective", "", problem) from error
-        if isinstance(fitness, SupportsFloat) and np.size(fitness) == 1:
-            return float(fitness)
+        if isinstance(fitness, SupportsFloat):
+            with contextlib.suppress(TypeError):  # of an array
+                return float(fitness)
         name = Method.of(self.scenario, objective=self.objective).objective
         raise InputError("objective", name, f"returned {fitness!r:.60}, expected a number")
 

@@ -171,8 +171,7 @@ class StructureFile(Section):
     nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
     """Coordinates [x, y, z] of each node, near an equilibrium."""
     unit: str | None = Field(default=None, exclude_if=lambda unit: unit is None)
-    """Unit of coordinates that are bare numbers, such as cm. A robot with coordinates in mm is
-    shown in mm."""
+    """Unit of coordinates that are bare numbers, such as cm. A robot in mm is shown in mm."""
     struts: dict[Name, StrutGroup] = Field(min_length=1)
     cables: dict[Name, CableGroup] = Field(default={})
     spheres: dict[Name, SphereGroup] = Field(default={})
@@ -360,13 +359,10 @@ class StructureFile(Section):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _apply_unit(cls, tree: Any) -> Any:
-        """Applies the key `unit` of a tree to all coordinates without a unit. Only mm is kept, as
-        lengths in m do not tell that a robot is shown in mm."""
-        if not isinstance(tree, dict):
+        """Applies the key `unit` of a tree to all coordinates without a unit. Only mm is kept: the
+        lengths tell the other units in which a robot is shown."""
+        if not isinstance(tree, dict) or "unit" not in tree:
             return tree
-        in_mm = tree.get("unit") == "mm" or " mm'" in str(tree.get("nodes"))
-        if "unit" not in tree:
-            return tree | ({"unit": "mm"} if in_mm else {})
         unit = tree["unit"]
         try:
             quantity_to_si(f"1 {unit}", "m")
@@ -380,7 +376,7 @@ class StructureFile(Section):
                 return place
             return [f"{x!r} {unit}" if type(x) in (int, float) else x for x in place]
 
-        tree = tree | {"unit": "mm" if in_mm else None}
+        tree = tree | {"unit": "mm" if unit == "mm" else None}
         if isinstance(tree.get("nodes"), dict):
             tree["nodes"] = {name: with_unit(place) for name, place in tree["nodes"].items()}
         return tree
