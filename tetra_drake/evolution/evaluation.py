@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
 
@@ -152,7 +152,7 @@ class GaitEvaluation:
         if self.objective is None:
             return result.fitness
         try:
-            fitness: object = self.objective(result)
+            fitness: Any = self.objective(result)
         except InputError as error:
             if result.recorded is not None or error.key != "trajectory":
                 raise

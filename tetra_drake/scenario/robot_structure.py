@@ -141,8 +141,7 @@ class CableGroup(CableConstants):
 
         if self.free_length is not None:
             return self.free_length
-        stretch = elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))
-        return max(0.0, length - stretch)
+        return length - elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))
 
 
 class Member(NamedTuple):
