@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, SupportsFloat
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -158,7 +158,7 @@ class GaitEvaluation:
                 raise
             problem = "reads the trajectory, expected its attribute needs_trajectory to be True"
             raise InputError("objective", "", problem) from error
-        if isinstance(fitness, SupportsFloat) and np.size(fitness) == 1:
+        if hasattr(fitness, "__float__") and np.size(fitness) == 1:
             return float(fitness)
         name = Method.of(self.scenario, objective=self.objective).objective
         raise InputError("objective", name, f"returned {fitness!r:.60}, expected a number")
