@@ -162,7 +162,7 @@ def main(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tau", type=quantity("s"), default=TAU_A)
+    parser.add_argument("--tau", type=quantity("s", "0.2 s"), default=TAU_A)
     parser.add_argument("--weights", type=float, nargs="+", default=WEIGHTS)
     parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS)
     parser.add_argument("--live", action="store_true")

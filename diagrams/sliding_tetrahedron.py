@@ -125,8 +125,8 @@ def main(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--speed", type=quantity("m/s"), default=INITIAL_SPEED)
-    parser.add_argument("--slope", type=quantity("rad"), default=0.0)
+    parser.add_argument("--speed", type=quantity("m/s", "10 in/s"), default=INITIAL_SPEED)
+    parser.add_argument("--slope", type=quantity("rad", "5 deg"), default=0.0)
     parser.add_argument("--law", default="!ResetIntegrator")
     parser.add_argument("--live", action="store_true")
     parser.add_argument("--out", type=Path, default=OUT)

@@ -65,7 +65,8 @@ def unchanged(work):
         # 2 n (n - 1) = 40 weights for the 5 oscillators of 6 tetrahedra.
         ("simulate --scenario six.yaml --gait good.json", "good.json", "weights 24 40"),
         ("simulate --scenario short.yaml --out good.json", "good.json", ""),
-        ("structure six_baer", "six_baer", ""),
+        ("structure six_baer", "six_baer", "'six_bar'?"),
+        ("structure nosuch", "nosuch", "prism, thesis,"),
     ],
 )
 def test_bad_files_and_places_are_refused_in_one_line(command, source, values, unchanged, capsys):
@@ -85,6 +86,7 @@ def test_bad_files_and_places_are_refused_in_one_line(command, source, values, u
         ("simulate --seed -1", "tetra-drake simulate: --seed '-1'"),
         ("simulate --sceanrio thesis", "tetra-drake simulate: --sceanrio '--scenario'?"),
         ("compare a --reach 14", "tetra-drake compare: --reach '14'"),
+        ("figures a --width 3.4", "tetra-drake figures: --width '3.4' '3.4 in'"),
     ],
 )
 def test_options_that_make_no_sense_are_refused_in_one_line(arguments, values, unchanged, capsys):

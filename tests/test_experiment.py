@@ -111,6 +111,15 @@ def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_a_scenario_with_fewer_evaluations_than_the_population_is_not_evolved(
+    tiny, tmp_path, refused
+):
+    scenario = tiny.with_changes({"evolution.evaluations": 3})
+    with refused(scenario.name, "evolution.evaluations", "4"):
+        tetra_drake.evolve(scenario, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
     def evolve(seed, **options):
         options |= {"reevaluate": False, "report": False}

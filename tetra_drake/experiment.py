@@ -27,6 +27,7 @@ from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
+from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -96,6 +97,8 @@ def evolve(
     if scenario is None:
         raise InputError("scenario", "", "is needed to begin a run")
     check_scenario(scenario)
+    if optimizer is None:
+        _check_budget(scenario)
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
@@ -183,6 +186,14 @@ def fit(
 
         save_fit(found, folder)
     return found
+
+
+def _check_budget(scenario: Scenario) -> None:
+    """Raises InputError if a trial would end before the first population is evaluated."""
+    evaluations, kind = scenario.evolution.evaluations, scenario.optimizer
+    if isinstance(kind, SteadyState) and evaluations < kind.population:
+        expected = f"expected at least the population, {kind.population}"
+        raise InputError(scenario.name, "evolution.evaluations", f"found {evaluations}, {expected}")
 
 
 def _check_counts(**given: tuple[int | None, int]) -> None:

@@ -135,8 +135,8 @@ def positive(text: str) -> float:
     raise argparse.ArgumentTypeError(f"found '{text}', expected a number above 0")
 
 
-def quantity(unit: str) -> Callable[[str], float]:
-    """Function that reads a quantity, such as "14 in", as a number in an SI unit."""
+def quantity(unit: str, example: str) -> Callable[[str], float]:
+    """Function that reads a quantity as a number in an SI unit. Errors name the `example`."""
 
     def read(text: str) -> float:
         from tetra_drake.scenario.units import quantity_to_si
@@ -144,6 +144,6 @@ def quantity(unit: str) -> Callable[[str], float]:
         try:
             return quantity_to_si(text, unit)
         except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
+            raise argparse.ArgumentTypeError(f"{error}, such as '{example}'") from error
 
     return read

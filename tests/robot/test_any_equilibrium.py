@@ -310,6 +310,21 @@ def test_a_structure_file_may_have_struts_that_overlap(tmp_path):
 
 @pytest.mark.parametrize("height", ["0", "1e-16"])
 def test_a_structure_file_may_not_have_struts_whose_axes_meet(height, tmp_path, refused):
-    (tmp_path / "crossed.yaml").write_text(CROSSED.replace("HEIGHT", height))
-    with refused("crossed", "strut_contact", "'a b'", "'c d'", "meet"):
-        robot_of_file(str(tmp_path / "crossed.yaml"))
+    file = tmp_path / "crossed.yaml"
+    file.write_text(CROSSED.replace("HEIGHT", height))
+    with refused(file, "strut_contact", "'a b'", "'c d'", "meet"):
+        robot_of_file(str(file))
+
+
+def test_a_file_with_a_node_below_the_ground_is_named_with_the_depth_in_its_units(
+    tmp_path, refused
+):
+    file = tmp_path / "low.yaml"
+    low = (
+        CROSSED.replace("unit: m", "unit: cm")
+        .replace("0.1", "10.0")
+        .replace("[10.0, 0, 0]", "[10.0, 0, -4]")
+    )
+    file.write_text(low.replace("HEIGHT", "2"))
+    with refused(file, "nodes.b", "4 cm below the ground"):
+        robot_of_file(str(file))

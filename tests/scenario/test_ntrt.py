@@ -6,9 +6,12 @@ from pathlib import Path
 import pytest
 from helpers.structures import joined_nodes
 
+from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.errors import InputError
+from tetra_drake.report.structure_page import robot_of_file, structure_text
 from tetra_drake.robot.statics import find_statics
 from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_structure import StructureFile
 
@@ -266,10 +269,19 @@ def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path, refused) -> 
         read(write(tmp_path, SPINE))
 
 
-def test_friction_and_restitution_that_the_scenario_replaces_are_announced(tmp_path, caplog):
-    read(write(tmp_path, PRISM))
+def test_the_structure_names_friction_and_restitution_that_the_scenario_replaces(tmp_path, caplog):
+    file = write(tmp_path, PRISM)
+    assert read(file).ignored == ["friction", "restitution"]
     [record] = caplog.records
     assert "my.yaml: friction, restitution not used" in record.getMessage()
     caplog.clear()
-    read(write(tmp_path, PRISM.replace(", friction: 0.9, restitution: 0", "")))
+    # The scenario keeps the names, which its own file and the text of the structure show.
+    robot = robot_of_file(str(file), unit="dm")
+    assert "friction, restitution" in structure_text(study_equilibrium(robot))
+    save_scenario(tmp_path, robot.scenario)
+    saved = load_scenario(tmp_path / "scenario.yaml")
+    assert dict(saved.differences(load_scenario()))["robot.ignored"] == "[friction, restitution]"
+    caplog.clear()
+    without = write(tmp_path, PRISM.replace(", friction: 0.9, restitution: 0", ""))
+    assert read(without).ignored is None
     assert not caplog.records

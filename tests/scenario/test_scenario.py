@@ -289,7 +289,6 @@ def test_another_default_changes_scenarios_that_leave_it_out(scenario, set_defau
 # Bad files: the key at fault, and what was found there or is suggested
 
 BAD = [
-    ("evolution: {evaluations: 49}", "evolution.evaluations", "49"),
     ("robot: {offsets: [[0 m, 0 m, 0 m]]}", "robot.offsets", "1 items"),
     ("gait_bounds: {tau_a_min: 0.6 s}", "gait_bounds.tau_a_min", "0.6"),
     ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),

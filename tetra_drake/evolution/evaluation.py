@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
@@ -151,7 +151,7 @@ class GaitEvaluation:
         if self.objective is None:
             return result.fitness
         try:
-            fitness: object = self.objective(result)
+            fitness: Any = self.objective(result)
         except InputError as error:
             if result.recorded is not None or error.key != "trajectory":
                 raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake.analysis.equilibrium import EquilibriumStudy
+from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
@@ -18,6 +20,8 @@ from tetra_drake.robot.robot import Robot, overlaps, undisturbed_structure
 from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.refusals import no_such
+from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.visualization.replay import save_replay
@@ -41,7 +45,12 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in some of
     NTRT's; in equilibrium they touch. Raises InputError that names file and key.
     """
-    if names_scenario(name_or_file):
+    shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
+    if name_or_file not in shipped and not os.path.exists(name_or_file):
+        problem = no_such("structure or scenario", name_or_file, shipped)
+        raise InputError(name_or_file, "", problem)
+    is_scenario = names_scenario(name_or_file)
+    if is_scenario:
         given = load_scenario(name_or_file)
         ground = Flat() if given.terrain.is_ground else given.terrain
         given = given.with_sections(terrain=ground, actuation=Force())
@@ -50,7 +59,11 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
         given = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
     friction = given.friction.without_bristles()
     scenario = given.with_sections(friction=friction, engine=Mujoco())
-    return Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
+    try:
+        return Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
+    except InputError as error:
+        key = error.key if is_scenario else error.key.removeprefix("robot.")
+        raise InputError(name_or_file, key, error.problem) from error
 
 
 def structure_text(study: EquilibriumStudy) -> str:
@@ -75,6 +88,8 @@ def structure_text(study: EquilibriumStudy) -> str:
     if structure.held.any():
         lines.append(_anchors_table(study).text())
     lines += _faults(study)
+    if ignored := robot.scenario.robot.ignored:
+        lines.append(f"Not used, as the scenario's friction and ground hold: {', '.join(ignored)}.")
     return "\n\n".join(lines)
 
 

@@ -275,8 +275,8 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
     depth = -heights[lowest]
     if depth > DEEPEST * np.ptp(heights):
         key = f"robot.nodes.{placed.node_names[lowest]}"
-        problem = f"starts {depth:.3g} m below the ground, expected on it or above"
-        raise InputError(scenario.name, key, problem)
+        found = f"starts {scenario.units.shown(depth, 'm')} below the ground"
+        raise InputError(scenario.name, key, f"{found}, expected on it or above")
     return 0.0 if placed.held.any() else float(depth)
 
 
@@ -294,7 +294,8 @@ def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool =
             raise InputError(scenario.name, "strut_contact", problem)
         if not may_overlap:
             advice = "move their nodes, make them thinner, or set strut_contact to !Nothing"
-            problem = f"{struts} overlap by {1e3 * depth:.3g} mm at the start; {advice}"
+            shown = scenario.units.shown(depth, "m")
+            problem = f"{struts} overlap by {shown} at the start; {advice}"
             raise InputError(scenario.name, "strut_contact", problem)
 
 

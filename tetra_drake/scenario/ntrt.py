@@ -277,8 +277,13 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     """
     whole = Assembly()
     whole.add_file(file)
-    _announce_replaced(whole.builders, file)
-    structure = StructureFile.model_construct(nodes={}, struts={}, cables={}, spheres={})
+    ignored = _ignored(whole.builders)
+    if ignored:
+        names = ", ".join(ignored)
+        _LOG.warning("%s: %s not used; the scenario's friction and ground hold", file, names)
+    structure = StructureFile.model_construct(
+        nodes={}, struts={}, cables={}, spheres={}, ignored=ignored
+    )
     _add_spheres(structure, whole, unit)
     ground = min((p_W[1] for p_W in whole.nodes.values()), default=0.0)
     for name, p_W in whole.nodes.items():
@@ -306,12 +311,10 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     return Tree(written(structure.model_dump()))
 
 
-def _announce_replaced(builders: dict[str, Builder], file: Path) -> None:
-    """Logs which parameters of builders the scenario's friction and ground replace."""
+def _ignored(builders: dict[str, Builder]) -> list[str] | None:
+    """Names of OF_GROUND that the builders give, if any."""
     given = {name for builder in builders.values() for name in builder.parameters.replaced}
-    if given:
-        names = ", ".join(name for name in OF_GROUND if name in given)
-        _LOG.warning("%s: %s not used; the scenario's friction and ground hold", file, names)
+    return [name for name in OF_GROUND if name in given] or None
 
 
 def _add_spheres(structure: StructureFile, whole: Assembly, unit: float) -> None:

@@ -141,8 +141,7 @@ class CableGroup(CableConstants):
 
         if self.free_length is not None:
             return self.free_length
-        stretch = elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))
-        return max(0.0, length - stretch)
+        return length - elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))
 
 
 class Member(NamedTuple):
@@ -197,6 +196,9 @@ class StructureFile(Section):
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
+    ignored: list[str] | None = None
+    """Settings of an imported file that have no effect, because the scenario's friction and ground
+    hold, such as restitution. They are noted when the file is read."""
 
     def __copy__(self) -> Self:
         # The copy has no cached properties, because it may get other values.

@@ -129,6 +129,8 @@ class Tetrahedra(Section):
 
     lacking: ClassVar[tuple[str, ...]] = ()
     """Properties that some metrics need and this robot does not have."""
+    ignored: ClassVar[None] = None
+    """See StructureFile; a row is not imported."""
 
     tetrahedra: int = Field(ge=2, le=200)
     """Number of tetrahedra; T1 is the rearmost."""
