@@ -85,7 +85,10 @@ def drawn_texts(monkeypatch):
     return drawn_texts
 
 
-@pytest.fixture(params=[None, "column", (5.0, 8.0)], ids=["own page", "column", "5 in wide"])
+PAGES = {"own page": None, "column": "column", "5 in wide": (5.0, 8.0)}
+
+
+@pytest.fixture(params=PAGES.values(), ids=PAGES)
 def check(drawn_texts, request):
     """check(draw, *data): checks a figure on its own page, or on a given one."""
 
@@ -107,10 +110,16 @@ def check(drawn_texts, request):
     return check
 
 
-@pytest.mark.parametrize(
-    "robot",
-    ["three", "five", "prism", "long names", pytest.param("twelve", marks=pytest.mark.slow)],
-)
+def robots_on_pages():
+    """All robots on all pages; fast are those with the most text, the others on one page each."""
+    fast = {"five": PAGES, "long names": PAGES, "three": ["own page"], "prism": ["column"]}
+    for robot in (*fast, "twelve"):
+        for page, value in PAGES.items():
+            marks = [] if page in fast.get(robot, ()) else [pytest.mark.slow]
+            yield pytest.param(robot, value, id=f"{robot}, {page}", marks=marks)
+
+
+@pytest.mark.parametrize(("robot", "check"), list(robots_on_pages()), indirect=["check"])
 @pytest.mark.parametrize("draw", OF_A_GAIT)
 def test_figures_of_a_gait(draw, robot, check):
     check(draw, gait_of(robot))
