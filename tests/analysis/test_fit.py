@@ -171,6 +171,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(search, tmp_path, monkeypatch):
         return predict(self, scenarios)
 
     monkeypatch.setattr(measurements._MeasuredRest, "predict", counted)
+    monkeypatch.setattr("tetra_drake.analysis.fit.MOST", 40)
     stop = 0
     whole = fit(hung(), cases, BOUNDS, search=search)
     needed = len(predicted)
