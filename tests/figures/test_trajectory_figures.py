@@ -131,7 +131,7 @@ def test_the_time_lapse_shows_instants_from_start_to_end(walk):
     assert [float(title[0]) for title in titles] == [0.0, 3.0, 6.0, 9.0]
     assert [float(title[2]) for title in titles] == [0.0, 1.18, 2.36, 3.54]
     part = pictures(time_lapse(row(walk), instants=2, time=(3.0, 6.0), units="SI"))
-    assert [panel.get_title("left") for panel in part] == ["3 s: +0.030 m", "6 s: +0.060 m"]
+    assert [panel.get_title("left") for panel in part] == ["3 s: +0.0300 m", "6 s: +0.0600 m"]
 
 
 def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):

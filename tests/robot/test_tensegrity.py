@@ -79,7 +79,7 @@ def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
 def test_nodes_placed_in_the_ground_are_refused(refused):
     scenario = load_scenario("prism")
     sunk = scenario.with_changes({"robot.nodes.n1": ["-5 cm", "8.66 cm", "-1 mm"]})
-    with refused("prism", "robot.nodes.n1", "0.001 m below"):
+    with refused("prism", "robot.nodes.n1", "0.1 cm below"):
         make_structure(sunk)
 
 

@@ -174,7 +174,6 @@ def test_an_unknown_cable_and_a_frame_of_the_world_are_refused(refused):
     ("constant", "value"),
     [
         ("stiffness", -1.0),
-        ("stiffness", 0.0),
         ("damping", -1e-9),
         ("free_length", -0.1),
         ("free_length", math.nan),

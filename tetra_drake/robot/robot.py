@@ -294,8 +294,7 @@ def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool =
             raise InputError(scenario.name, "strut_contact", problem)
         if not may_overlap:
             advice = "move their nodes, make them thinner, or set strut_contact to !Nothing"
-            shown = scenario.units.shown(depth, "m")
-            problem = f"{struts} overlap by {shown} at the start; {advice}"
+            problem = f"{struts} overlap by {1e3 * depth:.3g} mm at the start; {advice}"
             raise InputError(scenario.name, "strut_contact", problem)
 
 

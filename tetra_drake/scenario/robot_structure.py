@@ -169,7 +169,7 @@ class StructureFile(Section):
 
     nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
     """Coordinates [x, y, z] of each node, near an equilibrium."""
-    unit: str | None = Field(default=None, exclude_if=lambda unit: unit is None)
+    unit: str | None = None
     """Unit of coordinates that are bare numbers, such as cm. A robot in mm is shown in mm."""
     struts: dict[Name, StrutGroup] = Field(min_length=1)
     cables: dict[Name, CableGroup] = Field(default={})
@@ -361,9 +361,9 @@ class StructureFile(Section):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _apply_unit(cls, tree: Any) -> Any:
-        """Applies the key `unit` of a tree to all coordinates without a unit. Only mm is kept: the
-        lengths tell the other units in which a robot is shown."""
-        if not isinstance(tree, dict) or "unit" not in tree:
+        """Applies the key `unit` of a tree to all coordinates without a unit. Only mm is kept:
+        other units of a robot follow from its lengths."""
+        if not isinstance(tree, dict) or tree.get("unit") is None:
             return tree
         unit = tree["unit"]
         try:

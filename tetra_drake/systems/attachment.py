@@ -145,12 +145,11 @@ def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
 
 def CheckConstants(source: str, key: str, constants: Mapping[str, Any]) -> None:
     """Raises InputError that names `source` and `key` unless the constants of a law are numbers
-    that it can have: finite, none negative, and a stiffness."""
+    that it can have: finite and not negative."""
     for name, value in constants.items():
         is_number = isinstance(value, numbers.Real) and math.isfinite(value)
-        if not is_number or value < 0.0 or (value == 0.0 and name == "stiffness"):
-            expected = "more than 0" if name == "stiffness" else "0 or more"
-            raise InputError(source, f"{key}.{name}", f"found {value!r}, expected {expected}")
+        if not is_number or value < 0.0:
+            raise InputError(source, f"{key}.{name}", f"found {value!r}, expected 0 or more")
 
 
 def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:
