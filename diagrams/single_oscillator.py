@@ -162,9 +162,10 @@ def main(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tau", type=quantity("s", "0.2 s"), default=TAU_A)
-    parser.add_argument("--weights", type=float, nargs="+", default=WEIGHTS)
-    parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS)
-    parser.add_argument("--live", action="store_true")
-    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--tau", type=quantity("s", "0.2 s"), default=TAU_A, help="such as '0.2 s'")
+    weights, ratios = "weights of mutual inhibition", "ratios of the two time constants"
+    parser.add_argument("--weights", type=float, nargs="+", default=WEIGHTS, help=weights)
+    parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS, help=ratios)
+    parser.add_argument("--live", action="store_true", help="show the signals in Meshcat")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for the figures")
     main(**vars(parser.parse_args()))

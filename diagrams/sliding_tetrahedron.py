@@ -125,9 +125,11 @@ def main(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--speed", type=quantity("m/s", "10 in/s"), default=INITIAL_SPEED)
-    parser.add_argument("--slope", type=quantity("rad", "5 deg"), default=0.0)
-    parser.add_argument("--law", default="!ResetIntegrator")
-    parser.add_argument("--live", action="store_true")
-    parser.add_argument("--out", type=Path, default=OUT)
+    speed, slope = quantity("m/s", "10 in/s"), quantity("rad", "5 deg")
+    parser.add_argument("--speed", type=speed, default=INITIAL_SPEED, help="such as '10 in/s'")
+    parser.add_argument("--slope", type=slope, default=0.0, help="of the ground, such as '5 deg'")
+    law = "friction of a scenario, such as '!Coulomb' (default: %(default)s)"
+    parser.add_argument("--law", default="!ResetIntegrator", help=law)
+    parser.add_argument("--live", action="store_true", help="show it in Meshcat while it runs")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for the figures")
     main(**vars(parser.parse_args()))

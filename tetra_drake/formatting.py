@@ -11,6 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 
+_ROUNDING = 1e-12
+"""Size up to which a number in a table is a rounding error."""
+
 
 def fixed(value: float, digits: int = 2) -> str:
     """A number with this many decimals, never "-0.00". "-" if it is not finite."""
@@ -27,8 +30,9 @@ def signed(value: float, digits: int = 2) -> str:
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """A number with this many significant digits, without exponent. "-" if it is not finite."""
-    if value == 0.0 or not math.isfinite(value):
+    """A number with this many significant digits, without exponent. "-" if it is not finite, and 0
+    for a rounding error."""
+    if abs(value) < _ROUNDING or not math.isfinite(value):
         return fixed(value, 0)
     magnitude = int(f"{value:.{digits - 1}e}".partition("e")[2])
     return fixed(value, max(0, digits - 1 - magnitude))

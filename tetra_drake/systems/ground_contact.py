@@ -155,7 +155,13 @@ def AddGroundContact(
 
     The plant must be finalized, may have any joints, and should be continuous. `ground` is by
     robot.ground.make_surface(), or a robot's, whose own contact nodes do not count. For `witness`
-    see GroundContact. The ports have the contact nodes in the order of `frames`.
+    see GroundContact. The ports have the contact nodes in the order of `frames`. The ground of a
+    scenario under the tip of a link:
+
+    >>> given = load_scenario("coulomb")
+    >>> surface = make_surface(given.ground, given.friction, given.terrain)
+    >>> tip = AddFrame(plant, "tip", link, [0.0, 0.0, -1.0])  # before plant.Finalize()
+    >>> AddGroundContact(builder, plant, frames=[tip], ground=surface)
 
     Raises InputError for a frame of the world, and for a constant of the normal force that is
     negative or not finite.

@@ -8,8 +8,8 @@
 //   film.still(times)           the last instant, the earlier ones faded, with path and distance
 //   film.dress(on)              shows or hides heading, legend, bar (none at rest) and names
 window.addEventListener("load", () => {
-  const {Color, CylinderGeometry, ConeGeometry, BufferGeometry, Fog, Group, Line} = MeshCat.THREE;
-  const {LineBasicMaterial, Mesh, MeshPhongMaterial, Quaternion, Raycaster, Vector3} = MeshCat.THREE;
+  const {BoxGeometry, BufferGeometry, Color, ConeGeometry, CylinderGeometry, Fog, Group} = MeshCat.THREE;
+  const {Line, LineBasicMaterial, Mesh, MeshPhongMaterial, Quaternion, Raycaster, Vector3} = MeshCat.THREE;
   const {bodies, cables, colours, contacts, nodes, progress, strut, times} = recording;
   const UP = new Vector3(0, 0, 1);
   const WIDTH_FILLED = 0.7, HEIGHT_FILLED = 0.58;  // shares of the picture
@@ -20,6 +20,13 @@ window.addEventListener("load", () => {
   const find = (...path) => viewer.scene_tree.find(path).object;
 
   const mesh = (object) => object.isMesh ? object : object.children.map(mesh).find((found) => found);
+
+  // Browsers without graphics hardware draw a large triangle wrongly if the camera is above it.
+  const slab = mesh(find("floor", "slab"));
+  if (slab) {
+    const {width, height, depth} = slab.geometry.parameters;
+    slab.geometry = new BoxGeometry(width, height, depth, 16, 16);
+  }
 
   function sums(rows) {
     return rows.map((steps) => {

@@ -19,7 +19,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import render
+from tetra_drake.formatting import render, rounded
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.path import follow
 from tetra_drake.robot.robot import Robot
@@ -150,8 +150,8 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "traces": _steps(followed_nodes(frames["p_WN"].values, structure)[:, :2]),
         "progress": _progress(robot, frames),
         "legend": {
-            "tension": f"{greatest / units.force:.2g} {units.force_name}",
-            "force": f"{force_of_square / units.force:.2g} {units.force_name}",
+            "tension": f"{rounded(greatest / units.force, 2)} {units.force_name}",
+            "force": f"{rounded(force_of_square / units.force, 2)} {units.force_name}",
             "square": units.shown(units.square, "m"),
             "dark": units.shown(units.squares * units.square, "m"),
             "trace": "rear feet" if structure.markers.size else "centre",
