@@ -141,12 +141,14 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
     [
         ({"speed": 1.0, "heading_change": 9.0}, "walks 2.0 inches in 15 s"),
         ({"heading_change": 1.0}, "turns 180 degrees in 15 s"),
+        ({"rolled": 1.0, "lateral_drift": -4.0}, "rolled 5.73 deg, walks 2.0 inches in 15 s"),
         ({"cost_of_transport": -1, "twist": -1}, "cost of transport 4, walks 2.0 inches in 15 s"),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
     metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "twist": 0.5 * INCH}
     metrics |= {"heading_change": math.pi, "cost_of_transport": 4.0, "speed": 0.1}
+    metrics |= {"rolled": 0.1, "lateral_drift": 1.0}
     assert headline(scenario.with_sections(objective=objective), metrics) == text
 
 

@@ -76,10 +76,11 @@ def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
 
 def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:
     """Name of the most important metric of a gait: the distance if the objective rewards it,
-    otherwise the metric with the largest part in the fitness."""
+    otherwise the metric with the largest part in the fitness, of those that it rewards if any."""
     if looks_for_distance(objective):
         return "distance"
-    parts = {name: abs(weight * metrics[name]) for name, weight in objective.items()}
+    rewarded = {name: weight for name, weight in objective.items() if weight > 0.0} or objective
+    parts = {name: abs(weight * metrics[name]) for name, weight in rewarded.items()}
     return max(parts, key=lambda name: -1.0 if math.isnan(parts[name]) else parts[name])
 
 
