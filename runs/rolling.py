@@ -301,6 +301,15 @@ and winches on all 24 cables. Sizes, cables and the winches' speed, 0.2 m/s, are
 with which UC Berkeley plans its rover; the greatest force, 100 N, is chosen. Rods touch.
 `python runs/rolling.py` writes this page. [The motion in 3D](replay.html)
 
+To simulate the best policy yourself, in the folder `runs`:
+
+```python
+from rolling import best_of, drive, load_policies
+
+result = drive(best_of(load_policies())["coefficients"], "compiled", record=True)
+print(result.metrics)
+```
+
 **In 20 s the best policy rolls {turns} turns and {way} m forward ({drift} sideways). It rolls
 {diagram} turns on the Drake diagram and {mujoco} in MuJoCo. {kept} of {draws} disturbed robots make
 two turns and drift by at most 20 % of their way.**
