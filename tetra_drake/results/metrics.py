@@ -76,7 +76,8 @@ def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
 
 def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:
     """Name of the most important metric of a gait: the distance if the objective rewards it,
-    otherwise the metric with the largest part in the fitness, of those that it rewards if any."""
+    otherwise the metric with the largest part in the fitness. Metrics that it only punishes do not
+    count beside one that it rewards."""
     if looks_for_distance(objective):
         return "distance"
     rewarded = {name: weight for name, weight in objective.items() if weight > 0.0} or objective
