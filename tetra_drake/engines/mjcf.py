@@ -59,7 +59,7 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     (13 bodies,) at `rest`, there is a key frame of this name. Raises InputError if MuJoCo does not
     know the terrain or the friction.
     """
-    scenario, structure = robot.scenario, robot.structure
+    scenario = robot.scenario
     check_mjcf(scenario)
     model = Element("mujoco", model=scenario.name)
     steps = {"integrator": integrator_of(robot), "timestep": scenario.settings_of(Mujoco).step}
@@ -69,17 +69,14 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
         _add_floor(world, robot)
-    for node in range(structure.first_node[-1], len(structure.node_names)):  # fixed nodes
-        add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
+    _add_fixed_nodes(world, robot.structure)
     _add_bodies(model, world, robot)
     if rest is not None:
-        poses = rest[: 7 * len(structure.bodies)].reshape(-1, 7)
-        qpos = np.hstack([poses[:, 4:], poses[:, :4]])
-        add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
+        _add_key_frame(model, robot.structure, rest)
     if robot.model.strut_contact.acts:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot)
-    _add_pushes(model, world, structure)
+    _add_pushes(model, world, robot.structure)
     return xml_text(model)
 
 
@@ -102,6 +99,12 @@ def _add_floor(world: Element, robot: Robot) -> None:
     add_element(
         world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE
     )
+
+
+def _add_fixed_nodes(world: Element, structure: Structure) -> None:
+    """Adds a site of the world for each fixed node."""
+    for node in range(structure.first_node[-1], len(structure.node_names)):
+        add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
@@ -141,11 +144,18 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             add_element(body, "geom", **geom, rgba=STRUT_COLOUR, **_ALONE)
 
 
+def _add_key_frame(model: Element, structure: Structure, state: Array) -> None:
+    """Adds the key frame "rest" with the poses of a state."""
+    poses = state[: 7 * len(structure.bodies)].reshape(-1, 7)
+    qpos = np.hstack([poses[:, 4:], poses[:, :4]])
+    add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
+
+
 def _contact(robot: Robot, mass: float) -> dict:
     """Contact settings for the floor and a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
-    borne = robot.weight / (robot.structure.feet or max(1, robot.equilibrium.feet))
+    borne = robot.weight / _feet(robot)
     rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo's numbers are per mass, divided by 1 - impedance, and for friction multiplied by
     # impratio. Negative numbers mean stiffness and damping.
@@ -176,6 +186,11 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
             "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
         }
         add_element(pairs, "pair", geom1=f"strut {i}", geom2=f"strut {j}", **contact)
+
+
+def _feet(robot: Robot) -> int:
+    """Number of nodes that bear the weight: from the blueprint, or in equilibrium."""
+    return robot.structure.feet or max(1, robot.equilibrium.feet)
 
 
 def _add_cables(model: Element, robot: Robot) -> None:

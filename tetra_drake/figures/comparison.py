@@ -50,12 +50,12 @@ def comparison(compared: Compared, *, figure: Page | None = None) -> Drawn:
 
     If a distance to reach was given, a second panel shows the share of trials that have reached it.
     Finished trials keep their last values. A dot marks the end of a run."""
-    kinds, unit = 1 if compared.reach is None else 2, compared.scenario.units
+    panel_count, unit = 1 if compared.reach is None else 2, compared.scenario.units
     labels = []
     for label, count in compared.runs["trials"].items():
         labels.append(f"{label} (1 trial)" if count == 1 else f"{label} ({count} trials)")
     is_narrow = page_width(figure) < _BESIDE * rcParams["font.size"] / Look.font_size
-    rows, columns = (kinds, 1) if is_narrow else (1, kinds)
+    rows, columns = (panel_count, 1) if is_narrow else (1, panel_count)
     page = page_of(figure, height_in=1.2 + 2.2 * rows + 0.1 * len(labels))
     panels = page.subplots(rows, columns, squeeze=False).ravel()
     ends = compared.curves.groupby("run", sort=False)["cost"].max()

@@ -154,9 +154,10 @@ def trials_table(run: Run) -> Table:
     for status in run.statuses:
         values = [math.nan] * 3
         if status.number in best.index:
-            values[:2] = run.initial_best(status.number)[name], best.loc[status.number, name]
-            key = status.number, best.loc[status.number, "index"]
-            values[2] = in_drake.loc[key, name] if key in in_drake.index else math.nan
+            gait = best.loc[status.number]
+            key = status.number, gait["index"]
+            again = in_drake.loc[key, name] if key in in_drake.index else math.nan
+            values = [run.initial_best(status.number)[name], gait[name], again]
         cells = [rounded(value / size) for value in values]
         counts = [f"{status.evaluations}", f"{status.failures or ''}"]
         end = "not finished" if status.stop is None else status.stop.replace(ALL_DONE, "")

@@ -143,7 +143,7 @@ def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
     return applied
 
 
-def CheckConstants(source: str, key: str, constants: Mapping[str, Any]) -> None:
+def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None:
     """Raises InputError that names `source` and `key` unless the constants of a law are numbers
     that it can have: finite and not negative."""
     for name, value in constants.items():

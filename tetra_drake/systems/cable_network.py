@@ -20,7 +20,7 @@ from tetra_drake.scenario.refusals import hint
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.actuators import Actuators
-from tetra_drake.systems.attachment import Attach, CheckConstants, Nodes
+from tetra_drake.systems.attachment import Attach, Nodes, check_constants
 from tetra_drake.systems.cable_geometry import AddCableGeometry
 
 
@@ -192,7 +192,7 @@ def _cable_table(
     """Records of the cables, of dtype CABLE."""
     places: dict[str, int] = {}
     for place, one in enumerate(cables):
-        CheckConstants("AddCables", f"cables.{one.name}", one.law._asdict())
+        check_constants("AddCables", f"cables.{one.name}", one.law._asdict())
         if places.setdefault(one.name, place) != place:
             raise InputError("AddCables", f"cables.{one.name}", "is given twice")
     table = np.zeros(len(cables), dtype=cable.CABLE)

@@ -174,8 +174,10 @@ def _AddController(builder: DiagramBuilder, controller: System, *, size: int) ->
         found = ", ".join(ports) or "no output ports"
         problem = f"found {found}, expected an output port 'signals' of size {size}"
         raise InputError("MakeTensegrityDiagram", "controller", problem)
-    _CheckSize(controller.GetOutputPort("signals"), size)
-    return builder.AddNamedSystem("controller", controller).GetOutputPort("signals")
+    signals = controller.GetOutputPort("signals")
+    _check_size(signals, size)
+    builder.AddNamedSystem("controller", controller)
+    return signals
 
 
 def _ConnectController(
@@ -191,11 +193,11 @@ def _ConnectController(
             problem = f"found the input port '{name}', expected a port of cables or ground"
             raise InputError("MakeTensegrityDiagram", "controller", problem)
         given = state if name == "state" else having[0].GetOutputPort(name)
-        _CheckSize(port, given.size())
+        _check_size(port, given.size())
         builder.Connect(given, port)
 
 
-def _CheckSize(port: InputPort | OutputPort, size: int) -> None:
+def _check_size(port: InputPort | OutputPort, size: int) -> None:
     """Raises InputError unless a port of a controller has a size."""
     if port.size() != size:
         problem = f"found size {port.size()} of port '{port.get_name()}', expected {size}"

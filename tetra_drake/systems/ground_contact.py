@@ -26,7 +26,7 @@ from tetra_drake.physics.mode_change import mode_margin, modes_after_step, next_
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
-from tetra_drake.systems.attachment import Attach, CheckConstants, Nodes
+from tetra_drake.systems.attachment import Attach, Nodes, check_constants
 
 
 class GroundContact(LeafSystem):
@@ -167,7 +167,7 @@ def AddGroundContact(
     negative or not finite.
     """
     normal = contact.NormalForce(*ground.normal.tolist())
-    CheckConstants("AddGroundContact", "ground", normal._asdict())
+    check_constants("AddGroundContact", "ground", normal._asdict())
     if any(frame.body() is plant.world_body() for frame in frames):
         raise InputError("AddGroundContact", "frames", "found a frame of the world")
     nodes = Nodes.of(plant, frames)
