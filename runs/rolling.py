@@ -159,12 +159,12 @@ def evolve_policy(robots: Simulation, trial: int) -> np.ndarray:
 def drive(coefficients: Sequence[float], engine: str, *, record: bool = False) -> SimulationResult:
     """The undisturbed rover, driven by a policy on an engine."""
     scenario = load_scenario("rover").with_changes(ENGINES[engine])
-    policy = RollingPolicy.of(Simulation(load_scenario("rover")), np.array(coefficients))
+    rolling = RollingPolicy.of(Simulation(load_scenario("rover")), np.array(coefficients))
 
-    def control(time: float, readings: Readings) -> np.ndarray:
-        return policy(readings)
+    def policy(time: float, readings: Readings) -> np.ndarray:
+        return rolling(readings)
 
-    return simulate(scenario, controller=control, record=record)
+    return simulate(scenario, controller=policy, record=record)
 
 
 def rolls(metrics: Metrics | None) -> bool:

@@ -4,7 +4,8 @@
     >>> environment = gymnasium.make("tetra_drake/Walk-v0", grouped=True)
     >>> many = gymnasium.make_vec("tetra_drake/Walk-v0", num_envs=64)
 
-The import registers the environments with Gymnasium, as Gymnasium expects it of a package.
+The import registers the environments with Gymnasium, as Gymnasium expects it of a package. The name
+"tetra_drake.gym:tetra_drake/Walk-v0" makes Gymnasium import the module itself.
 
 Observation, a row of numbers:
 
@@ -15,7 +16,8 @@ Observation, a row of numbers:
 
 Action: the signal of each driven cable, or of each oscillator with `grouped`, as a share of the
 typical amplitude of the network's signals. Positive signals shorten the cable. An actuator gets the
-setpoint of this signal, see Simulation: 0 is its setpoint at the start.
+setpoint of this signal, see Simulation: 0 is its setpoint at the start. Actions beyond -1 and 1 are
+applied as they are.
 
 Reward: the increase of the fitness, which the scenario's `objective` defines. Within an episode it
 is the part of `rolled` and of the metrics that follow from positions. The last reward adds the

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 from helpers.structures import joined_nodes
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.errors import InputError
-from tetra_drake.report.structure_page import robot_of_file, structure_text
+from tetra_drake.report.structure_page import robot_of_file
 from tetra_drake.robot.statics import find_statics
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario, save_scenario
@@ -275,10 +274,8 @@ def test_the_structure_names_friction_and_restitution_that_the_scenario_replaces
     [record] = caplog.records
     assert "my.yaml: friction, restitution not used" in record.getMessage()
     caplog.clear()
-    # The scenario keeps the names, which its own file and the text of the structure show.
-    robot = robot_of_file(str(file), unit="dm")
-    assert "friction, restitution" in structure_text(study_equilibrium(robot))
-    save_scenario(tmp_path, robot.scenario)
+    # The scenario keeps the names, as its own file shows.
+    save_scenario(tmp_path, robot_of_file(str(file), unit="dm").scenario)
     saved = load_scenario(tmp_path / "scenario.yaml")
     assert dict(saved.differences(load_scenario()))["robot.ignored"] == "[friction, restitution]"
     caplog.clear()

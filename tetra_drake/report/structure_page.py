@@ -88,8 +88,6 @@ def structure_text(study: EquilibriumStudy) -> str:
     if structure.held.any():
         lines.append(_anchors_table(study).text())
     lines += _faults(study)
-    if ignored := robot.scenario.robot.ignored:
-        lines.append(f"Not used, as the scenario's friction and ground hold: {', '.join(ignored)}.")
     return "\n\n".join(lines)
 
 
