@@ -185,9 +185,10 @@ def announce(kept: bool) -> None:
     if time.monotonic() < _told + _MINUTE:
         return
     _told = time.monotonic()
-    often = "once" if kept else "each time, as no folder can be written to: set NUMBA_CACHE_DIR"
+    lost = " each time, as no folder can be written to: set NUMBA_CACHE_DIR"
+    often = "; later runs reuse the code" if kept else lost
     logging.getLogger(LOGGER).warning(
-        "tetra_drake is compiling for this processor, which may take a minute, %s", often
+        "tetra_drake is compiling for this processor, which may take a minute%s", often
     )
 
 
