@@ -25,8 +25,8 @@ leads, and it can follow a faster one.
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -166,4 +166,6 @@ def main(out: Path = OUT) -> None:
 
 
 if __name__ == "__main__":
-    main(*[Path(folder) for folder in sys.argv[1:2]])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", nargs="?", type=Path, default=OUT)
+    main(parser.parse_args().out)

@@ -8,9 +8,9 @@ packages nbclient and ipykernel (`pip install -e '.[test]'`).
 
 from __future__ import annotations
 
+import argparse
 import ast
 import re
-import sys
 import tempfile
 from pathlib import Path
 
@@ -57,4 +57,6 @@ def main(out: Path = NOTEBOOK) -> None:
 
 
 if __name__ == "__main__":
-    main(*[Path(name) for name in sys.argv[1:2]])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", nargs="?", type=Path, default=NOTEBOOK)
+    main(parser.parse_args().out)

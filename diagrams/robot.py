@@ -21,7 +21,7 @@ node touches the ground or breaks free.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 from block_diagram import OUT, save_block_diagram
@@ -64,4 +64,6 @@ def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = OUT
 
 
 if __name__ == "__main__":
-    main(*[Path(name) for name in sys.argv[1:2]])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("gait_file", nargs="?", type=Path, default=BEST_GAIT)
+    main(parser.parse_args().gait_file)

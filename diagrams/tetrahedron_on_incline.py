@@ -18,8 +18,8 @@ tan = mu / (1 + mu / sqrt(2)) with the static mu; 23 degrees here.
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -178,4 +178,6 @@ def main(out: Path = OUT) -> None:
 
 
 if __name__ == "__main__":
-    main(*[Path(folder) for folder in sys.argv[1:2]])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", nargs="?", type=Path, default=OUT)
+    main(parser.parse_args().out)
