@@ -268,17 +268,20 @@ def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path, refused) -> 
         read(write(tmp_path, SPINE))
 
 
-def test_the_structure_names_friction_and_restitution_that_the_scenario_replaces(tmp_path, caplog):
+def test_the_structure_names_settings_that_the_scenario_replaces(tmp_path, caplog):
     file = write(tmp_path, PRISM)
-    assert read(file).ignored == ["friction", "restitution"]
+    unused = ["friction", "restitution", "history"]
+    assert read(file).ignored == unused
     [record] = caplog.records
-    assert "my.yaml: friction, restitution not used" in record.getMessage()
+    assert str(file) in record.getMessage()
+    assert ", ".join(unused) in record.getMessage()
     caplog.clear()
     # The scenario keeps the names, as its own file shows.
     save_scenario(tmp_path, robot_of_file(str(file), unit="dm").scenario)
     saved = load_scenario(tmp_path / "scenario.yaml")
-    assert dict(saved.differences(load_scenario()))["robot.ignored"] == "[friction, restitution]"
+    assert dict(saved.differences(load_scenario()))["robot.ignored"] == f"[{', '.join(unused)}]"
     caplog.clear()
-    without = write(tmp_path, PRISM.replace(", friction: 0.9, restitution: 0", ""))
+    used = PRISM.replace(", friction: 0.9, restitution: 0", "").replace(", history: true", "")
+    without = write(tmp_path, used)
     assert read(without).ignored is None
     assert not caplog.records

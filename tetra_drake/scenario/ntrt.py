@@ -41,16 +41,6 @@ MOST_BYTES = 2**20
 MOST_PARTS = MOST_NODES // 2
 """Largest number of substructures, including nested ones."""
 
-UNUSED = (
-    "friction roll_friction restitution rotation history max_tension target_velocity "
-    "min_actual_length min_rest_length motor_friction motor_inertia back_drivable "
-    "moveCablePointAToEdge moveCablePointBToEdge"
-)
-"""Parameters of NTRT's builders that are allowed and not used."""
-
-OF_GROUND = "friction", "roll_friction", "restitution"
-"""Unused parameters for which the scenario has others: its friction and its ground."""
-
 _LOG = logging.getLogger("tetra_drake")
 
 
@@ -85,7 +75,27 @@ class Substructure(Section):
     translation: Point = Field(default=[0.0, 0.0, 0.0])
 
 
-class Parameters(Section):
+class Unused(Section):
+    """Parameters of NTRT's builders that have no effect: the scenario has its own friction, ground
+    and actuators."""
+
+    friction: Any = None
+    roll_friction: Any = None
+    restitution: Any = None
+    rotation: Any = None
+    history: Any = None
+    max_tension: Any = None
+    target_velocity: Any = None
+    min_actual_length: Any = None
+    min_rest_length: Any = None
+    motor_friction: Any = None
+    motor_inertia: Any = None
+    back_drivable: Any = None
+    moveCablePointAToEdge: Any = None
+    moveCablePointBToEdge: Any = None
+
+
+class Parameters(Unused):
     """Parameters of a builder, with NTRT's defaults."""
 
     radius: float = Field(default=0.5, gt=0)
@@ -94,16 +104,6 @@ class Parameters(Section):
     stiffness: float = Field(default=1000.0, gt=0)
     damping: float = Field(default=10.0, ge=0)
     pretension: float = Field(default=0.0, ge=0)
-    replaced: list[str] = Field(default=[])
-    """Names of OF_GROUND that the file gives."""
-
-    @pydantic.model_validator(mode="before")
-    @classmethod
-    def _drop_unused(cls, tree: Any) -> Any:
-        if not isinstance(tree, dict):
-            return tree
-        used = {name: value for name, value in tree.items() if name not in UNUSED.split()}
-        return used | {"replaced": [name for name in OF_GROUND if name in tree]}
 
 
 class Builder(Section):
@@ -280,7 +280,7 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     ignored = _ignored(whole.builders)
     if ignored:
         names = ", ".join(ignored)
-        _LOG.warning("%s: %s not used; the scenario's friction and ground hold", file, names)
+        _LOG.warning("%s: not used, as the scenario has its own: %s", file, names)
     structure = StructureFile.model_construct(
         nodes={}, struts={}, cables={}, spheres={}, ignored=ignored
     )
@@ -312,9 +312,9 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
 
 
 def _ignored(builders: dict[str, Builder]) -> list[str] | None:
-    """Names of OF_GROUND that the builders give, if any."""
-    given = {name for builder in builders.values() for name in builder.parameters.replaced}
-    return [name for name in OF_GROUND if name in given] or None
+    """Names of unused parameters that the builders give, if any."""
+    given = {name for builder in builders.values() for name in builder.parameters.model_fields_set}
+    return [name for name in Unused.model_fields if name in given] or None
 
 
 def _add_spheres(structure: StructureFile, whole: Assembly, unit: float) -> None:

@@ -197,8 +197,8 @@ class StructureFile(Section):
     """Displacement [x, y, z] of each body at t = 0; none if empty. A body stays along the axes of
     its anchors."""
     ignored: list[str] | None = None
-    """Settings of an imported file that have no effect, because the scenario's friction and ground
-    hold, such as restitution. They are noted when the file is read."""
+    """Settings of an imported file that have no effect, because the scenario has its own friction,
+    ground and actuators. They are noted when the file is read."""
 
     def __copy__(self) -> Self:
         # The copy has no cached properties, because it may get other values.
