@@ -31,6 +31,8 @@ _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
 
 _NOTHING = 5e-4
 """Threshold for a row of a table: it may be left out if all its numbers, as shown, are smaller."""
+_NOISE = 1e-5
+"""Threshold for a number of a gait, as shown: smaller ones are 0, as rounding errors add up."""
 
 
 def metrics_table(
@@ -51,7 +53,8 @@ def metrics_table(
         values = [gait.get(name, math.nan) / size for gait in gaits.values()]
         has_some = any(math.isfinite(value) and abs(value) >= _NOTHING for value in values)
         if has_some or name in always:
-            digits = [fixed(x, 0) if name in _SHARES else rounded(x) for x in values]
+            whole = name in _SHARES
+            digits = [fixed(x, 0) if whole or abs(x) < _NOISE else rounded(x) for x in values]
             rows.append([title, *digits, _NOTES.get(name, "")])
     return Table(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))
 
