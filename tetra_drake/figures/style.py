@@ -147,13 +147,18 @@ def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
 
     @functools.wraps(draw)
     def drawn(*args: Any, units: str | None = None, **kwargs: Any) -> Drawn:
+        figure = kwargs.get("figure")
+        if not isinstance(figure, Page | None):
+            kind = type(figure).__name__
+            problem = f"found a value of type {kind}, expected matplotlib's Figure or SubFigure"
+            raise InputError(draw.__name__, "figure", problem)
         look = Look(**{name: kwargs.pop(name) for name in vars(Look()) if name in kwargs})
         with shown_in(units), common_style(look):
             rcParams["text.parse_math"] = False  # a name may hold a dollar sign
             page = draw(*args, **kwargs)
         if not look.title:
             page.suptitle("").set_in_layout(False)
-        return page if kwargs.get("figure") is None else None
+        return page if figure is None else None
 
     keyword = inspect.Parameter.KEYWORD_ONLY
     of_look = inspect.signature(Look).parameters.values()
