@@ -51,6 +51,15 @@ def test_each_key_is_a_labelled_axis_of_the_numbers_of_single_simulations(short:
     }  # fmt: skip
 
 
+def test_joined_keys_are_one_axis(short: Scenario) -> None:
+    slippery = short.with_changes({"friction": "!Coulomb"})
+    gait = seeded_gait(slippery)
+    found = sweep(slippery, gait, {"friction.static, friction.kinetic": [0.1, 0.3]})
+    assert found.kinetic.values.tolist() == [0.1, 0.3]
+    both = slippery.with_changes({"friction.static": 0.1, "friction.kinetic": 0.1})
+    assert found.distance.values[0, 0] == simulate(both, gait).metrics.distance
+
+
 def test_the_path_of_one_gait_is_enough_and_a_failure_is_nan(short, tmp_path):
     save_gait(seeded_gait(short), tmp_path / "gait.json", short)
     found = sweep(short, tmp_path / "gait.json", {"simulation.max_evaluations": [10, 100_000]})

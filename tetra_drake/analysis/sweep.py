@@ -14,6 +14,7 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.changes import given_changes
+from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
@@ -39,7 +40,8 @@ def sweep(
         {'outer_stiffness': 3, 'gait': 1}
         >>> mean = metrics.distance.mean("gait").sel(outer_stiffness=35)
 
-    Each key of `changes` is a dimension of the result. The name of the dimension is the last part
+    Each key of `changes` is a dimension of the result. Keys that are joined by commas get the same
+    value, such as "friction.static, friction.kinetic". The name of the dimension is the last part
     of the key, or the whole key if the last part is not unique. Coordinates are in SI. The
     dimension `gait` has the names of the gaits. A failed simulation is NaN.
 
@@ -63,7 +65,7 @@ def sweep(
     swept = given_changes(changes, "sweep")
     changes = {key: _values(key, values) for key, values in swept.items()}
     combinations = list(itertools.product(*changes.values()))
-    scenarios = [base.with_changes(dict(zip(changes, each, strict=True))) for each in combinations]
+    scenarios = [base.with_changes(_by_key(changes, each)) for each in combinations]
     outcomes = simulate_many(
         [changed for changed in scenarios for _ in walkers],
         walkers * len(scenarios),
@@ -83,6 +85,12 @@ def sweep(
         variables[name] = list(labels), numbers, {"units": unit or "1"}
     coordinates = {name: (name, *given) for name, given in labels.items()}
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
+
+
+def _by_key(joined: Iterable[str], values: Iterable[Any]) -> dict[str, Any]:
+    """Changes of a scenario: each value for all keys that are joined."""
+    pairs = zip(joined, values, strict=True)
+    return {key: value for keys, value in pairs for key in separate(keys)}
 
 
 def _values(key: str, given: Any) -> list[Any]:
@@ -107,7 +115,7 @@ def _labels(
 ) -> tuple[list[Any], dict[str, str]]:
     """Coordinates of a dimension: the numbers of a key in SI and their unit. Values that are not
     numbers become text."""
-    numbers = [value_at(changed.model_dump(), key) for changed in scenarios]
+    numbers = [value_at(changed.model_dump(), separate(key)[-1]) for changed in scenarios]
     if not all(isinstance(number, int | float) for number in numbers):
         return [str(value) for value in values], {}
     return numbers, {"units": getattr(numbers[0], "unit", "1")}

@@ -142,8 +142,8 @@ def time_lapse(
         way = signed(float(walked.sel(time=now)), unit.decimals + 1)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
-    if len(looks) <= len(LINE_COLOURS):
-        legend_below(page, dict(zip(structure.bodies, looks, strict=True)))
+    named = structure.bodies if len(looks) <= len(LINE_COLOURS) else ()
+    legend_below(page, dict(zip(named, looks, strict=False)) | {"path of the centre": _PATH})
     set_title(page, "Time lapse from above: time and distance walked")
     return page
 
