@@ -47,6 +47,7 @@ _CLEARANCE = 0.02  # a body is off the ground above this share of the robot's he
 
 _ON_GROUND, _LIFTED = "0.2", OKABE_ITO["vermillion"]
 _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
+_WAY: Any = _PATH | {"color": "0.6"}  # beside bodies in the colours of lines
 _GROUND: Any = {"color": "0.6", "linewidth": 0.8, "linestyle": "-"}
 _SECONDS: Any = {"color": "0.4", "marker": "o", "linestyle": "", "markersize": 1.8}
 _START: Any = {"color": "black", "marker": "o", "linestyle": "", "markerfacecolor": "white"}
@@ -137,13 +138,13 @@ def time_lapse(
         now = float(trajectory.time[sample])
         _draw_struts(panel, nodes[sample][:, [X, Y]], structure, [look["color"] for look in looks])
         seconds = _nearest(trajectory, np.arange(math.ceil(first), now + 1e-9))
-        panel.plot(centre[: sample + 1, X], centre[: sample + 1, Y], **_PATH)
+        panel.plot(centre[: sample + 1, X], centre[: sample + 1, Y], **_WAY)
         panel.plot(centre[seconds, X], centre[seconds, Y], **_SECONDS)
         way = signed(float(walked.sel(time=now)), unit.decimals + 1)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
     named = structure.bodies if len(looks) <= len(LINE_COLOURS) else ()
-    legend_below(page, dict(zip(named, looks, strict=False)) | {"path of the centre": _PATH})
+    legend_below(page, dict(zip(named, looks, strict=False)) | {"path of the centre": _WAY})
     set_title(page, "Time lapse from above: time and distance walked")
     return page
 
