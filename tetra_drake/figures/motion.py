@@ -30,6 +30,7 @@ from tetra_drake.figures.style import (
 )
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results import measures
+from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
@@ -59,10 +60,7 @@ _AFTER: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.6, "linestyle": "-"}
 
 @figure_function
 def relative_distances(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
 ) -> Drawn:
     """Distance along x of each body from the first body, over time. Distances are between centres
     of mass. Grey lines: the distances at the start."""
@@ -90,7 +88,7 @@ def before_and_after(
     best: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
 ) -> Drawn:
     """Distance walked over time, before and after evolution: the best initial gait and the best
     gait of the best trial."""
@@ -115,7 +113,7 @@ def time_lapse(
     result: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
     instants: int = 6,
 ) -> Drawn:
     """Time lapse of the robot from above, to scale, with the distance walked. Forward is to the
@@ -153,7 +151,7 @@ def path_of_the_centre(
     result: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
     instants: int = 9,
 ) -> Drawn:
     """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
@@ -202,7 +200,7 @@ def one_step(
     result: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
     instants: int = 6,
 ) -> Drawn:
     """One step to scale, from above and from the side. Bodies off the ground are red.
@@ -254,9 +252,7 @@ def one_step(
     return page
 
 
-def _shown_step(
-    result: SimulationResult, time: tuple[float, float] | None
-) -> tuple[tuple[float, float], str]:
+def _shown_step(result: SimulationResult, time: Span | None) -> tuple[Span, str]:
     """Start and end (s) of the time to show, and its title."""
     ends = time or measures.last_step(result.trajectory)
     if ends is not None:
@@ -327,19 +323,14 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
-def _range(values: np.ndarray, unit: Units) -> tuple[float, float]:
+def _range(values: np.ndarray, unit: Units) -> Span:
     """Range of coordinates with a margin."""
     margin = _MARGIN / unit.length
     return float(values.min()) - margin, float(values.max()) + margin
 
 
 def _fit(
-    count: int,
-    wide: tuple[float, float],
-    high: tuple[float, float],
-    figure: Page | None,
-    *,
-    height_in: float,
+    count: int, wide: Span, high: Span, figure: Page | None, *, height_in: float
 ) -> tuple[int, float]:
     """Number of columns for which `count` pictures are largest, and the height (in) of all rows.
 
@@ -358,7 +349,7 @@ def _fit(
     return columns, row * math.ceil(count / columns)
 
 
-def _to_scale(panel: Axes, wide: tuple[float, float], high: tuple[float, float]) -> None:
+def _to_scale(panel: Axes, wide: Span, high: Span) -> None:
     """Sets the ranges of both axes, with the same scale and without numbers on the y axis."""
     panel.set(xlim=wide, ylim=high, aspect="equal", yticks=[])
     panel.tick_params(axis="y", length=0.0)
