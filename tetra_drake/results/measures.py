@@ -48,15 +48,6 @@ def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
     return trajectory.normal_force == 0.0
 
 
-def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """True if no contact node of a body bears a normal force (time, body)."""
-    import xarray
-
-    off, bodies = off_ground(trajectory), trajectory.body
-    of_bodies = [off[:, (off.contact_body == body).values].all("contact") for body in bodies]
-    return xarray.concat(of_bodies, dim=bodies).T
-
-
 def intervals(times: np.ndarray, active: np.ndarray) -> list[Span]:
     """Intervals where a Boolean signal is true, as starts and ends (s).
 
