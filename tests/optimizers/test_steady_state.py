@@ -8,13 +8,12 @@ import pytest
 from helpers.analytic import optimise, small_scenario
 
 from tetra_drake.optimizers import optimizer_of
-from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation, mean_fitness
 from tetra_drake.optimizers.steady_state import (
     cross_over,
     draw_mutation,
     find_place,
     has_levelled_off,
-    mean_fitness,
     mutate,
     mutation_steps,
     select_parent,

@@ -361,10 +361,8 @@ def _draw_struts(
     panel: Axes, points: np.ndarray, structure: Structure, colours: Sequence[str]
 ) -> None:
     """Draws the struts between points (nodes, 2); each body has its colour."""
-    bodies = structure.carriers[structure.struts[:, 0]]
-    lines = LineCollection(
-        list(points[structure.struts]), colors=[colours[body] for body in bodies], linewidths=1.2
-    )
+    of_struts = [colours[body] for body in structure.carriers[structure.struts[:, 0]]]
+    lines = LineCollection(list(points[structure.struts]), colors=of_struts, linewidths=1.2)
     panel.add_collection(lines, autolim=False)
 
 

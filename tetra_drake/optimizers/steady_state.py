@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.files import json_number
-from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
 from tetra_drake.robot.gait import TAU_A, TAU_B, TAU_B_PER_TAU_A, ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
 from tetra_drake.scenario.common_sections import EvolutionSection
@@ -165,12 +165,6 @@ def find_place(
         if child > fitnesses[member]:
             return member
     return None
-
-
-def mean_fitness(fitnesses: Vector) -> float:
-    """Mean fitness of the members that did not fail; NaN if all failed."""
-    finite = fitnesses[np.isfinite(fitnesses)]
-    return float(np.mean(finite)) if finite.size else float("nan")
 
 
 def has_levelled_off(means: Sequence[float], settings: kinds.SteadyState) -> bool:
