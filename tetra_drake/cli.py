@@ -30,10 +30,11 @@ FAILED, INTERRUPTED = 1, 130  # exit statuses beside BAD_INPUT
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
-    call, [units] = make_parser().call_of(argv, common=["units"])
+    command, options = make_parser().call_of(argv)
+    units = options.pop("units")
     try:
         with heeding_interrupts(), shown_in(units):
-            call()
+            command(**options)
             sys.stdout.flush()
     except (InputError, SimulationFailure) as error:
         print(f"tetra-drake: {error}", file=sys.stderr)

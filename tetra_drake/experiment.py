@@ -10,7 +10,7 @@ from numbers import Integral
 from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
-from tetra_drake.analysis.fit import EVALUATIONS, Bounds, Fit, Say, fit_values
+from tetra_drake.analysis.fit import EVALUATIONS, Bounds, Fit, fit_values
 from tetra_drake.analysis.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure
@@ -23,6 +23,7 @@ from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
 from tetra_drake.files import check_folder, given_path
+from tetra_drake.formatting import Say, silent
 from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.robot.robot import Robot
@@ -137,7 +138,7 @@ def fit(
     *,
     search: bool = False,
     out: str | Path | None = None,
-    say: Say | None = None,
+    say: Say = silent,
     source: object = "fit",
 ) -> Fit:
     """Fits values of a scenario to measurements of a robot, by bounded least squares.

@@ -7,12 +7,19 @@ import itertools
 import math
 import shutil
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import resources
 
+Say = Callable[[str], None]
+"""Function that tells the user something."""
+
 _ROUNDING = 1e-12
 """Size up to which a number in a table is a rounding error."""
+
+
+def silent(text: str) -> None:
+    """Tells the user nothing."""
 
 
 def fixed(value: float, digits: int = 2) -> str:

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import platform
 from collections.abc import Iterable
 from importlib import metadata
 
+from tetra_drake.errors import InputError
+
 
 def available_cores() -> int:
     """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def check_package(name: str, *, extra: str, source: str) -> None:
+    """Raises InputError, naming `source`, if a package of one of this project's extras is
+    missing."""
+    if importlib.util.find_spec(name) is None:
+        raise InputError(source, "", f"needs {name}: pip install 'tetra_drake[{extra}]'")
 
 
 def versions(packages: Iterable[str] = ()) -> dict[str, str]:

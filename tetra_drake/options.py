@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import functools
 import inspect
 import math
 import re
@@ -67,11 +66,8 @@ class Command(argparse.ArgumentParser):
                     groups[group] = command.add_mutually_exclusive_group()
                 groups[group].add_argument(name, **more)
 
-    def call_of(
-        self, argv: Sequence[str] | None, *, common: Sequence[str]
-    ) -> tuple[Callable[[], None], list[Any]]:
-        """The call of a command's function for given arguments, and the values of the options
-        `common` to all commands."""
+    def call_of(self, argv: Sequence[str] | None) -> tuple[Callable[..., None], dict[str, Any]]:
+        """The function of a command, and the values of its options."""
         options, unknown = self.parse_known_args(argv)
         values = vars(options)
         function, parser = values.pop("function"), values.pop("parser")
@@ -80,8 +76,7 @@ class Command(argparse.ArgumentParser):
 
             names = re.findall(r"--[\w-]+", parser.format_usage())
             parser.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
-        shared = [values.pop(name) for name in common]
-        return functools.partial(function, **values), shared
+        return function, values
 
 
 def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[str, Any]]:

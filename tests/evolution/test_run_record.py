@@ -53,7 +53,7 @@ def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
     with refused(manifest, key, ""):
         RunRecord.resume(run)
     cut(manifest, 50)
-    with refused(manifest, "", "cannot be read"):
+    with refused(manifest, "", "is not JSON"):
         RunRecord.resume(run)
 
 

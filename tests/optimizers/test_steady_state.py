@@ -8,19 +8,19 @@ import pytest
 from helpers.analytic import optimise, small_scenario
 
 from tetra_drake.optimizers import optimizer_of
-from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation, mean_fitness
 from tetra_drake.optimizers.steady_state import (
     cross_over,
     draw_mutation,
     find_place,
     has_levelled_off,
-    mean_fitness,
     mutate,
     mutation_steps,
     select_parent,
     select_victim,
 )
 from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
+from tetra_drake.scenario import optimizer_kinds as kinds
 
 DRAWS = 2000
 
@@ -108,8 +108,11 @@ def test_a_child_replaces_the_worst_of_its_tournament_or_else_of_all(fitness, pl
 )
 def test_the_stop_rule_looks_a_hundred_iterations_back_after_the_200th(iterations, rise, stops):
     means = [0.0] * iterations + [rise]
-    assert has_levelled_off(means, rise=0.03, window=100, after=200) is stops
-    assert not has_levelled_off(means, rise=0.03, window=300, after=0)
+    assert (
+        has_levelled_off(means, kinds.SteadyState(stop_rise=0.03, stop_window=100, stop_after=200))
+        is stops
+    )
+    assert not has_levelled_off(means, kinds.SteadyState(stop_window=300, stop_after=0))
 
 
 def test_one_iteration_as_the_listing_goes_through_it(scenario):

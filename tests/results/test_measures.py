@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from helpers import prism
-from helpers.made_up_walk import HEIGHT, PERIOD, make_row, make_walk
+from helpers.made_up_walk import PERIOD, make_row, make_walk
 
 from tetra_drake.physics.curves import travelling_index
 from tetra_drake.results.measures import (
@@ -13,7 +13,6 @@ from tetra_drake.results.measures import (
     dominant_frequency,
     intervals,
     last_step,
-    lifted,
     relative_distances,
     share_of_time,
 )
@@ -25,17 +24,6 @@ UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
 @pytest.fixture(scope="module")
 def walk():
     return make_walk()
-
-
-def test_a_tetrahedron_is_lifted_when_none_of_its_nodes_bears_a_force(walk):
-    eleven = make_walk(bodies=11)  # T1 and T11 begin alike
-    heights = eleven.p_WN.sel(node=[f"{body} bottom_left" for body in eleven.body.values], axis="z")
-    np.testing.assert_array_equal(lifted(eleven), heights > 1e-9)
-    assert float(heights.max()) == pytest.approx(HEIGHT, rel=1e-3)
-    on_its_tip = walk.copy(deep=True)
-    on_its_tip.normal_force.loc[{"contact": "T5 tip"}] = 0.1
-    assert lifted(walk).sel(body="T5").any()
-    assert not lifted(on_its_tip).sel(body="T5").any()
 
 
 def test_the_distance_is_that_of_the_first_marker_or_of_the_centre(walk):

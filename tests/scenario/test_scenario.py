@@ -294,7 +294,7 @@ BAD = [
     ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),
     ("robot: {cables: {free_length: 1 km}}", "robot.spacing", "balance"),
     ("terrain: !HeightField {file: none.csv, cell: 1 in}", "terrain.file", "none.csv"),
-    ("robot: {spacing: &own [*own]}", "", "alias of what holds it"),
+    ("robot: {spacing: &own [*own]}", "", "recursive"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
     ("terrain: !Steps {height: 1 in, depth: 0.1 um, count: 2}", "terrain.depth", "4000000"),
     (

@@ -24,7 +24,7 @@ from tetra_drake.analysis.statistics import (
     resampled,
 )
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.manifest import FITNESS
+from tetra_drake.evolution.manifest import FITNESS, read_manifest
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.scenario.scenario import Scenario
 
@@ -103,14 +103,10 @@ def compare(
     Raises:
         InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
     """
-    _check_labels(labels, len(directories))
-    return _compared(_labelled([load_run(directory) for directory in directories], labels), reach)
-
-
-def _compared(runs: Mapping[str, Run], reach: float | None) -> Compared:
-    """The comparison of runs by their labels; see compare()."""
     import pandas
 
+    _check_labels(labels, len(directories))
+    runs = _labelled([load_run(directory) for directory in directories], labels)
     notes = _differences(runs)
     searches = {label: _progress(run) for label, run in runs.items()}
     common = min(_end(progress) for progress in searches.values())
@@ -153,18 +149,19 @@ def compare_scenarios(
     Raises InputError also if no scenario has two of the runs.
     """
     _check_labels(labels, len(directories))
-    names = labels or [Path(directory).resolve().name for directory in directories]
-    groups: dict[str, list[tuple[Run, str]]] = {}
-    for directory, label in zip(directories, names, strict=True):
-        run = load_run(directory)
-        groups.setdefault(run.scenario.name, []).append((run, label))
+    groups: dict[str, list[int]] = {}
+    for place, directory in enumerate(directories):
+        name = read_manifest(Path(directory)).scenario.name
+        groups.setdefault(name, []).append(place)
     if all(len(group) == 1 for group in groups.values()):
         found = f"found one run of each scenario: {', '.join(groups)}"
         raise InputError("compare", "scenarios", f"{found}; expected two of one scenario at least")
-    return {
-        name: _compared(_labelled([run for run, _ in group], [own for _, own in group]), reach)
-        for name, group in groups.items()
-    }
+    compared = {}
+    for name, places in groups.items():
+        own = [labels[place] for place in places] if labels else None
+        runs = [directories[place] for place in places]
+        compared[name] = compare(runs, reach=reach, labels=own)
+    return compared
 
 
 def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -8,7 +8,7 @@ elites.jsonl    results of elites on disturbed robots, one line per gait
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,9 +65,7 @@ def _cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> npt.NDArray[np.in
     return cells.clip(0, count - 1).astype(np.int64)
 
 
-def judge_elites(
-    directory: Path, *, workers: int | None = None, say: Callable[[str], None] = lambda text: None
-) -> None:
+def judge_elites(directory: Path, *, workers: int | None = None) -> None:
     """Simulates the elites of a run on disturbed robots, as judge() does, and records the results.
 
     The scenario sets the number of draws. Elites with a recorded result are skipped.
@@ -82,7 +80,6 @@ def judge_elites(
     missing = gaits_of_map[gaits_of_map["kept"].isna()]
     if missing.empty:
         return
-    say(f"simulating {len(missing)} gaits of the map in {kind.draws} draws of disturbances")
     keys = missing[_KEY].to_numpy().tolist()
     gaits = {i: run.gait(trial, index) for i, (trial, index) in enumerate(keys)}
     seed = run.manifest.seed

@@ -98,12 +98,11 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
 
 def _frequencies(structure: Structure, unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
     """Natural frequencies (Hz) above LEAST_FREQUENCY."""
+    from scipy import linalg
+
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), structure, unactuated, state)
-    # M x'' = -K x with M = L Lᵀ: the squared frequencies are the eigenvalues of L^-1 K L^-T.
-    factor = np.linalg.cholesky(_mass_matrix(unactuated))
-    scaled = np.linalg.solve(factor, np.linalg.solve(factor, stiffness).T)
-    squares = np.linalg.eigvalsh(scaled)
+    squares = linalg.eigvalsh(stiffness, _mass_matrix(unactuated))  # of M x'' = -K x
     least = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
     return np.sqrt(squares[squares > least]) / (2.0 * math.pi)
 

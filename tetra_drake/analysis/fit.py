@@ -6,7 +6,7 @@ import hashlib
 import io
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -18,13 +18,13 @@ from tetra_drake import __version__
 from tetra_drake.analysis.measurements import Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
-from tetra_drake.formatting import Table, fixed, listed, rounded
+from tetra_drake.formatting import Say, Table, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import value_at
-from tetra_drake.scenario.units import quantity_to_si
+from tetra_drake.scenario.units import given_quantity
 
 STEP = 1e-3
 """Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and
@@ -55,7 +55,6 @@ EVALUATIONS = "evaluations"
 """Folder of the evaluations of a fit."""
 
 Bounds = Sequence[str | float]
-Say = Callable[[str], None]
 
 
 class Parameter(NamedTuple):
@@ -157,7 +156,7 @@ def fit_values(
     *,
     search: bool = False,
     folder: Path | None = None,
-    say: Say | None = None,
+    say: Say = silent,
     source: object = "fit",
 ) -> Fit:
     """Values of a scenario's keys within bounds for which it meets measurements best.
@@ -242,10 +241,7 @@ def _parameter(scenario: Scenario, key: str, bounds: Bounds, source: object) -> 
 
 def _bound(bound: str | float, unit: str, source: object, place: str) -> float:
     if isinstance(bound, str):
-        try:
-            return quantity_to_si(bound, unit)
-        except ValueError as error:
-            raise InputError(source, place, str(error)) from error
+        return given_quantity(bound, unit, source, place)
     if isinstance(bound, bool) or not isinstance(bound, int | float) or not math.isfinite(bound):
         raise InputError(source, place, f"found the bound {bound!r:.40}, expected a number")
     return float(bound)
@@ -273,7 +269,7 @@ class _Problem:
         measured: Sequence[Measured],
         digest: str,
         folder: Path | None,
-        say: Say | None,
+        say: Say,
     ) -> None:
         self.scenario, self.parameters, self.measured = scenario, parameters, measured
         self.scale = np.array([parameter.scale for parameter in parameters])
@@ -348,8 +344,7 @@ class _Problem:
 
     def tell(self, residuals: np.ndarray) -> None:
         """Tells the user of an iteration that ended with these residuals."""
-        if self._say:
-            self._say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
+        self._say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
 
     def predictions(self, x: np.ndarray) -> list[Prediction]:
         """Predictions for each measurement at a point that was evaluated."""
@@ -495,10 +490,8 @@ def _warnings(
             warnings.append(f"{key} is at a bound, {rounded(value)} {row['unit']}".rstrip())
     determined = table.index[table["determined"]]
     for place, one in enumerate(determined):
-        others = [
-            other for other in determined[place + 1 :] if abs(correlations.loc[one, other]) > STRONG
-        ]
-        if others:
+        strength = correlations.loc[one, determined[place + 1 :]].abs()
+        if others := strength.index[strength > STRONG].tolist():
             warnings.append(f"the data hardly tell {one} from {listed(others)}")
     rough = [str(key) for key in determined if not table["smooth"][key]]
     if rough:

@@ -33,7 +33,7 @@ from tetra_drake.scenario.quantities import Force, Length, Time, Unit
 from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Kinds, Section, keys_of
-from tetra_drake.scenario.units import quantity_to_si
+from tetra_drake.scenario.units import given_quantity
 from tetra_drake.scenario.yaml_text import read_mapping
 
 if TYPE_CHECKING:
@@ -231,12 +231,8 @@ class _MeasuredMotion(Measured):
     clock: float
 
     def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
-        finely = [
-            each.with_sections(
-                simulation=each.simulation.model_copy(update={"sample_period": SAMPLE_PERIOD})
-            )
-            for each in scenarios
-        ]
+        often = {"simulation.sample_period": SAMPLE_PERIOD}
+        finely = [each.with_numbers(often) for each in scenarios]
         outcomes = simulate_many(finely, [self.driver] * len(finely), record=True)
         return [self._prediction(outcome) for outcome in outcomes]
 
@@ -328,10 +324,7 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
         coordinate, node, unit = match.groups()
         if node not in nodes:
             raise InputError(path, name, f"found unknown node '{node}'; {hint(node, nodes)}")
-        try:
-            scale = quantity_to_si(f"1 {unit}", "m")
-        except ValueError as error:
-            raise InputError(path, name, str(error)) from error
+        scale = given_quantity(f"1 {unit}", "m", path, name)
         columns[coordinate] = scale * column_numbers(cells[name], path, gaps=True)
     table = pandas.DataFrame(columns, index=times)
     if not np.isfinite(table.to_numpy(dtype=float)).any():

@@ -124,14 +124,13 @@ def judge(
     if alone:
         plan += _alone(disturbances, fresh)
     rows = _simulated(scenario, plan, gaits, workers)
+    changed = [row for row in rows if row["what"] not in (NOTHING, ALL)]
     return Judgement(
         scenario=scenario,
         seed=seed,
         undisturbed=_table([row for row in rows if row["what"] == NOTHING]),
         draws=_table([row for row in rows if row["what"] == ALL], "draw", *disturbances.spreads),
-        alone=_table(
-            [row for row in rows if row["what"] not in (NOTHING, ALL)], "what", "spread", "draw"
-        ),
+        alone=_table(changed, "what", "spread", "draw"),
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluators import check_guard, deaf_to_ctrl_c
-from tetra_drake.machine import available_cores
+from tetra_drake.machine import available_cores, check_package
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -46,11 +46,9 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         InputError: if Dask is missing, no scheduler answers, workers do not start, or a worker has
             another version of this package or of Drake.
     """
-    try:
-        import distributed
-    except ImportError as error:
-        problem = "Dask is not installed: pip install 'tetra_drake[cluster]'"
-        raise InputError("executor", "", problem) from error
+    check_package("distributed", extra="cluster", source="executor")
+    import distributed
+
     check_guard()
     with contextlib.ExitStack() as stack:
         try:

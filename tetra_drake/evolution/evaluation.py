@@ -139,9 +139,8 @@ class GaitEvaluation:
     def _draws(self) -> Callable[[IterationSeed], list[Scenario]]:
         """Function from a seed to disturbed scenarios. It is cached, so all vectors of an iteration
         share the same scenario objects."""
-        return functools.lru_cache(_SEEDS_KEPT)(
-            functools.partial(draws_of_iteration, self.scenario)
-        )
+        draws = functools.partial(draws_of_iteration, self.scenario)
+        return functools.lru_cache(_SEEDS_KEPT)(draws)
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
         with time_limit(self.scenario.evolution.time_budget):

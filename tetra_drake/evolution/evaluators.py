@@ -26,6 +26,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Protocol, Self
 
 from tetra_drake.errors import InputError
+from tetra_drake.formatting import Say
 from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Task
 
@@ -60,7 +61,7 @@ def evaluator_of(
     *,
     workers: int | None = None,
     executor: MakeExecutor | None = None,
-    warn: Callable[[str], None],
+    warn: Say,
 ) -> Evaluator:
     """The evaluator for a scenario's engine; the engine's code is compiled on return.
 
@@ -102,7 +103,7 @@ class InLanes:
         return self._evaluate.in_lanes(task, self._lanes)
 
 
-class InProcesses:
+class InProcesses(contextlib.AbstractContextManager["InProcesses"]):
     """Evaluates in worker processes. They are spawned, not forked, and end with this process.
 
     Each worker process has its own executor, because all processes of one executor die together.
@@ -113,9 +114,6 @@ class InProcesses:
         self._threads = futures.ThreadPoolExecutor(workers)
         self._idle: deque[Executor] = deque()
         self._lifeline, self._holder = multiprocessing.Pipe(duplex=False)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
@@ -185,16 +183,13 @@ def deaf_to_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class OnExecutor:
+class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
     """Evaluates on an executor of concurrent.futures. A broken executor is replaced."""
 
     def __init__(self, evaluate: Evaluate, make: MakeExecutor, workers: int) -> None:
         self._evaluate, self._make = evaluate, functools.partial(make, workers)
         self._executor = self._make()
         self._submitted: set[Future[Evaluation]] = set()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         for future in list(self._submitted):

@@ -27,7 +27,7 @@ from typing import Any
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_text, write_whole
+from tetra_drake.files import read_json, read_text, write_whole
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
@@ -133,11 +133,7 @@ def read_manifest(directory: Path) -> Manifest:
     path = directory / MANIFEST
     if not os.path.exists(path):
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
-    try:
-        content = json.loads(read_text(path, "manifest of a run"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"cannot be read: {error}") from error
-    file = _File.from_tree(content, path)
+    file = _File.from_tree(read_json(path, "manifest of a run"), path)
     scenario_file = directory / SCENARIO
     scenario = load_scenario(scenario_file)
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
 import time
@@ -21,11 +22,8 @@ _LINE_PERIOD = 10.0  # s, between plain lines
 _FIRST_ESTIMATE = 5  # tasks; the time left is estimated after these, and after a line's period
 
 
-class Progress:
+class Progress(contextlib.AbstractContextManager["Progress"]):
     """Receiver of a run's messages and progress. This base class shows nothing but warnings."""
-
-    def __enter__(self) -> Progress:
-        return self
 
     def __exit__(self, *_: object) -> None:
         return None

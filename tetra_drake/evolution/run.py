@@ -118,9 +118,8 @@ class Run:
         Rows are sorted by trial, then from best to worst. The first row is the best gait of trial
         0. For the best gait of the run, see fittest().
         """
-        ranked = self.with_parameters.dropna(subset="fitness").sort_values(
-            ["trial", "fitness", "index"], ascending=[True, False, True]
-        )
+        walked = self.with_parameters.dropna(subset="fitness")
+        ranked = walked.sort_values(["trial", "fitness", "index"], ascending=[True, False, True])
         return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
 
     def fittest(self) -> pandas.Series:
@@ -184,7 +183,7 @@ class Run:
             wall_time=float(rows["wall_time_s"].sum()),
         )
         lines = self.iterations[self.iterations["trial"] == trial]
-        for line in lines.iloc[[0, -1]].to_dict("records") if len(lines) else ():
+        for line in lines.tail(1).to_dict("records"):
             status.complete(line, best_distance=line["best_distance"])
         return status
 

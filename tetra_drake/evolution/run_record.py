@@ -52,7 +52,7 @@ _ASIDE = ".replaced"
 _Lines = Sequence[dict[str, Any]]
 
 
-class RunRecord:
+class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
     """A run directory, locked against other processes until the end of its `with` block. A new run
     is locked from begin() on."""
 
@@ -125,9 +125,6 @@ class RunRecord:
     def file(self, name: str, trial: int) -> RecordFile:
         """A file of a trial."""
         return RecordFile.of(self.directory, self.manifest.run, name, trial=trial)
-
-    def __enter__(self) -> RunRecord:
-        return self
 
     def __exit__(self, *_: object) -> None:
         if self._lock is not None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from tetra_drake.evolution.manifest import MANIFEST, read_manifest
 from tetra_drake.evolution.run import load_run
+from tetra_drake.formatting import Say, silent
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -25,12 +25,7 @@ class GaitSource:
     """The gait of the file by its name, or the best gait of each trial by "trial 0" ..."""
 
 
-def load_source(
-    source: Path,
-    *,
-    scenario: str | None = None,
-    warn: Callable[[str], None] = lambda text: None,
-) -> GaitSource:
+def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent) -> GaitSource:
     """Loads the gait of a file, or the best gaits of a run.
 
     Args:

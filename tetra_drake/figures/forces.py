@@ -29,7 +29,7 @@ from tetra_drake.figures.style import (
     shown_part,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.results.measures import intervals, off_ground, share_of_time
+from tetra_drake.results.measures import Span, intervals, off_ground, share_of_time
 from tetra_drake.results.result import SimulationResult
 
 _SECONDS = 4.0  # length of the part that is shown by default
@@ -48,10 +48,7 @@ _MIRRORED = 0.01  # two nodes share a panel if mean difference / mean force is a
 
 @figure_function
 def signals_and_tensions(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
 ) -> Drawn:
     """Actuation signals and the tensions of the cables that they drive, in the last 4 s.
 
@@ -81,10 +78,7 @@ def signals_and_tensions(
 
 @figure_function
 def ground_forces(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
 ) -> Drawn:
     """Normal force and friction of the feet in the last 4 s.
 
@@ -120,12 +114,12 @@ def ground_forces(
     return page
 
 
-def _last(result: SimulationResult) -> tuple[float, float]:
+def _last(result: SimulationResult) -> Span:
     end = float(result.trajectory.time[-1])
     return max(0.0, end - _SECONDS), end
 
 
-def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | None:
+def _limits_between_impacts(forces: xarray.Dataset) -> Span | None:
     """Range of the y axis: the forces of touching nodes without impacts. None if no node touches
     the ground."""
     touching = forces.where(forces.normal_force > 0.0)

@@ -29,6 +29,7 @@ from tetra_drake.figures.style import (
 )
 from tetra_drake.formatting import fixed
 from tetra_drake.results import measures
+from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.units import Units
@@ -55,10 +56,7 @@ _OTHER_FOOT = "0.35"
 
 @figure_function
 def gait_diagram(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
 ) -> Drawn:
     """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
     speed of the centre of mass.
@@ -89,9 +87,7 @@ def gait_diagram(
     return page
 
 
-def _last_cycles(
-    trajectory: xarray.Dataset, cycle: tuple[float, float] | None
-) -> tuple[float, float]:
+def _last_cycles(trajectory: xarray.Dataset, cycle: Span | None) -> Span:
     """Start and end (s) of the last cycles. Without a cycle, of the last quarter."""
     if cycle is None:
         start, end = (float(trajectory.time[i]) for i in (0, -1))
@@ -210,9 +206,7 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, u
     name_panel(panel, f"{name} ({unit.length_name}/s)")
 
 
-def _mark_cycles(
-    panels: Iterable[Axes], times: np.ndarray, cycle: tuple[float, float] | None
-) -> None:
+def _mark_cycles(panels: Iterable[Axes], times: np.ndarray, cycle: Span | None) -> None:
     """Draws a line at the beginning of each cycle."""
     if cycle is None:
         return

@@ -30,6 +30,7 @@ from tetra_drake.figures.style import (
 )
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results import measures
+from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
@@ -60,10 +61,7 @@ _AFTER: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.6, "linestyle": "-"}
 
 @figure_function
 def relative_distances(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
 ) -> Drawn:
     """Distance along x of each body from the first body, over time. Distances are between centres
     of mass. Grey lines: the distances at the start."""
@@ -91,7 +89,7 @@ def before_and_after(
     best: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
 ) -> Drawn:
     """Distance walked over time, before and after evolution: the best initial gait and the best
     gait of the best trial."""
@@ -116,7 +114,7 @@ def time_lapse(
     result: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
     instants: int = 6,
 ) -> Drawn:
     """Time lapse of the robot from above, to scale, with the distance walked. Forward is to the
@@ -154,7 +152,7 @@ def path_of_the_centre(
     result: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
     instants: int = 9,
 ) -> Drawn:
     """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
@@ -203,7 +201,7 @@ def one_step(
     result: SimulationResult,
     *,
     figure: Page | None = None,
-    time: tuple[float, float] | None = None,
+    time: Span | None = None,
     instants: int = 6,
 ) -> Drawn:
     """One step to scale, from above and from the side. Bodies off the ground are red.
@@ -255,9 +253,7 @@ def one_step(
     return page
 
 
-def _shown_step(
-    result: SimulationResult, time: tuple[float, float] | None
-) -> tuple[tuple[float, float], str]:
+def _shown_step(result: SimulationResult, time: Span | None) -> tuple[Span, str]:
     """Start and end (s) of the time to show, and its title."""
     ends = time or measures.last_step(result.trajectory)
     if ends is not None:
@@ -328,19 +324,14 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
-def _range(values: np.ndarray, unit: Units) -> tuple[float, float]:
+def _range(values: np.ndarray, unit: Units) -> Span:
     """Range of coordinates with a margin."""
     margin = _MARGIN / unit.length
     return float(values.min()) - margin, float(values.max()) + margin
 
 
 def _fit(
-    count: int,
-    wide: tuple[float, float],
-    high: tuple[float, float],
-    figure: Page | None,
-    *,
-    height_in: float,
+    count: int, wide: Span, high: Span, figure: Page | None, *, height_in: float
 ) -> tuple[int, float]:
     """Number of columns for which `count` pictures are largest, and the height (in) of all rows.
 
@@ -359,7 +350,7 @@ def _fit(
     return columns, row * math.ceil(count / columns)
 
 
-def _to_scale(panel: Axes, wide: tuple[float, float], high: tuple[float, float]) -> None:
+def _to_scale(panel: Axes, wide: Span, high: Span) -> None:
     """Sets the ranges of both axes, with the same scale and without numbers on the y axis."""
     panel.set(xlim=wide, ylim=high, aspect="equal", yticks=[])
     panel.tick_params(axis="y", length=0.0)
@@ -371,10 +362,8 @@ def _draw_struts(
     panel: Axes, points: np.ndarray, structure: Structure, colours: Sequence[str]
 ) -> None:
     """Draws the struts between points (nodes, 2); each body has its colour."""
-    bodies = structure.carriers[structure.struts[:, 0]]
-    lines = LineCollection(
-        list(points[structure.struts]), colors=[colours[body] for body in bodies], linewidths=1.2
-    )
+    of_struts = [colours[body] for body in structure.carriers[structure.struts[:, 0]]]
+    lines = LineCollection(list(points[structure.struts]), colors=of_struts, linewidths=1.2)
     panel.add_collection(lines, autolim=False)
 
 

@@ -32,6 +32,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file, write_whole
+from tetra_drake.results.measures import Span
 from tetra_drake.scenario.units import shown_in
 
 Page: TypeAlias = Figure | SubFigure
@@ -97,7 +98,7 @@ REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 """Line style of reference values."""
 
 
-def shown_part(trajectory: xarray.Dataset, time: tuple[float, float] | None) -> xarray.Dataset:
+def shown_part(trajectory: xarray.Dataset, time: Span | None) -> xarray.Dataset:
     """The part of a trajectory between two times (s); all of it without times. Raises InputError if
     the part has fewer than two samples."""
     if time is None:

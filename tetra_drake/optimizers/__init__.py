@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
 from typing import Any
 
-from tetra_drake.errors import InputError
+from tetra_drake.machine import check_package
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.optimizers.cma_es import CmaEs
-from tetra_drake.optimizers.quality_diversity import INSTALL, QualityDiversity
+from tetra_drake.optimizers.quality_diversity import QualityDiversity
 from tetra_drake.optimizers.random_search import RandomSearch
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario import optimizer_kinds as kinds
@@ -29,6 +28,6 @@ def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
 
     Raises InputError if pyribs is missing.
     """
-    if isinstance(kind, kinds.QualityDiversity) and importlib.util.find_spec("ribs") is None:
-        raise InputError("optimizer", "", f"needs pyribs: {INSTALL}")
+    if isinstance(kind, kinds.QualityDiversity):
+        check_package("ribs", extra="qd", source="optimizer")
     return functools.partial(OPTIMIZERS[type(kind)], settings=kind)

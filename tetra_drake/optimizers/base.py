@@ -68,6 +68,12 @@ class Iteration:
     of a list for an optimiser without a population."""
 
 
+def mean_fitness(fitnesses: Vector) -> float:
+    """Mean of the fitnesses of vectors that did not fail; NaN if all failed."""
+    finite = fitnesses[np.isfinite(fitnesses)]
+    return float(np.mean(finite)) if finite.size else math.nan
+
+
 class Optimizer(Protocol):
     """An optimiser: ask() gives a batch of vectors, tell() takes their evaluations.
 

@@ -9,7 +9,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.files import json_number
+from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
 from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
 from tetra_drake.scenario.common_sections import EvolutionSection
 
@@ -90,7 +91,7 @@ class Generational(Generic[SettingsT]):
         """Takes the evaluations of a batch."""
         fitnesses = np.array([evaluation.fitness for evaluation in evaluations])
         is_finite = np.isfinite(fitnesses)
-        mean = float(np.mean(fitnesses[is_finite])) if is_finite.any() else None
+        mean = json_number(mean_fitness(fitnesses))
         report = {"mean_fitness": mean, "population": len(self._points), **self._state()}
         if is_finite.any() and len(evaluations) == len(self._points):
             least = np.min(fitnesses[is_finite])

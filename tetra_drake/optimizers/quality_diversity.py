@@ -13,8 +13,6 @@ from tetra_drake.optimizers.generational import Generational, Matrix
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
 
-INSTALL = 'pip install "tetra_drake[qd]"'
-
 FLOOR = 0.0
 """Fitness that a gait must exceed to enter the map; the initial threshold of every cell."""
 
@@ -85,13 +83,10 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Adds a batch to the archive; then the emitters learn from it."""
         count = len(evaluations)
-        objective, status, value = np.empty(count), np.zeros(count, np.int32), np.zeros(count)
-        measures = np.empty((count, len(self.settings.measures)))
-        for i, evaluation in enumerate(evaluations):
-            objective[i] = evaluation.fitness
-            for j, name in enumerate(self.settings.measures):
-                number = evaluation.metrics.get(name)
-                measures[i, j] = np.nan if number is None else number
+        objective = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
+        rows = [[e.metrics.get(name) for name in self.settings.measures] for e in evaluations]
+        measures = np.array(rows, dtype=float)  # None becomes NaN
+        status, value = np.zeros(count, np.int32), np.zeros(count)
         enters = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
         self._told = {}
         if enters.any():

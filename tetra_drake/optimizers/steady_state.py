@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.files import json_number
-from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.optimizers.base import Evaluation, Iteration, mean_fitness
 from tetra_drake.robot.gait import TAU_A, TAU_B, TAU_B_PER_TAU_A, ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
 from tetra_drake.scenario.common_sections import EvolutionSection
@@ -64,13 +64,7 @@ class SteadyState:
             placed = [self._place(vector, evaluation) for vector, evaluation in children]
         mean = mean_fitness(self._fitnesses)
         self._means.append(mean)
-        settings = self.settings
-        levelled_off = has_levelled_off(
-            self._means,
-            rise=settings.stop_rise,
-            window=settings.stop_window,
-            after=settings.stop_after,
-        )
+        levelled_off = has_levelled_off(self._means, self.settings)
         return Iteration(
             report={"mean_fitness": json_number(mean)},
             placed=placed,
@@ -173,15 +167,9 @@ def find_place(
     return None
 
 
-def mean_fitness(fitnesses: Vector) -> float:
-    """Mean fitness of the members that did not fail; NaN if all failed."""
-    finite = fitnesses[np.isfinite(fitnesses)]
-    return float(np.mean(finite)) if finite.size else float("nan")
-
-
-def has_levelled_off(means: Sequence[float], *, rise: float, window: int, after: int) -> bool:
-    """True if the mean fitness rose by less than `rise` in the last `window` iterations. False up
-    to iteration `after`. `means` begins with iteration 0."""
-    iteration = len(means) - 1
-    long_enough = iteration > after and iteration >= window
-    return long_enough and means[iteration] - means[iteration - window] < rise
+def has_levelled_off(means: Sequence[float], settings: kinds.SteadyState) -> bool:
+    """True if the mean fitness rose by less than `stop_rise` in the last `stop_window` iterations.
+    False up to iteration `stop_after`. `means` begins with iteration 0."""
+    iteration, window = len(means) - 1, settings.stop_window
+    long_enough = iteration > settings.stop_after and iteration >= window
+    return long_enough and means[iteration] - means[iteration - window] < settings.stop_rise

@@ -50,9 +50,8 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
     if out.exists():
         raise InputError(out, "", "exists, expected a new folder")
     refinement = math.ceil(LEAST_RATE / rate)
-    finely = scenario.simulation.model_copy(update={"sample_period": 1.0 / (rate * refinement)})
-    recorded = scenario.with_sections(simulation=finely)
-    result = simulate(scenario=recorded, gait=gait, record=True)
+    finely = scenario.with_numbers({"simulation.sample_period": 1.0 / (rate * refinement)})
+    result = simulate(scenario=finely, gait=gait, record=True)
     robot, motion = Robot.of(scenario), result.trajectory.isel(time=slice(None, None, refinement))
     loads = actuator_loads(robot, result.trajectory)
     command = Command(gait.name, 1.0 / rate, loads.commands[::refinement])

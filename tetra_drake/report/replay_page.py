@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 from tetra_drake.engines.simulate import simulate
@@ -11,17 +10,13 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_file
+from tetra_drake.formatting import Say, silent
 from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.results.result import SimulationResult
 
 
 def write_replay(
-    source: Path,
-    out: Path,
-    *,
-    scenario: str | None = None,
-    viewer: Path | None = None,
-    warn: Callable[[str], None] = lambda text: None,
+    source: Path, out: Path, *, scenario: str | None = None, warn: Say = silent
 ) -> str:
     """Writes the replay page of a result folder, a gait file or a run. Returns the page's title.
 
@@ -29,21 +24,19 @@ def write_replay(
         source: the result folder, gait file or folder of a run.
         out: the page to write.
         scenario: the scenario for a gait file.
-        viewer: file with Meshcat's script, shared with other pages; see save_replay().
         warn: see load_source().
 
     Raises:
-        InputError: if a file cannot be written; nothing is simulated then.
+        InputError: if the page cannot be written; nothing is simulated then.
     """
-    for file in (out,) if viewer is None else (out, viewer):
-        check_file(file)
+    check_file(out)
     result = load_or_simulate(source, scenario=scenario, warn=warn)
-    result.save_replay(out, viewer=viewer)
+    result.save_replay(out)
     return result.title
 
 
 def load_or_simulate(
-    source: Path, *, scenario: str | None = None, warn: Callable[[str], None] = lambda text: None
+    source: Path, *, scenario: str | None = None, warn: Say = silent
 ) -> SimulationResult:
     """The result of a result folder; or simulates a gait file, or the fittest gait of a run.
 

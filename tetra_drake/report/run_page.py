@@ -164,7 +164,6 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
         weights=_weight_matrices(gait),
         oscillators=scenario.robot.blueprint().oscillators,
         pictures=_pictures(captions, folder),
-        gait=best_gait,
         files={
             "scenario": SCENARIO,
             "replay": REPLAY,

@@ -30,10 +30,8 @@ class LabelIndex(PandasIndex):
         missing = [str(label) for label in wanted.ravel() if label not in self.index]
         if missing:
             unknown = ", ".join(f"'{label}'" for label in missing)
-            problem = (
-                f"found the unknown {unknown}; {hint(missing[0], map(str, self.index.unique()))}"
-            )
-            raise InputError("sel", str(coordinate), problem)
+            advice = hint(missing[0], map(str, self.index.unique()))
+            raise InputError("sel", str(coordinate), f"found the unknown {unknown}; {advice}")
         if wanted.ndim == 1:
             return IndexSelResult({self.dim: np.flatnonzero(self.index.isin(wanted))})
         return super().sel(labels, method=method, tolerance=tolerance)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from tetra_drake.robot.structure import Structure, followed_nodes
 
 if TYPE_CHECKING:
     import xarray
+
+Span: TypeAlias = tuple[float, float]
+"""Start and end, such as of a time in s; or least and greatest coordinate."""
 
 _STEADY = 0.01
 """Least swing of an oscillating signal, as a share of its largest value."""
@@ -45,16 +48,7 @@ def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
     return trajectory.normal_force == 0.0
 
 
-def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """True if no contact node of a body bears a normal force (time, body)."""
-    import xarray
-
-    off, bodies = off_ground(trajectory), trajectory.body
-    of_bodies = [off[:, (off.contact_body == body).values].all("contact") for body in bodies]
-    return xarray.concat(of_bodies, dim=bodies).T
-
-
-def intervals(times: np.ndarray, active: np.ndarray) -> list[tuple[float, float]]:
+def intervals(times: np.ndarray, active: np.ndarray) -> list[Span]:
     """Intervals where a Boolean signal is true, as starts and ends (s).
 
     `times` (samples,) are in s and ascend; `active` (samples,) is the signal. A sample has the
@@ -88,7 +82,7 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
     return float(frequencies[spectrum.argmax()])
 
 
-def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
+def last_step(trajectory: xarray.Dataset) -> Span | None:
     """Start and end (s) of one period of the signals, late in the trajectory.
 
     The period is taken from the signal with the largest swing in the second half of the trajectory.

@@ -92,11 +92,9 @@ class Blueprint:
     @functools.cached_property
     def carriers(self) -> np.ndarray:
         """Index of the body of each node (nodes,); WORLD for a fixed node."""
-        carriers = np.full(len(self.node_names), WORLD)
-        carriers[: self.first_node[-1]] = np.repeat(
-            np.arange(len(self.bodies)), np.diff(self.first_node)
-        )
-        return carriers
+        of_bodies = np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
+        fixed = len(self.node_names) - len(of_bodies)
+        return np.pad(of_bodies, (0, fixed), constant_values=WORLD)
 
     @property
     def body_of_node(self) -> tuple[str, ...]:
@@ -154,16 +152,15 @@ class Blueprint:
     def distances(self) -> np.ndarray:
         """Distances between oscillators (m, m): 0 if their cables join the same bodies, 1 if they
         share a body, 2 if both are at distance 1 of a third oscillator, and so on."""
+        from scipy.sparse.csgraph import shortest_path
+
         bodies = self.carriers[self.cable_ends]
         joined = [set(bodies[list(cables)].ravel().tolist()) for cables in self.groups]
         count = len(joined)
         near = np.array([[bool(a & b) for b in joined] for a in joined]).reshape(count, count)
-        distances = np.array([[0 if a == b else count for b in joined] for a in joined])
-        reached = np.eye(count, dtype=bool)
-        for distance in range(1, count):
-            reached = reached @ near
-            distances[reached] = np.minimum(distances[reached], distance)
-        return distances.reshape(count, count)
+        same = np.array([[a == b for b in joined] for a in joined]).reshape(count, count)
+        steps = np.minimum(shortest_path(near, unweighted=True), count)
+        return np.where(same, 0.0, steps)
 
     def with_oscillator_per_cable(self, *, without_law: bool) -> Self:
         """The robot with one oscillator for each driven cable, group by group.

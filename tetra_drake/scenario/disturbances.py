@@ -63,13 +63,8 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     The values are not checked: the largest changes were checked when the scenario was loaded.
     """
     numbers = scenario.numbers()
-    changed = scenario.with_numbers(
-        {
-            key: factor * numbers[key]
-            for joined, factor in draw.factors.items()
-            for key in separate(joined)
-        }
-    )
+    factors = {key: factor for joined, factor in draw.factors.items() for key in separate(joined)}
+    changed = scenario.with_numbers({key: x * numbers[key] for key, x in factors.items()})
     robot, terrain = changed.robot, changed.terrain
     if draw.moves is not None:
         offsets = draw.moves + (robot.offsets or np.zeros_like(draw.moves))

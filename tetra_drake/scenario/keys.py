@@ -65,19 +65,17 @@ def keys_page() -> str:
 
 
 def _table_of_keys(rows: Sequence[Row]) -> str:
-    headings = ["key", "value", "default", "what it is"]
     cells = [(f"`{key}`", *rest) for key, *rest in rows]
-    return Table(headings, cells, text_columns=range(len(headings))).markdown()
+    return Table(["key", "value", "default", "what it is"], cells, range(4)).markdown()
 
 
 def _table_of_metrics() -> str:
-    headings = ["metric", "unit", "`require`", "robots", "what it is"]
-    texts = _docstrings(Metrics)
-    rows = []
+    rows, texts = [], _docstrings(Metrics)
     for name, metric in METRICS.items():
         limit = "at most" if metric.most else "at least"
         rows.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", texts[name]))
-    return Table(headings, rows, text_columns=range(len(headings))).markdown()
+    headings = ["metric", "unit", "`require`", "robots", "what it is"]
+    return Table(headings, rows, range(5)).markdown()
 
 
 def _rows(key: str, section: type[Section]) -> Iterator[Row]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 import logging
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -257,14 +256,13 @@ def _bonded_parts(bond: str, parts: list[str], file: Path, key: str) -> Iterable
 
 
 def _turned(p: np.ndarray, rotation: Rotation) -> np.ndarray:
-    """Points (n, 3) turned by Rodrigues' formula."""
+    """Points (n, 3) with a rotation."""
+    from scipy.spatial import transform
+
     about = p.mean(axis=0) if rotation.reference is None else np.array(rotation.reference)
     axis = np.array(rotation.axis) / np.abs(rotation.axis).max()  # its square must not be 0
-    axis /= np.linalg.norm(axis)
-    angle = math.radians(rotation.angle)
-    along = np.outer((p - about) @ axis, axis)
-    across = p - about - along
-    return about + along + math.cos(angle) * across + math.sin(angle) * np.cross(axis, across)
+    vector = rotation.angle * axis / np.linalg.norm(axis)
+    return about + transform.Rotation.from_rotvec(vector, degrees=True).apply(p - about)
 
 
 def ntrt_tree(file: Path, *, unit: float) -> Tree:

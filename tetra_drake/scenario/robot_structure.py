@@ -228,7 +228,8 @@ class StructureFile(Section):
         spheres = [self.sphere_of_node.get(node) for node in nodes]
         held = np.array([[axis in self._held(node) for axis in "xyz"] for node in nodes])
         cables = self.all_cables
-        ends = [sorted(cable.nodes, key=self.body_of_node.__getitem__) for cable in cables]
+        pairs = [sorted(cable.nodes, key=self.body_of_node.__getitem__) for cable in cables]
+        ends = np.array([[number[node] for node in pair] for pair in pairs], dtype=int)
         laws = zip(cables, self.free_lengths, strict=True)
         return Blueprint(
             bodies=self.body_names,
@@ -249,9 +250,7 @@ class StructureFile(Section):
             payload=np.zeros(self.body_count),
             cable_names=tuple(cable.name for cable in cables),
             cable_groups=tuple(cable.group for cable in cables),
-            cable_ends=np.array(
-                [[number[node] for node in pair] for pair in ends], dtype=int
-            ).reshape(-1, 2),
+            cable_ends=ends.reshape(-1, 2),
             cable_laws=tuple(self.cables[cable.group].law(length) for cable, length in laws),
             slack=self.slack,
             oscillators=tuple(self.actuated),
@@ -460,9 +459,8 @@ class StructureFile(Section):
     def _check_sizes(self) -> None:
         for node, place in self.nodes.items():
             if max(map(abs, place)) > LONGEST:
-                refuse(
-                    f"nodes.{node}", f"found {place}, expected coordinates of at most {LONGEST:g} m"
-                )
+                expected = f"expected coordinates of at most {LONGEST:g} m"
+                refuse(f"nodes.{node}", f"found {place}, {expected}")
         for strut in self.all_struts:
             group, length = self.struts[strut.group], self._length(strut)
             check_strut(strut.key, length=length, diameter=group.diameter, density=group.density)

@@ -236,11 +236,8 @@ class Scenario(Section):
     def _check_metrics(self) -> None:
         """Refuses a metric that the robot does not have."""
         measures = getattr(self.optimizer, "measures", {})
-        for key, metrics in (
-            ("objective", self.objective),
-            ("require", self.require),
-            ("optimizer.measures", measures),
-        ):
+        named = {"objective": self.objective, "require": self.require}
+        for key, metrics in {**named, "optimizer.measures": measures}.items():
             for name in metrics:
                 for section in (self.robot, self.actuation):
                     if METRICS[name].needs in section.lacking:

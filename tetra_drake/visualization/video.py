@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,9 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
+from tetra_drake.formatting import Say, silent
+from tetra_drake.machine import check_package
 from tetra_drake.visualization.browser import (
-    INSTALL,
     do,
     launch_browser,
     picture_of,
@@ -43,11 +43,7 @@ def check_video(path: Path) -> None:
     is missing."""
     if path.suffix not in KINDS:
         raise InputError(path, "", f"expected a file that ends in {' or '.join(KINDS)}")
-    try:
-        import imageio_ffmpeg  # noqa: F401
-    except ImportError as error:
-        problem = f"needs playwright and imageio-ffmpeg; install them by: {INSTALL}"
-        raise InputError("video", "", problem) from error
+    check_package("imageio_ffmpeg", extra="video", source="video")
 
 
 def make_video(
@@ -58,7 +54,7 @@ def make_video(
     fps: float = 30.0,
     view: str = "free",
     speed: float = 1.0,
-    say: Callable[[str], None] = lambda text: None,
+    say: Say = silent,
 ) -> None:
     """Writes a video of a replay page: an MP4 or a GIF, by the suffix of `path`.
 
