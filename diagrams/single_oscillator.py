@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -168,4 +169,7 @@ if __name__ == "__main__":
     parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS, help=ratios)
     parser.add_argument("--live", action="store_true", help="show the signals in Meshcat")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for the figures")
-    main(**vars(parser.parse_args()))
+    try:
+        main(**vars(parser.parse_args()))
+    except ValueError as error:
+        sys.exit(f"single_oscillator.py: {error}")

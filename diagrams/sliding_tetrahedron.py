@@ -13,6 +13,7 @@ again. Below 23 in/s no node breaks free.
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -132,4 +133,7 @@ if __name__ == "__main__":
     parser.add_argument("--law", default="!ResetIntegrator", help=law)
     parser.add_argument("--live", action="store_true", help="show it in Meshcat while it runs")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for the figures")
-    main(**vars(parser.parse_args()))
+    try:
+        main(**vars(parser.parse_args()))
+    except ValueError as error:
+        sys.exit(f"sliding_tetrahedron.py: {error}")

@@ -1,13 +1,14 @@
 """Predictions beside measurements of three real structures; their constants are not fitted.
 
-    python runs/measured.py
+    python runs/measured.py [OUT]
 
-Writes the page measured/README.md and its pictures. The structures and the measurements are files
-in measured/, with their sources.
+Writes the page README.md and its pictures into the folder OUT, by default measured/. The structures
+and the measurements are files in measured/, with their sources.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 from pathlib import Path
 
@@ -418,7 +419,7 @@ six-bar with equal cables, the ground, the contact of the rods, stiff actuator c
 """
 
 
-def main() -> None:
+def main(out: Path = HERE) -> None:
     """Writes the page and its pictures."""
     under_load, poses = simplex_under_load(), spine_poses()
     frequencies = {stress: simplex_frequency(stress) for stress in SELF_STRESSES}
@@ -429,7 +430,7 @@ def main() -> None:
         "jumper": jump_figure(jumps),
     }
     for name, figure in figures.items():
-        save_figure(figure, HERE, name, kinds=["svg"])
+        save_figure(figure, out, name, kinds=["svg"])
     page = PAGE.format(
         simplex=simplex_table(under_load).markdown(),
         free_lengths=free_length_table(fitted_free_lengths("top", "vertical")).markdown(),
@@ -437,9 +438,11 @@ def main() -> None:
         spine=spine_table(poses).markdown(),
         jumps=jump_table(jumps).markdown(),
     )
-    write_whole(HERE / "README.md", page)
-    print(HERE / "README.md")
+    write_whole(out / "README.md", page)
+    print(out / "README.md")
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", nargs="?", type=Path, default=HERE)
+    main(parser.parse_args().out)

@@ -15,6 +15,7 @@ from record import EXPERIMENTS
 from tables import aspect
 
 import tetra_drake as td
+from tetra_drake.analysis.measurements import load_fit_file
 from tetra_drake.cli import main, make_parser
 from tetra_drake.robot.robot import equilibrium_of
 from tetra_drake.scenario.structure_files import read_structure
@@ -57,6 +58,20 @@ def test_the_commands_of_all_pages_are_commands_with_their_options() -> None:
     assert len(written) >= 7
     for arguments in written:
         make_parser().parse_args(arguments)  # ends the process if it cannot be parsed
+
+
+def test_the_files_of_other_kinds_are_read(work: Path) -> None:
+    texts = snippets("yaml", SCENARIOS)
+    [tower] = [text for text in texts if "pair_groups:" in text]
+    [fit] = [text for text in texts if "measurements:" in text]
+    (work / "tower.yaml").write_text(tower)
+    (work / "fit.yaml").write_text(fit)
+    structure = read_structure("tower.yaml", unit="dm")
+    assert structure.nodes["f"] == pytest.approx([0.5, 0.0, 1.0])
+    assert len(structure.struts["rod"].pairs) == 3
+    capture, rest = load_fit_file("fit.yaml").measurements
+    assert capture.files == {"log": "log.csv", "command": "command.csv"}
+    assert rest.positions == {"n3 z": 0.171}
 
 
 @pytest.mark.slow

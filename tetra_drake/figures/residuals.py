@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 MANY = 100
 """Numbers of a measurement from which their points are small."""
+MOST = 2000
+"""Largest number of points in a panel; of more numbers, some are drawn by lot."""
 
 
 @figure_function
@@ -38,11 +40,12 @@ def residuals(fit: Fit, *, figure: Page | None = None) -> Drawn:
     for panel, (name, rows) in zip(panels, groups, strict=True):
         panel.axhspan(-1.96, 1.96, color="0.9", linewidth=0.0)
         size = 3.0 if len(rows) > MANY else 9.0
+        drawn = rows.sample(min(len(rows), MOST), random_state=0)
         for series, column in enumerate(("start", "fitted")):
             color = line_style(1 - series)["color"]
             style = {"color": color, "marker": ".", "linestyle": "none", "markersize": size}
-            difference = (rows[column] - rows["measured"]) / rows["uncertainty"]
-            panel.plot(rows["along"], difference, **style)
+            difference = (drawn[column] - drawn["measured"]) / drawn["uncertainty"]
+            panel.plot(drawn["along"], difference, **style)
             styles[column] = style
         name_panel(panel, str(name))
         panel.set(ylabel="residual / std. dev.", yscale="symlog")

@@ -54,11 +54,15 @@ class Network(NamedTuple):
     ) -> Self:
         """A network with time constants (s) and beta; each is one number, or one per neuron.
 
-        Raises ValueError if the shape of `inhibition` is not (2n, 2n).
+        Raises ValueError if the shape of `inhibition` is not (2n, 2n), or a time constant is not
+        above 0.
         """
         matrix = np.array(inhibition, dtype=float)
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 2:
             raise ValueError(f"found inhibition of shape {matrix.shape}, expected (2n, 2n)")
+        for name, tau in (("tau_a", tau_a), ("tau_b", tau_b)):
+            if not np.all(np.asarray(tau) > 0.0):
+                raise ValueError(f"found {name} of {tau} s, expected more than 0")
         neurons, inhibiting = len(matrix), [np.flatnonzero(row) for row in matrix]
         first = np.array([row[0] if row.size else 0 for row in inhibiting], dtype=np.int64)
         beyond = np.array([row[-1] + 1 if row.size else 0 for row in inhibiting], dtype=np.int64)
