@@ -65,12 +65,10 @@ class _Episodes:
         self.simulation = simulation
         self._scenario: Scenario = simulation.scenario
         robot, count, start = simulation.robot, simulation.count, simulation.state
-        self._groups = np.arange(robot.driven.size)  # the action of each driven cable
-        if grouped:
-            groups = self._scenario.robot.blueprint().groups
-            of_cable = {cable: i for i, group in enumerate(groups) for cable in group}
-            self._groups = np.array([of_cable[cable] for cable in robot.driven.tolist()])
-        self._cables, self._weight = Robot.of(self._scenario).starting_cables(), robot.weight
+        by_network = Robot.of(self._scenario)
+        structure = by_network.structure if grouped else robot.structure
+        self._groups = structure.drivers[robot.driven]  # the action of each driven cable
+        self._cables, self._weight = by_network.starting_cables(), robot.weight
         self._start_lengths = start.lengths[:1]
         size = self._observe(start).shape[1]
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
