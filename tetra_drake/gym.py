@@ -63,27 +63,14 @@ that rolls, by default on `rover`."""
 class _Episodes:
     """Episodes of robots side by side: observations, actions and rewards of all environments."""
 
-    def __init__(
-        self,
-        scenario: GivenScenario,
-        *,
-        count: int,
-        control_period: float | None,
-        grouped: bool,
-        workers: int | None,
-    ) -> None:
-        self.simulation = Simulation(
-            scenario, count=count, control_period=control_period, workers=workers
-        )
-        self._scenario: Scenario = self.simulation.scenario
-        robot = self.simulation.robot
-        self._groups = np.arange(robot.driven.size)  # the action of each driven cable
-        if grouped:
-            groups = self._scenario.robot.blueprint().groups
-            of_cable = {cable: i for i, group in enumerate(groups) for cable in group}
-            self._groups = np.array([of_cable[cable] for cable in robot.driven.tolist()])
-        self._cables, self._weight = Robot.of(self._scenario).starting_cables(), robot.weight
-        start = self.simulation.state
+    def __init__(self, simulation: Simulation, *, grouped: bool) -> None:
+        self.simulation = simulation
+        self._scenario: Scenario = simulation.scenario
+        robot, count, start = simulation.robot, simulation.count, simulation.state
+        by_network = Robot.of(self._scenario)
+        structure = by_network.structure if grouped else robot.structure
+        self._groups = structure.drivers[robot.driven]  # the action of each driven cable
+        self._cables, self._weight = by_network.starting_cables(), robot.weight
         self._start_lengths = start.lengths[:1]
         size = self._observe(start).shape[1]
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
@@ -187,9 +174,8 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         Raises:
             InputError: if an argument does not fit the scenario.
         """
-        self._episodes = _Episodes(
-            scenario, count=1, control_period=control_period, grouped=grouped, workers=1
-        )
+        simulation = Simulation(scenario, control_period=control_period, workers=1)
+        self._episodes = _Episodes(simulation, grouped=grouped)
         self.observation_space = self._episodes.observation_space
         self.action_space = self._episodes.action_space
 
@@ -226,13 +212,10 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         default."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
         self.num_envs = num_envs
-        self._episodes = _Episodes(
-            scenario,
-            count=num_envs,
-            control_period=control_period,
-            grouped=grouped,
-            workers=workers,
+        simulation = Simulation(
+            scenario, count=num_envs, control_period=control_period, workers=workers
         )
+        self._episodes = _Episodes(simulation, grouped=grouped)
         self.single_observation_space = self._episodes.observation_space
         self.single_action_space = self._episodes.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)

@@ -155,16 +155,16 @@ def test_a_stiff_anchor_takes_no_shorter_steps():
     assert steps(1e9) < 2.0 * steps(1e5)
 
 
-def test_a_diagram_has_anchors_and_loads_only_where_the_robot_has():
+def test_a_diagram_has_state_forces_only_where_the_robot_has_anchors_or_loads():
     def systems(scenario: Scenario) -> set[str]:
         diagram = MakeTensegrityDiagram(Robot.of(scenario), seeded_gait(scenario))
         names = {system.get_name() for system in diagram.GetSystems()}
         return {name for name in names if not name.startswith("forces")}
 
     both, neither = systems(supported_prism()), systems(floating_prism())
-    assert both - neither == {"anchors", "loads"}
-    assert systems(scenario_of(SWINGING)) - neither == {"anchors"}
-    assert not systems(scenario_of(HUNG)) & {"anchors", "loads"}
+    assert both - neither == {"state_forces"}
+    assert systems(scenario_of(SWINGING)) - neither == {"state_forces"}
+    assert "state_forces" not in systems(scenario_of(HUNG))
 
 
 def test_pictures_of_a_floating_prism_leave_out_the_ground(tmp_path):

@@ -17,7 +17,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from tetra_drake.physics.forces import Forces, compute_strut_forces
+from tetra_drake.physics.forces import Forces, compute_state_forces
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
@@ -147,7 +147,7 @@ def test_forces_do_not_depend_on_when_near_struts_were_searched():
 
     def forces_at(state: np.ndarray, memory: Forces) -> np.ndarray:
         force = np.empty(12)
-        compute_strut_forces(Packed((robot.model, memory)), state, force)
+        compute_state_forces(Packed((robot.model, memory)), state, force)
         return force
 
     kept = Forces.of(robot.model)

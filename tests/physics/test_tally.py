@@ -14,7 +14,7 @@ from tetra_drake.simd.allocation import allocate
 CABLES = SimpleNamespace(signal=[0, PASSIVE])
 """The first is driven."""
 
-NO_DRIVES, NO_STATE = np.zeros((0, DRIVE_COLUMNS)), np.zeros(0)
+NO_DRIVES = np.zeros((0, DRIVE_COLUMNS))
 
 CARRIERS = np.array([0, 0, 1])
 """Two contacts of the first body and one of the second."""
@@ -59,7 +59,7 @@ def tallied(
                 cable_forces=cable_forces,
                 ground_forces=ground_forces,
             )
-            observe(tally, robot, time, NO_STATE, signal, forces)
+            observe(tally, robot, time, signal, forces)
     return tally
 
 

@@ -9,7 +9,7 @@ from helpers.anchored import BAR, HUNG, SWINGING, floating_prism, scenario_of, s
 
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.capsules import find_touch
-from tetra_drake.physics.forces import Forces, compute_strut_forces
+from tetra_drake.physics.forces import Forces, compute_state_forces
 from tetra_drake.report.structure_page import robot_of_file
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.equilibrium import (
@@ -183,7 +183,7 @@ def test_a_heavy_structure_rests_on_its_own_struts():
     assert load == pytest.approx(robot.weight, rel=1e-5)
     memory = Forces.of(robot.model)
     pushes = np.empty(18)
-    compute_strut_forces(Packed((robot.model, memory)), robot.structure.initial_state, pushes)
+    compute_state_forces(Packed((robot.model, memory)), robot.structure.initial_state, pushes)
     assert pushes.any() and np.ptp(heights) < 0.1
 
 

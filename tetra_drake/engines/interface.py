@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from tetra_drake.engines import ENGINES
@@ -70,10 +70,15 @@ class Engine:
 
     def outcome(self, scenario: Scenario, driver: Driver, *, record: bool) -> Outcome:
         """Simulates one gait or command. Returns its result or its failure."""
-        try:
-            return self.simulate(GaitSimulation.of(scenario, driver, record=record))
-        except SimulationFailure as failure:
-            return failure
+        return outcome_of(lambda: self.simulate(GaitSimulation.of(scenario, driver, record=record)))
+
+
+def outcome_of(simulate: Callable[[], SimulationResult]) -> Outcome:
+    """The result of a simulation, or its failure."""
+    try:
+        return simulate()
+    except SimulationFailure as failure:
+        return failure
 
 
 def engine_of(scenario: Scenario) -> Engine:

@@ -129,14 +129,13 @@ class _Simulator:
         height = max(0.0, heights.min() if robot.structure.points_ahead else heights.max())
         fall = math.sqrt(2.0 * robot.scenario.robot.gravity * height)
         self._max_speed = MAX_SPEED + fall
-        nodes = [robot.structure.node_names[node] for node in robot.structure.contacts]
-        self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(nodes)}
+        names = [robot.structure.node_names[node] for node in robot.structure.contacts]
+        self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(names)}
+        self._contacts = [self._model.site(name).id for name in names]
         driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # index of each motor's signal
         self.has_drives = has_drive(robot.model.actuator)
         """True if the actuators have states."""
-        names = np.array(robot.structure.node_names)[robot.structure.contacts]
-        self._contacts = [self._model.site(name).id for name in names]
 
     def start(self) -> Array:
         """MuJoCo's state at the start."""
@@ -192,28 +191,19 @@ class _Simulator:
         return controls
 
     def observe(
-        self,
-        observer: Observer,
-        states: Array,
-        drives: Array,
-        signals: Array,
-        *,
-        first: int,
-        begin: int,
+        self, observer: Observer, states: Array, signals: Array, drives: Array, *, first: int
     ) -> None:
-        """Passes states to an observer: every _OBSERVED-th one, and the state at the end of the
-        start-up. `states` and `drives` are after step `first` and the following ones. `signals`
-        begin at step `begin`."""
+        """Passes states to an observer, with their signals and drives: every _OBSERVED-th one, and
+        the state at the end of the start-up. They are after step `first` and the following ones."""
         begins = round(self._robot.scenario.cpg.start_up / self._step)
         observed = np.arange(first + 1, first + len(states) + 1)
         rows = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
         if not rows.size:
             return
-        steps: list[int] = observed[rows].tolist()
-        moments = zip(steps, self.body_states(states[rows]), drives[rows], strict=True)
-        for step, state, of_step in moments:
-            now = signals[min(step - begin, len(signals) - 1)]
-            observer.add(self._step * step, state, now, of_step)
+        times = (self._step * observed[rows]).tolist()
+        bodies = self.body_states(states[rows])
+        for moment in zip(times, bodies, signals[rows], drives[rows], strict=True):
+            observer.add(*moment)
 
     def check(self, states: Array, first: int) -> None:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
@@ -309,8 +299,8 @@ class _MujocoWalk:
         """Simulates a step for each row of signals (steps, m). Raises Diverged."""
         from mujoco.rollout import Rollout
 
-        started, begin, simulator = time.perf_counter(), self._done, self._simulator
-        if begin == 0 and len(signals):
+        started, simulator = time.perf_counter(), self._simulator
+        if self._done == 0 and len(signals):
             self.signals[0] = signals[0]
             start = simulator.body_states(self._kept[:1])[0]
             self._observer.add(0.0, start, signals[0], self._drives)
@@ -328,7 +318,8 @@ class _MujocoWalk:
                 rows = self._steps_kept[here] - done - 1
                 self._kept[here], self.signals[here] = states[rows], some[rows]
                 self._drives_kept[here] = drives[rows]
-                simulator.observe(self._observer, states, drives, signals, first=done, begin=begin)
+                following = np.minimum(first + 1 + np.arange(len(some)), len(signals) - 1)
+                simulator.observe(self._observer, states, signals[following], drives, first=done)
                 simulator.check(states, done)
                 self._done += len(states)
         self._wall_time += time.perf_counter() - started

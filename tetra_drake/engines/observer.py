@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from tetra_drake.physics.actuator import DRIVE
@@ -11,10 +13,12 @@ from tetra_drake.physics.model import Model
 from tetra_drake.physics.tally import Tally, observe, update_clearance
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, machine_code
 from tetra_drake.simd.lanes import Table
+from tetra_drake.simd.packed import Packed, unpacked
 
-_TOGETHER = 1000  # observations per call: calls of kernels with many tables are slow
+Parts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
+"""A robot, its tally, and the memory for its forces."""
 
 
 class Observer:
@@ -25,52 +29,36 @@ class Observer:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self._model, begins = robot.model, steady_start(robot.scenario)
-        self._tally = Tally.of(robot.model, signals=robot.structure.signals, begins=begins)
-        self._modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
-        self._forces = Forces.of(robot.model)
-        self._waiting: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
+        model, signals = robot.model, robot.structure.signals
+        self._tally = Tally.of(model, signals=signals, begins=steady_start(robot.scenario))
+        self._parts = Packed((model, self._tally, Forces.of(model)))
+        state, drives = robot.structure.initial_state, robot.starting_drives()
+        self._observe = machine_code(
+            observe_state, self._parts, 0.0, state, np.zeros(signals), drives
+        )
 
     def add(self, time: float, state: np.ndarray, signals: np.ndarray, drives: np.ndarray) -> None:
         """Adds the state (13 bodies,), signals (m,) in N, and drives at a time (s)."""
-        self._waiting.append((time, state, signals, drives))
-        if len(self._waiting) == _TOGETHER:
-            self._flush()
+        self._observe(self._parts, time, state, signals, drives)
 
     def totals(self) -> Tally:
         """The tally of all added states."""
-        self._flush()
         return self._tally
-
-    def _flush(self) -> None:
-        if not self._waiting:
-            return
-        columns = tuple(np.array(column) for column in zip(*self._waiting, strict=True))
-        observe_states(self._model, self._tally, self._forces, self._modes, *columns)
-        self._waiting = []
 
 
 @compiled
-def observe_states(
-    robot: Model,
-    tally: Tally,
-    forces: Forces,
-    modes: Table,
-    times: Table,
-    states: Table,
-    signals: Table,
-    drives: Table,
-) -> None:
-    """Adds states (k, 13 bodies), signals (k, m) and drives at times (k,) to a tally.
+def observe_state(parts: Parts, time: float, state: Table, signals: Table, drives: Table) -> None:
+    """Adds a state (13 bodies,), signals (m,) and drives at a time (s) to the tally.
 
-    `modes` (contacts, MODE_COLUMNS) is scratch memory. The tally does not depend on friction modes.
+    The tally does not depend on friction modes.
     """
+    robot, tally, forces = unpacked(parts)
+    modes = np.zeros((robot.ground.contacts.size, MODE_COLUMNS))
     generalized = np.empty(6 * robot.bodies.mass.size)
-    for k in range(times.size):
-        modes[:] = 0.0
-        move_robot(robot, states[k], forces)
-        update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
-        forces.drives[:, DRIVE] = drives[k]
-        compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
-        observe(tally, robot, times[k], states[k], signals[k], forces)
-        update_clearance(tally, robot, states[k], forces.nodes)
+    move_robot(robot, state, forces)
+    update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
+    for i in range(drives.size):
+        forces.drives[i, DRIVE] = drives[i]
+    compute_forces(robot, state, modes, signals, True, forces, generalized)
+    observe(tally, robot, time, signals, forces)
+    update_clearance(tally, robot, state, forces.nodes)

@@ -87,24 +87,16 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
     context = diagram.CreateDefaultContext()
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
     drives_at = drives_of(diagram)
-    states_then, signals_then, modes_then, drives_then = [], [], [], []
+    rows = []
     for sample in samples:
         context.SetTime(sample.time)
         context.SetContinuousState(sample.continuous)
         for group, values in enumerate(sample.discrete):
             context.SetDiscreteState(group, values)
-        states_then.append(state.Eval(context))
-        signals_then.append(signals.Eval(context))
-        drives_then.append(drives_at(context))
-        modes = ground.get_discrete_state_vector().CopyToVector()
-        modes_then.append(modes.reshape(-1, MODE_COLUMNS))
-    return Motion(
-        times=np.array([sample.time for sample in samples]),
-        states=np.array(states_then),
-        signals=np.array(signals_then),
-        modes=np.array(modes_then),
-        drives=np.array(drives_then),
-    )
+        modes = ground.get_discrete_state_vector().CopyToVector().reshape(-1, MODE_COLUMNS)
+        evaluated = state.Eval(context), signals.Eval(context), modes, drives_at(context)
+        rows.append((sample.time, *evaluated))
+    return Motion(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def frame_of(robot: Robot, diagram: Diagram, context: Context) -> xarray.Dataset:

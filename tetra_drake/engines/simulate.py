@@ -11,7 +11,7 @@ from tetra_drake.engines.simulation import Controller, simulate_controlled
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import Command, commanded_robot
+from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -67,18 +67,15 @@ def simulate(
         return simulate_controlled(
             scenario, controller, control_period=control_period, record=record, viewer=viewer
         )
-    if command is not None:
-        if gait is not None or steering is not None:
-            raise InputError("simulate", "command", "excludes a gait, and steering")
-        robot = commanded_robot(scenario, command)
-        simulation = GaitSimulation(robot, command.gait, record=record, viewer=viewer)
-        result = engine.simulate(simulation)
-        return dataclasses.replace(result, scenario=scenario)  # the caller's, with a network
-    if gait is None:
+    if command is not None and (gait is not None or steering is not None):
+        raise InputError("simulate", "command", "excludes a gait, and steering")
+    given = gait if command is None else command
+    if given is None:
         raise InputError("simulate", "gait", "is needed, or a command, or a controller")
-    robot, gait = Robot.of(scenario), given_gait(gait, scenario)
-    simulation = GaitSimulation(robot, gait, record=record, viewer=viewer, steering=steering)
-    return engine.simulate(simulation)
+    simulation = GaitSimulation.of(scenario, _driver(given, scenario), record=record)
+    simulation = dataclasses.replace(simulation, viewer=viewer, steering=steering)
+    result = engine.simulate(simulation)
+    return dataclasses.replace(result, scenario=scenario)  # a command's has no network
 
 
 def simulate_many(

@@ -41,6 +41,7 @@ from tetra_drake.physics.vectors import (
     dot,
     scaled,
     subtract_vector,
+    sum_of,
     vector_at,
 )
 from tetra_drake.simd.allocation import allocate
@@ -184,11 +185,7 @@ def contact_places(axes: Axes) -> tuple[Real, Real]:
 def place_on(nodes: Table, a: int, b: int, column: int, s: Real) -> Vector:
     """Vector in three columns of the table `nodes`, at the place s, 0 to 1, from node a to b."""
     at_a, at_b = vector_at(nodes, a, column), vector_at(nodes, b, column)
-    return (
-        at_a[0] + s * (at_b[0] - at_a[0]),
-        at_a[1] + s * (at_b[1] - at_a[1]),
-        at_a[2] + s * (at_b[2] - at_a[2]),
-    )
+    return sum_of(at_a, scaled(s, difference(at_b, at_a)))
 
 
 @inlined

@@ -191,9 +191,7 @@ def compute_forces(
     """
     add_cable_forces(robot, signals, write_parts, forces)
     add_ground_forces(robot, modes, write_parts, forces)
-    add_strut_forces(robot, state, forces)
-    add_anchor_forces(robot.anchors, forces.nodes)
-    add_loads(robot.loads, forces.nodes)
+    add_state_forces(robot, state, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
     bodies = generalized.size // 6
     for body in range(bodies):
@@ -203,10 +201,17 @@ def compute_forces(
     for body in range(bodies):
         t, v = 6 * body, 7 * bodies + 6 * body
         w_WB = state[v], state[v + 1], state[v + 2]
-        t_x, t_y, t_z = gyroscopic_torque(forces.inertia, body, w_WB)
-        generalized[t] += t_x
-        generalized[t + 1] += t_y
-        generalized[t + 2] += t_z
+        torque = gyroscopic_torque(forces.inertia, body, w_WB)
+        for axis in range(3):
+            generalized[t + axis] += torque[axis]
+
+
+@inlined
+def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
+    """Adds the forces between struts, of anchors and of loads to the forces on the nodes."""
+    add_strut_forces(robot, state, forces)
+    add_anchor_forces(robot.anchors, forces.nodes)
+    add_loads(robot.loads, forces.nodes)
 
 
 @inlined
@@ -249,34 +254,15 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
 
 
 @compiled
-def compute_strut_forces(parts: Parts, state: Table, generalized: Table) -> None:
-    """Writes the generalized force between struts (6 bodies,): [t_W; f_W] at each body's origin.
+def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None:
+    """Writes the generalized force of touching struts, anchors and loads (6 bodies,): [t_W; f_W] at
+    each body's origin.
 
     Also writes nodes.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
-    add_strut_forces(robot, state, forces)
-    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
-
-
-@compiled
-def compute_anchor_forces(parts: Parts, state: Table, generalized: Table) -> None:
-    """Writes the generalized force of all anchors (6 bodies,): [t_W; f_W] at each body's origin.
-    Also writes nodes."""
-    robot, forces = unpacked(parts)
-    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
-    add_anchor_forces(robot.anchors, forces.nodes)
-    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
-
-
-@compiled
-def compute_loads(parts: Parts, state: Table, generalized: Table) -> None:
-    """Writes the generalized force of all loads (6 bodies,): [t_W; f_W] at each body's origin. Also
-    writes nodes."""
-    robot, forces = unpacked(parts)
-    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
-    add_loads(robot.loads, forces.nodes)
+    add_state_forces(robot, state, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
 
 

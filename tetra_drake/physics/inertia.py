@@ -19,8 +19,7 @@ XX, YY, ZZ, XY, XZ, YZ, INERTIA_COLUMNS = range(7)
 def turn_inertia(state: Table, inertia_B: Table, inertia_W: Table) -> None:
     """Writes the inertia of the bodies along the world's axes, for a state (13 bodies,)."""
     for body in range(inertia_B.shape[0]):
-        r_00, r_01, r_02, r_10, r_11, r_12, r_20, r_21, r_22 = rotation(state, body)
-        x, y, z = (r_00, r_01, r_02), (r_10, r_11, r_12), (r_20, r_21, r_22)
+        x, y, z = rotation(state, body)
         # R I, row by row, then (R I) Rᵀ.
         i_x = times_inertia(inertia_B, body, x)
         i_y = times_inertia(inertia_B, body, y)

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.physics.vectors import Vector, cross, difference, put_vector, vector_at
+from tetra_drake.physics.vectors import (
+    Vector,
+    cross,
+    difference,
+    dot,
+    put_vector,
+    scaled,
+    sum_of,
+    vector_at,
+)
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, inverse_sqrt
 
@@ -32,15 +41,13 @@ def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> No
     bodies = state.size // 13
     for body in range(bodies):
         q, v = 7 * body, 7 * bodies + 6 * body
-        r_00, r_01, r_02, r_10, r_11, r_12, r_20, r_21, r_22 = rotation(state, body)
+        x, y, z = rotation(state, body)
         o_x, o_y, o_z = state[q + 4], state[q + 5], state[q + 6]
         w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
         v_x, v_y, v_z = state[v + 3], state[v + 4], state[v + 5]
         for node in range(first_node[body], first_node[body + 1]):
-            a, b, c = vector_at(p_BN, node, 0)
-            p_x = r_00 * a + r_01 * b + r_02 * c
-            p_y = r_10 * a + r_11 * b + r_12 * c
-            p_z = r_20 * a + r_21 * b + r_22 * c
+            p_B = vector_at(p_BN, node, 0)
+            p_x, p_y, p_z = dot(x, p_B), dot(y, p_B), dot(z, p_B)
             put_vector((p_x, p_y, p_z), node, P_BN_W, nodes)
             put_vector((o_x + p_x, o_y + p_y, o_z + p_z), node, P_WN, nodes)
             nodes[node, V_WN] = v_x + w_y * p_z - w_z * p_y
@@ -69,15 +76,12 @@ def pitch_rate(nodes: Table, moving: int) -> Real:
     with a unit mass at each node. A change of shape alone does not count.
     """
     share = 1.0 / moving
-    c_x = c_y = c_z = 0.0
+    centre = spin = (0.0, 0.0, 0.0)
     for node in range(moving):
-        p_x, p_y, p_z = vector_at(nodes, node, P_WN)
-        c_x += share * p_x
-        c_y += share * p_y
-        c_z += share * p_z
-    s_xx = s_yy = s_zz = s_xy = s_xz = s_yz = l_x = l_y = l_z = 0.0
+        centre = sum_of(centre, scaled(share, vector_at(nodes, node, P_WN)))
+    s_xx = s_yy = s_zz = s_xy = s_xz = s_yz = 0.0
     for node in range(moving):
-        r = difference(vector_at(nodes, node, P_WN), (c_x, c_y, c_z))
+        r = difference(vector_at(nodes, node, P_WN), centre)
         r_x, r_y, r_z = r
         s_xx += r_x * r_x
         s_yy += r_y * r_y
@@ -85,10 +89,7 @@ def pitch_rate(nodes: Table, moving: int) -> Real:
         s_xy += r_x * r_y
         s_xz += r_x * r_z
         s_yz += r_y * r_z
-        spin = cross(r, vector_at(nodes, node, V_WN))
-        l_x += spin[0]
-        l_y += spin[1]
-        l_z += spin[2]
+        spin = sum_of(spin, cross(r, vector_at(nodes, node, V_WN)))
     least = _LEAST_INERTIA * (s_xx + s_yy + s_zz)
     i_xx, i_yy, i_zz = s_yy + s_zz + least, s_xx + s_zz + least, s_xx + s_yy + least
     # Cofactors of the inertia's second row.
@@ -96,25 +97,19 @@ def pitch_rate(nodes: Table, moving: int) -> Real:
     c_yy = i_xx * i_zz - s_xz * s_xz
     c_yz = s_xy * s_xz + i_xx * s_yz
     determinant = i_yy * c_yy - s_xy * c_yx - s_yz * c_yz
-    return (c_yx * l_x + c_yy * l_y + c_yz * l_z) / determinant
+    return dot((c_yx, c_yy, c_yz), spin) / determinant
 
 
 @inlined
-def rotation(state: Table, body: int) -> tuple[Real, ...]:
-    """Rotation matrix R_WB of a body: nine numbers, row by row."""
+def rotation(state: Table, body: int) -> tuple[Vector, Vector, Vector]:
+    """Rotation matrix R_WB of a body, as its rows."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
     return (
-        1.0 - s * (y * y + z * z),
-        s * (x * y - w * z),
-        s * (x * z + w * y),
-        s * (x * y + w * z),
-        1.0 - s * (x * x + z * z),
-        s * (y * z - w * x),
-        s * (x * z - w * y),
-        s * (y * z + w * x),
-        1.0 - s * (x * x + y * y),
+        (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)),
+        (s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)),
+        (s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)),
     )
 
 
@@ -152,10 +147,8 @@ def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> No
 @inlined
 def forward_axis(state: Table, body: int) -> Vector:
     """The x axis of a body in the world frame."""
-    q = 7 * body
-    w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
-    s = 2.0 / (w * w + x * x + y * y + z * z)
-    return 1.0 - s * (y * y + z * z), s * (x * y + w * z), s * (x * z - w * y)
+    x, y, z = rotation(state, body)
+    return x[0], y[0], z[0]
 
 
 @inlined
@@ -181,23 +174,14 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
     """Sums the forces on the nodes to the generalized force (6 bodies,): [t_W; f_W] at each body's
     origin, as in Drake's applied_generalized_force."""
     for body in range(generalized_force.size // 6):
-        t_x = t_y = t_z = f_x = f_y = f_z = 0.0
+        torque = total = (0.0, 0.0, 0.0)
         for node in range(first_node[body], first_node[body + 1]):
             force = vector_at(nodes, node, FORCE)
-            torque = cross(vector_at(nodes, node, P_BN_W), force)
-            t_x += torque[0]
-            t_y += torque[1]
-            t_z += torque[2]
-            f_x += force[0]
-            f_y += force[1]
-            f_z += force[2]
+            torque = sum_of(torque, cross(vector_at(nodes, node, P_BN_W), force))
+            total = sum_of(total, force)
         g = 6 * body
-        generalized_force[g] = t_x
-        generalized_force[g + 1] = t_y
-        generalized_force[g + 2] = t_z
-        generalized_force[g + 3] = f_x
-        generalized_force[g + 4] = f_y
-        generalized_force[g + 5] = f_z
+        generalized_force[g], generalized_force[g + 1], generalized_force[g + 2] = torque
+        generalized_force[g + 3], generalized_force[g + 4], generalized_force[g + 5] = total
 
 
 @compiled

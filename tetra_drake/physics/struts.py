@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.kinematics import P_WN
-from tetra_drake.physics.vectors import Vector, difference, dot, vector_at
+from tetra_drake.physics.vectors import Vector, difference, dot, scaled, sum_of, vector_at
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, any_lane, maximum, minimum
 
@@ -80,12 +80,7 @@ def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
 @inlined
 def vector_between(axes: Axes, s: Real, t: Real) -> Vector:
     """Vector (m) from the place t on the second axis to the place s on the first."""
-    u, v, r = axes.u, axes.v, axes.r
-    return (
-        r[0] + s * u[0] - t * v[0],
-        r[1] + s * u[1] - t * v[1],
-        r[2] + s * u[2] - t * v[2],
-    )
+    return difference(sum_of(axes.r, scaled(s, axes.u)), scaled(t, axes.v))
 
 
 @inlined
@@ -103,9 +98,8 @@ def origin(state: Table, body: int) -> Vector:
 @inlined
 def midpoint(struts: Struts, nodes: Table, i: int) -> Vector:
     """Midpoint of a strut (m)."""
-    a_x, a_y, a_z = vector_at(nodes, struts.node_a[i], P_WN)
-    b_x, b_y, b_z = vector_at(nodes, struts.node_b[i], P_WN)
-    return 0.5 * (a_x + b_x), 0.5 * (a_y + b_y), 0.5 * (a_z + b_z)
+    p_WA, p_WB = vector_at(nodes, struts.node_a[i], P_WN), vector_at(nodes, struts.node_b[i], P_WN)
+    return scaled(0.5, sum_of(p_WA, p_WB))
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Tally of a simulation: sums and extremes over all steps, which metrics are computed from.
 
-A part of the tally is a NamedTuple of tables. Its kernel `add` adds a step to them. All engines
-call it for each part of `Tally`. scenario.metrics computes metrics from the tables.
+A part of the tally is a NamedTuple of tables, with a kernel that adds a step to them. All engines
+call observe(), which calls these kernels. scenario.metrics computes metrics from the tables.
 """
 
 from __future__ import annotations
@@ -18,16 +18,13 @@ from tetra_drake.physics.model import Model
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, Truth, maximum, minimum, select
-from tetra_drake.simd.unrolling import for_each
 
 
 class Step(NamedTuple):
-    """A step of a simulation, with state, signals and forces at its end. The first step, and a
-    repeated step, take no time."""
+    """A step of a simulation, with signals and forces at its end. The first step, and a repeated
+    step, take no time."""
 
     robot: Model
-    state: Table
-    """State of the bodies (13 bodies,)."""
     signals: Table
     """Signals (signals,) in N at the end of the step."""
     signals_before: Table
@@ -66,31 +63,32 @@ class Effort(NamedTuple):
     limited: Annotated[Table, 1]
     """Time at a limit of an actuator, in s."""
 
-    @inlined
-    def add(self, step: Step) -> None:
-        """Adds a step."""
-        signal, cable_forces = step.robot.cables.signal, step.forces.cable_forces
-        per_time, work = select(step.takes_time, 1.0 / step.duration, 0.0), 0.0 * step.duration
-        drive = 0
-        for i in range(self.left.size):
-            if signal[i] == cable.PASSIVE:
-                continue
-            tension = cable_forces[i, cable.TENSION]
-            pull, left, limited = winding(step, i, drive)
-            drive += 1
-            wound = select(step.takes_time, self.left[i] - left, 0.0)
-            self.left[i] = left
-            speed = wound * per_time
-            self.peak_force[0] = maximum(self.peak_force[0], tension)
-            self.peak_speed[0] = maximum(self.peak_speed[0], abs(speed))
-            self.peak_power[0] = maximum(self.peak_power[0], tension * speed)
-            wound = select(step.counts, wound, 0.0)
-            work += maximum(pull * wound, 0.0)
-            self.impulse[0] += step.counted * tension
-            self.wound[0] += abs(wound)
-            self.pulled[0] += maximum(tension * wound, 0.0)
-            self.limited[0] += step.counted * limited
-        self.work[0] += work
+
+@inlined
+def add_to_effort(effort: Effort, step: Step) -> None:
+    """Adds a step."""
+    signal, cable_forces = step.robot.cables.signal, step.forces.cable_forces
+    per_time, work = select(step.takes_time, 1.0 / step.duration, 0.0), 0.0 * step.duration
+    drive = 0
+    for i in range(effort.left.size):
+        if signal[i] == cable.PASSIVE:
+            continue
+        tension = cable_forces[i, cable.TENSION]
+        pull, left, limited = winding(step, i, drive)
+        drive += 1
+        wound = select(step.takes_time, effort.left[i] - left, 0.0)
+        effort.left[i] = left
+        speed = wound * per_time
+        effort.peak_force[0] = maximum(effort.peak_force[0], tension)
+        effort.peak_speed[0] = maximum(effort.peak_speed[0], abs(speed))
+        effort.peak_power[0] = maximum(effort.peak_power[0], tension * speed)
+        wound = select(step.counts, wound, 0.0)
+        work += maximum(pull * wound, 0.0)
+        effort.impulse[0] += step.counted * tension
+        effort.wound[0] += abs(wound)
+        effort.pulled[0] += maximum(tension * wound, 0.0)
+        effort.limited[0] += step.counted * limited
+    effort.work[0] += work
 
 
 @inlined
@@ -112,14 +110,15 @@ class Roughness(NamedTuple):
     total: Annotated[Table, 1]
     """Integral of (dS/dt)² of all signals, in N²/s."""
 
-    @inlined
-    def add(self, step: Step) -> None:
-        """Adds a step."""
-        square = 0.0 * step.duration
-        for k in range(step.signals.size):
-            change = step.signals[k] - step.signals_before[k]
-            square += change * change
-        self.total[0] += select(step.counts, square / step.duration, 0.0)
+
+@inlined
+def add_to_roughness(roughness: Roughness, step: Step) -> None:
+    """Adds a step."""
+    square = 0.0 * step.duration
+    for k in range(step.signals.size):
+        change = step.signals[k] - step.signals_before[k]
+        square += change * change
+    roughness.total[0] += select(step.counts, square / step.duration, 0.0)
 
 
 class Lifted(NamedTuple):
@@ -128,16 +127,17 @@ class Lifted(NamedTuple):
     time: Annotated[Table, "bodies"]
     """Time (bodies,) in s while no contact node of a body bears a normal force."""
 
-    @inlined
-    def add(self, step: Step) -> None:
-        """Adds a step."""
-        carriers, i = step.robot.ground.carriers, 0
-        for body in range(self.time.size):
-            load = 0.0 * step.counted
-            while i < carriers.size and carriers[i] == body:
-                load += step.forces.ground_forces[i, NORMAL]
-                i += 1
-            self.time[body] += select(load == 0.0, step.counted, 0.0)
+
+@inlined
+def add_to_lifted(lifted: Lifted, step: Step) -> None:
+    """Adds a step."""
+    carriers, i = step.robot.ground.carriers, 0
+    for body in range(lifted.time.size):
+        load = 0.0 * step.counted
+        while i < carriers.size and carriers[i] == body:
+            load += step.forces.ground_forces[i, NORMAL]
+            i += 1
+        lifted.time[body] += select(load == 0.0, step.counted, 0.0)
 
 
 class LeastTension(NamedTuple):
@@ -146,13 +146,14 @@ class LeastTension(NamedTuple):
     of_all: Annotated[Table, 1, math.inf]
     """Least tension of all cables, in N."""
 
-    @inlined
-    def add(self, step: Step) -> None:
-        """Adds a step."""
-        least = self.of_all[0]
-        for i in range(step.forces.cable_forces.shape[0]):
-            least = minimum(least, step.forces.cable_forces[i, cable.TENSION])
-        self.of_all[0] = least
+
+@inlined
+def add_to_tension(tension: LeastTension, step: Step) -> None:
+    """Adds a step."""
+    least = tension.of_all[0]
+    for i in range(step.forces.cable_forces.shape[0]):
+        least = minimum(least, step.forces.cable_forces[i, cable.TENSION])
+    tension.of_all[0] = least
 
 
 class Rolled(NamedTuple):
@@ -163,13 +164,14 @@ class Rolled(NamedTuple):
     angle: Annotated[Table, 1]
     """Integral of the rate, in rad."""
 
-    @inlined
-    def add(self, step: Step) -> None:
-        """Adds a step."""
-        first_node = step.robot.first_node
-        rate = pitch_rate(step.forces.nodes, first_node[first_node.size - 1])
-        self.angle[0] += select(step.takes_time, 0.5 * step.duration * (self.rate[0] + rate), 0.0)
-        self.rate[0] = rate
+
+@inlined
+def add_to_rolled(rolled: Rolled, step: Step) -> None:
+    """Adds a step."""
+    first_node = step.robot.first_node
+    rate = pitch_rate(step.forces.nodes, first_node[first_node.size - 1])
+    rolled.angle[0] += select(step.takes_time, 0.5 * step.duration * (rolled.rate[0] + rate), 0.0)
+    rolled.rate[0] = rate
 
 
 class Tally(NamedTuple):
@@ -198,20 +200,14 @@ class Tally(NamedTuple):
         return tally
 
 
-add_to_each = for_each("add")
-
-
 @inlined
-def observe(
-    tally: Tally, robot: Model, time: Real, state: Table, signals: Table, forces: Forces
-) -> None:
-    """Adds the step that ends at `time` (s) with this state, signals and forces."""
+def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
+    """Adds the step that ends at `time` (s) with these signals and forces."""
     duration = time - tally.time[0]
     takes_time = duration > 0.0
     counts = takes_time & (tally.time[0] >= tally.begins[0])
     step = Step(
         robot=robot,
-        state=state,
         signals=signals,
         signals_before=tally.signals,
         forces=forces,
@@ -220,7 +216,11 @@ def observe(
         counts=counts,
         counted=select(counts, duration, 0.0),
     )
-    add_to_each(tally, step)
+    add_to_effort(tally.effort, step)
+    add_to_roughness(tally.roughness, step)
+    add_to_lifted(tally.lifted, step)
+    add_to_tension(tally.tension, step)
+    add_to_rolled(tally.rolled, step)
     for k in range(signals.size):
         tally.signals[k] = signals[k]
     tally.time[0] = time

@@ -39,6 +39,12 @@ def subtract_vector(vector: Vector, row: int, column: int, table: Table) -> None
 
 
 @inlined
+def sum_of(a: Vector, b: Vector) -> Vector:
+    """Sum a + b of two vectors."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
 def difference(a: Vector, b: Vector) -> Vector:
     """Difference a - b of two vectors."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]

@@ -78,23 +78,18 @@ def _check_start(
 ) -> None:
     """Raises InputError if a contact node is outside the terrain or in the ground. `start`
     (contacts, 3) are the positions of the contact nodes."""
-    corner, cells = np.array(grid.corner), np.array(grid.heights.shape) - 1
-    low, high = start[:, :2].min(axis=0), start[:, :2].max(axis=0)
-    if (low < corner).any() or (high > corner + cells * grid.cell).any():
-        reach = [
-            scenario.units.shown(side, "m") for side in (*corner, *(corner + cells * grid.cell))
-        ]
-        problem = f"the robot starts off its grid, which goes from x, y = {reach[0]}, {reach[1]} "
-        raise InputError(scenario.name, "terrain", problem + f"to {reach[2]}, {reach[3]}")
-    units, gaps = scenario.units, ground_frames(start, ground)[:, terrain.GAP]
+    near, shown = np.array(grid.corner), scenario.units.shown
+    far = near + (np.array(grid.heights.shape) - 1) * grid.cell
+    if (start[:, :2] < near).any() or (start[:, :2] > far).any():
+        reach = " to ".join(", ".join(shown(x, "m") for x in corner) for corner in (near, far))
+        problem = f"the robot starts off its grid, which goes from x, y = {reach}"
+        raise InputError(scenario.name, "terrain", problem)
+    gaps = ground_frames(start, ground)[:, terrain.GAP]
     weight = float(structure.mass.sum()) * scenario.robot.gravity
     if gaps.min() < -START_DEPTH - weight / scenario.ground.stiffness:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
-        problem = (
-            f"the robot starts with node {node} {units.shown(-gaps.min(), 'm')} below the ground"
-        )
-        problem += "; move what is there, or robot.offsets"
-        raise InputError(scenario.name, "terrain", problem)
+        found = f"the robot starts with node {node} {shown(-gaps.min(), 'm')} below the ground"
+        raise InputError(scenario.name, "terrain", f"{found}; move what is there, or robot.offsets")
 
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:

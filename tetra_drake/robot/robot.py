@@ -70,11 +70,6 @@ class Robot:
         return cls(scenario, structure, model, commanded=no_command)
 
     @property
-    def weights(self) -> Weights:
-        """The weights between the oscillators."""
-        return Weights(self.structure, self.scenario.cpg.reach)
-
-    @property
     def driven(self) -> np.ndarray:
         """Indices of the driven cables, oscillator by oscillator in the order of the scenario.
         Commands, actions and loads have this order."""
@@ -124,7 +119,8 @@ class Robot:
 
     def network(self, gait: Gait) -> Network:
         """The network of a gait. Raises InputError if the gait does not fit the scenario."""
-        cpg, weights = self.scenario.cpg, self.weights
+        cpg = self.scenario.cpg
+        weights = Weights(self.structure, cpg.reach)
         check_gait(gait, self.scenario, weights, source=f"gait {gait.name}")
         neurons = np.arange(2 * self.structure.signals)
         inhibition = np.zeros((neurons.size, neurons.size))

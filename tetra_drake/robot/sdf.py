@@ -41,13 +41,13 @@ def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
     links = *structure.bodies, FIXED
     for node, p_BN in enumerate(structure.p_BN):
         link_name, frame = links[structure.carriers[node]], f"node {structure.node_names[node]}"
-        _add_pose(add_element(model, "frame", name=frame, attached_to=link_name), p_BN)
+        element = add_element(model, "frame", name=frame, attached_to=link_name)
+        _add_pose(element, RigidTransform(p_BN))
     return xml_text(root)
 
 
-def _add_pose(parent: Element, pose: RigidTransform | np.ndarray) -> None:
-    """Adds a pose, or a position (3,) in m."""
-    X = pose if isinstance(pose, RigidTransform) else RigidTransform(pose)
+def _add_pose(parent: Element, X: RigidTransform) -> None:
+    """Adds a pose."""
     angles = RollPitchYaw(X.rotation()).vector()
     add_element(parent, "pose", np.concatenate([X.translation(), angles]))
 

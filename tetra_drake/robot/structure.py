@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.geometry import Cylinder, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
@@ -215,11 +216,10 @@ def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
     """Adds the bodies of a structure, as free bodies, to a plant that is not finalized. If the
     plant has a SceneGraph, struts and spheres are shown."""
+    given = zip(structure.bodies, structure.mass, structure.unit_inertia, strict=True)
     bodies = [
         plant.AddRigidBody(name, SpatialInertia(mass, np.zeros(3), UnitInertia(*unit)))
-        for name, mass, unit in zip(
-            structure.bodies, structure.mass, structure.unit_inertia, strict=True
-        )
+        for name, mass, unit in given
     ]
     if plant.geometry_source_is_registered():
         _show_bodies(plant, structure, bodies)
@@ -264,11 +264,14 @@ def AddNodes(
 ) -> list[Frame]:
     """Adds a frame "node NAME" for each node of a structure to a plant that is not finalized."""
     carriers = [*bodies, plant.world_body()]
+    nodes = zip(structure.node_names, structure.carriers, structure.p_BN, strict=True)
     return [
-        plant.AddFrame(
-            FixedOffsetFrame(f"node {name}", carriers[carrier].body_frame(), RigidTransform(p_BN))
-        )
-        for name, carrier, p_BN in zip(
-            structure.node_names, structure.carriers, structure.p_BN, strict=True
-        )
+        AddFrame(plant, f"node {name}", carriers[carrier].body_frame(), p_BN)
+        for name, carrier, p_BN in nodes
     ]
+
+
+def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:
+    """Adds a frame at a place p (3,) in m in another frame to a plant that is not finalized."""
+    offset = RigidTransform(np.asarray(p, dtype=float))
+    return plant.AddFrame(FixedOffsetFrame(name, parent, offset))

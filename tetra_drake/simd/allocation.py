@@ -22,7 +22,7 @@ import numpy as np
 Record = TypeVar("Record", bound=tuple)
 
 
-def allocate(kind: type[Record], sizes: Mapping[str, int], **given: object) -> Record:
+def allocate(kind: type[Record], sizes: Mapping[str, int]) -> Record:
     """A NamedTuple of new tables.
 
     Args:
@@ -31,21 +31,12 @@ def allocate(kind: type[Record], sizes: Mapping[str, int], **given: object) -> R
             float, all numbers have this value; otherwise they are 0. A field without annotation is
             a NamedTuple of tables.
         sizes: sizes by name.
-        given: values of fields that are not allocated.
     """
-    fields: dict[str, Any] = {}
-    for name, table in _fields(kind).items():
-        if name in given:
-            fields[name] = given[name]
-        elif isinstance(table, _Table):
-            shape = [
-                math.prod(sizes[factor] if isinstance(factor, str) else factor for factor in length)
-                for length in table.shape
-            ]
-            fields[name] = np.full(shape, table.start, dtype=table.kind)
-        else:
-            fields[name] = allocate(table, sizes)
-    return kind(**fields)
+    fields = [
+        field.filled(sizes) if isinstance(field, _Table) else allocate(field, sizes)
+        for field in _fields(kind)
+    ]
+    return kind(*fields)
 
 
 @dataclass(frozen=True)
@@ -59,12 +50,19 @@ class _Table:
     kind: type
     """Type of the numbers."""
 
+    def filled(self, sizes: Mapping[str, int]) -> np.ndarray:
+        """A new table, for sizes by name."""
+        shape = [
+            math.prod(sizes[factor] if isinstance(factor, str) else factor for factor in length)
+            for length in self.shape
+        ]
+        return np.full(shape, self.start, dtype=self.kind)
+
 
 @functools.cache
-def _fields(kind: type) -> dict[str, Any]:
-    """The fields of a NamedTuple by name: tables, and classes of further NamedTuples."""
-    hints = get_type_hints(kind, include_extras=True)
-    return {name: _table(hint) for name, hint in hints.items()}
+def _fields(kind: type) -> list[Any]:
+    """The fields of a NamedTuple: tables, and classes of further NamedTuples."""
+    return [_table(hint) for hint in get_type_hints(kind, include_extras=True).values()]
 
 
 def _table(hint: Any) -> Any:

@@ -1,32 +1,29 @@
 """LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
 
-from tetra_drake.systems.actuators import Actuators
-from tetra_drake.systems.attachment import AddFrame, Attach
+from tetra_drake.robot.structure import AddFrame
+from tetra_drake.systems.attachment import Attach
 from tetra_drake.systems.cable_network import AddCables, Cable, CableNetwork
 from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import AddGroundContact, GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.sampled_controller import HeldSignals, SampledController
 from tetra_drake.systems.start_up_gate import StartUpGate
-from tetra_drake.systems.state_forces import Anchors, Loads, StrutContact
+from tetra_drake.systems.state_forces import StateForces
 from tetra_drake.systems.steering import Steering
 
 __all__ = [
-    "Actuators",
     "AddCables",
     "AddFrame",
     "AddGroundContact",
-    "Anchors",
     "Attach",
     "Cable",
     "CableNetwork",
     "Feedback",
     "GroundContact",
     "HeldSignals",
-    "Loads",
     "MatsuokaCpg",
     "SampledController",
     "StartUpGate",
+    "StateForces",
     "Steering",
-    "StrutContact",
 ]

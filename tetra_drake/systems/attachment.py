@@ -13,16 +13,14 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.common.value import AbstractValue
-from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     ExternallyAppliedSpatialForce,
     ExternallyAppliedSpatialForceMultiplexer,
     MultibodyPlant,
 )
-from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, FrameIndex, RigidBody
+from pydrake.multibody.tree import BodyIndex, Frame, FrameIndex, RigidBody
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -91,13 +89,10 @@ class BodyStates(LeafSystem):
 
     def __init__(self, plant: MultibodyPlant) -> None:
         super().__init__()
-        self._poses, self._velocities = (
-            self.DeclareAbstractInputPort(name, port.Allocate())
-            for name, port in (
-                ("body_poses", plant.get_body_poses_output_port()),
-                ("spatial_velocities", plant.get_body_spatial_velocities_output_port()),
-            )
-        )
+        poses = plant.get_body_poses_output_port().Allocate()
+        velocities = plant.get_body_spatial_velocities_output_port().Allocate()
+        self._poses = self.DeclareAbstractInputPort("body_poses", poses)
+        self._velocities = self.DeclareAbstractInputPort("spatial_velocities", velocities)
         sources = {self._poses.ticket(), self._velocities.ticket()}
         size = 13 * (plant.num_bodies() - 1)
         self.DeclareVectorOutputPort("state", size, self._calc_state, sources)
@@ -150,12 +145,6 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
         is_number = isinstance(value, numbers.Real) and math.isfinite(value)
         if not is_number or value < 0.0:
             raise InputError(source, f"{key}.{name}", f"found {value!r}, expected 0 or more")
-
-
-def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:
-    """Adds a frame at a place p (3,) in m in another frame to a plant that is not finalized."""
-    offset = RigidTransform(np.asarray(p, dtype=float))
-    return plant.AddFrame(FixedOffsetFrame(name, parent, offset))
 
 
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:

@@ -10,6 +10,7 @@ from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import Integrator
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics import actuator, cable, kinematics
@@ -19,7 +20,6 @@ from tetra_drake.scenario.actuator_kinds import Actuation, DrivenCables, Force
 from tetra_drake.scenario.refusals import hint
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
-from tetra_drake.systems.actuators import Actuators
 from tetra_drake.systems.attachment import Attach, Nodes, check_constants
 from tetra_drake.systems.cable_geometry import AddCableGeometry
 
@@ -148,7 +148,7 @@ def AddCables(
     Args:
         actuated: names of the cables that each signal drives, in the order of the signals.
         actuation: kind of the actuators, Force() by default. Kinds with states are added as the
-            system NAME_actuators.
+            system NAME_actuators, which is Drake's Integrator of `drive_rates`.
         drives: states of the actuators at t = 0; by default without signals, at the plant's
             default positions.
         slack: False if cables also push.
@@ -171,17 +171,17 @@ def AddCables(
     )
     network = builder.AddNamedSystem(name, CableNetwork(model, signals=len(actuated)))
     Attach(builder, plant, network)
+    lengths = _default_lengths(plant, cables)
     if drives is None:
         driven = np.flatnonzero(table["signal"] != cable.PASSIVE)
-        law, lengths = cable.CableLaw.of(table[driven]), _default_lengths(plant, cables)[driven]
-        drives = actuation.drives(DrivenCables.at_rest(law, lengths, np.zeros(driven.size)))
+        law, signals = cable.CableLaw.of(table[driven]), np.zeros(driven.size)
+        drives = actuation.drives(DrivenCables.at_rest(law, lengths[driven], signals))
     if len(drives):
-        actuators = builder.AddNamedSystem(f"{name}_actuators", Actuators(drives))
-        builder.Connect(network.GetOutputPort("drive_rates"), actuators.GetInputPort("rates"))
+        actuators = builder.AddNamedSystem(f"{name}_actuators", Integrator(drives))
+        builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None:
-        names = [one.name for one in cables]
-        shown = dict(zip(names, _default_lengths(plant, cables), strict=True))
+        shown = dict(zip((one.name for one in cables), lengths, strict=True))
         AddCableGeometry(builder, scene_graph, network.GetOutputPort("ends"), lengths=shown)
     return network
 

@@ -22,15 +22,13 @@ from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import (
     AddCables,
     AddGroundContact,
-    Anchors,
     Attach,
     Cable,
     Feedback,
-    Loads,
     MatsuokaCpg,
     StartUpGate,
+    StateForces,
     Steering,
-    StrutContact,
 )
 
 
@@ -54,7 +52,7 @@ def MakeTensegrityDiagram(
 
         cables_actuators ←──→ cables
 
-        anchors, loads ──→ forces
+        state_forces ──→ forces
 
     Subsystems:
 
@@ -62,8 +60,7 @@ def MakeTensegrityDiagram(
       without oscillators has no cpg.
     - feedback: only if `cpg.feedback` is not empty
     - cables_actuators: only if the kind of actuators has states, as winches have
-    - strut_contact: only if struts touch
-    - anchors, loads: only if nodes of bodies are held, or loaded
+    - state_forces: only if struts touch, or nodes of bodies are held or loaded
     - controller: in place of cpg and start_up, a system with the output port `signals`, and any
       others. Its input ports may be `state` and any output port of cables and ground, such as
       `lengths`, `rates`, `tensions` and `normal_forces`: ports of the same name are connected. See
@@ -82,9 +79,8 @@ def MakeTensegrityDiagram(
     builder = DiagramBuilder()
 
     plant, scene_graph = MultibodyPlant(time_step=0.0), None
-    plant.set_name("plant")
     if meshcat is None:
-        builder.AddSystem(plant)
+        builder.AddNamedSystem("plant", plant)
     else:
         _, scene_graph = AddMultibodyPlantSceneGraph(builder, plant)
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
@@ -119,12 +115,9 @@ def MakeTensegrityDiagram(
         ground=robot.ground,
         witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
     )
-    if robot.model.strut_contact.acts:
-        Attach(builder, plant, builder.AddNamedSystem("strut_contact", StrutContact(robot)))
-    if structure.anchors.nodes.size:
-        Attach(builder, plant, builder.AddNamedSystem("anchors", Anchors(robot)))
-    if structure.loads.nodes.size:
-        Attach(builder, plant, builder.AddNamedSystem("loads", Loads(robot)))
+    pushed = robot.model.anchors.nodes.size + robot.model.loads.nodes.size
+    if robot.model.strut_contact.acts or pushed:
+        Attach(builder, plant, builder.AddNamedSystem("state_forces", StateForces(robot)))
 
     state = plant.get_state_output_port()
     if structure.signals:

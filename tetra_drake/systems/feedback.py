@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics import cable, contact
+from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS
+from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.physics.feedback import sense
 from tetra_drake.robot.robot import Robot
 
@@ -33,10 +32,9 @@ class Feedback(LeafSystem):
         self._gains = np.array(gains, dtype=float)
         self._neurons = 2 * structure.signals
         self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
-        self._cable_shape = len(structure.cables), cable.CABLE_FORCE_COLUMNS
-        self._ground_shape = len(structure.contacts), contact.GROUND_FORCE_COLUMNS
-        self._cables = self.DeclareVectorInputPort("cable_forces", math.prod(self._cable_shape))
-        self._ground = self.DeclareVectorInputPort("ground_forces", math.prod(self._ground_shape))
+        cables, contacts = len(structure.cables), len(structure.contacts)
+        self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
+        self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
         inputs = {self._state.ticket(), self._cables.ticket(), self._ground.ticket()}
         self.DeclareVectorOutputPort("feedback", self._neurons, self._calc_feedback, inputs)
 
@@ -45,7 +43,7 @@ class Feedback(LeafSystem):
             self._senses,
             self._gains,
             self._state.Eval(context),
-            self._cables.Eval(context).reshape(self._cable_shape),
-            self._ground.Eval(context).reshape(self._ground_shape),
+            self._cables.Eval(context).reshape(-1, CABLE_FORCE_COLUMNS),
+            self._ground.Eval(context).reshape(-1, GROUND_FORCE_COLUMNS),
             output.get_mutable_value(),
         )

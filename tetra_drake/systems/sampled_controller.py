@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -40,13 +39,15 @@ class HeldSignals(LeafSystem):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
-        self._structure = robot.structure
-        signals = robot.structure.signals
-        self._cable_shape = len(robot.structure.cables), CABLE_FORCE_COLUMNS
-        self._ground_shape = len(robot.structure.contacts), GROUND_FORCE_COLUMNS
-        self._state = self.DeclareVectorInputPort("state", 13 * len(robot.structure.bodies))
-        self._cables = self.DeclareVectorInputPort("cable_forces", math.prod(self._cable_shape))
-        self._ground = self.DeclareVectorInputPort("ground_forces", math.prod(self._ground_shape))
+        self._structure = structure = robot.structure
+        signals, cables, contacts = (
+            structure.signals,
+            len(structure.cables),
+            len(structure.contacts),
+        )
+        self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
+        self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
+        self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
         first = robot.commanded[0] if len(robot.commanded) else np.zeros(signals)
         self.DeclareDiscreteState(first)
         self.DeclareVectorOutputPort("signals", signals, self._calc_signals, {self.xd_ticket()})
@@ -57,8 +58,8 @@ class HeldSignals(LeafSystem):
             self._structure,
             time=context.get_time(),
             state=self._state.Eval(context),
-            cable_forces=self._cables.Eval(context).reshape(self._cable_shape),
-            ground_forces=self._ground.Eval(context).reshape(self._ground_shape),
+            cable_forces=self._cables.Eval(context).reshape(-1, CABLE_FORCE_COLUMNS),
+            ground_forces=self._ground.Eval(context).reshape(-1, GROUND_FORCE_COLUMNS),
         )
 
     def Hold(self, context: Context, signals: np.ndarray) -> None:

@@ -82,9 +82,8 @@ def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table
         else:
             turns = inertia.over_inertia(inertia_W, body, (force[i], force[i + 1], force[i + 2]))
         acceleration[i], acceleration[i + 1], acceleration[i + 2] = turns
-        acceleration[i + 3] = force[i + 3] * per_mass
-        acceleration[i + 4] = force[i + 4] * per_mass
-        acceleration[i + 5] = force[i + 5] * per_mass
+        for j in range(3, BLOCK):
+            acceleration[i + j] = force[i + j] * per_mass
 
 
 @inlined

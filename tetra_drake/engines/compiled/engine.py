@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine
+from tetra_drake.engines.compiled.lane_engine import BODY_STEPS, LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.lane_stepper import LaneStepper
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
-from tetra_drake.engines.interface import Engine, Outcome
+from tetra_drake.engines.interface import Engine, Outcome, outcome_of
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
-
-_BODY_STEPS = 100_000
-"""Iterations times bodies per call of the kernel, about 70 ms. Between calls Python handles signals
-of the operating system."""
 
 
 class CompiledEngine(Engine):
@@ -35,7 +30,7 @@ class CompiledEngine(Engine):
         prepared = Prepared.of(simulation)
         engine = LaneEngine(prepared, width=1)
         engine.load(0, prepared)
-        while not engine.advance(_BODY_STEPS):
+        while not engine.advance(BODY_STEPS):
             check_time()
         return engine.result(0)
 
@@ -45,14 +40,9 @@ class CompiledEngine(Engine):
     def simulate_many(
         self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
     ) -> list[Outcome]:
-        outcomes: list[Outcome] = []
         with LanePool(threads) as pool:
-            for future in pool.submit(simulations, record=record):
-                try:
-                    outcomes.append(future.result())
-                except SimulationFailure as failure:
-                    outcomes.append(failure)
-        return outcomes
+            futures = pool.submit(simulations, record=record)
+            return [outcome_of(future.result) for future in futures]
 
 
 ENGINE = CompiledEngine()

@@ -30,8 +30,7 @@ FIRST = SurfaceGrid._fields.index("first")
 """Column of Ground.grid with the index of the first height. It differs between robots, because one
 table has the heights of all robots."""
 
-
-_BODY_STEPS = 100_000
+BODY_STEPS = 100_000
 """Iterations times bodies per call of the kernel, about 70 ms. Between calls Python handles signals
 of the operating system."""
 
@@ -165,9 +164,9 @@ class LaneEngine:
         self._tried += work
         longest_first = np.argsort(-work, kind="stable")  # so that the lanes end together
         self._wait(longest_first[np.isfinite(marks[longest_first, 0])])
-        self._simulate(_BODY_STEPS)
+        self._simulate(BODY_STEPS)
         while (self._running == loop.RUNNING).any():
-            self._simulate(_BODY_STEPS)
+            self._simulate(BODY_STEPS)
 
     def _simulate(self, body_steps: int) -> None:
         """Simulates until a robot ends, or for about `body_steps` iterations times bodies."""

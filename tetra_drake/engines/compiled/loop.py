@@ -201,7 +201,7 @@ def arrive(constants: Constants, lanes: LaneState) -> None:
         forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
     contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
     compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
-    observe(lanes.tally, robot, lanes.clock[TIME], state, lanes.signals, forces)
+    observe(lanes.tally, robot, lanes.clock[TIME], lanes.signals, forces)
 
 
 @inlined
