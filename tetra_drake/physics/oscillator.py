@@ -62,7 +62,7 @@ class Network(NamedTuple):
             raise ValueError(f"found inhibition of shape {matrix.shape}, expected (2n, 2n)")
         for name, tau in (("tau_a", tau_a), ("tau_b", tau_b)):
             if not np.all(np.asarray(tau) > 0.0):
-                raise ValueError(f"found {name} of {tau} s, expected more than 0")
+                raise ValueError(f"found {tau!r} s as {name}, expected more than 0")
         neurons, inhibiting = len(matrix), [np.flatnonzero(row) for row in matrix]
         first = np.array([row[0] if row.size else 0 for row in inhibiting], dtype=np.int64)
         beyond = np.array([row[-1] + 1 if row.size else 0 for row in inhibiting], dtype=np.int64)
