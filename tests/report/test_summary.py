@@ -47,7 +47,7 @@ def test_metrics_that_are_zero_or_missing_have_no_row_unless_the_scenario_is_abo
 
 def test_requirements_that_are_not_met_are_named(tiny, result):
     assert "requirement" not in result_text(result)
-    strict = tiny.with_changes({"require": {"distance": "4000 in", "twist": "0 in"}})
+    strict = tiny.with_changes({"require": {"distance": "4000 in", "twist": "4000 in"}})
     strict_result = dataclasses.replace(result, scenario=strict)
     (line,) = (line for line in result_text(strict_result).splitlines() if "requir" in line)
     assert line.split()[0] == "distance" and "4000 in" in line

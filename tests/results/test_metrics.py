@@ -166,14 +166,18 @@ def test_the_headline_says_where_the_robot_walks(scenario, terrain, text):
 
 
 @pytest.mark.parametrize(
-    ("twist", "texts"),
+    ("changes", "text"),
     [
-        (0.0126, ["twist is 0.4961 in, less than 0.5 in"]),
-        (0.0127, []),  # 0.5 in
-        (math.inf, []),
-        (math.nan, ["twist is nan in, less than 0.5 in"]),
+        ({"lead": 0.0126}, "lead is 0.4961 in, less than 0.5 in"),
+        ({"lead": 0.0127}, None),  # 0.5 in
+        ({"lead": math.inf}, None),
+        ({"lead": math.nan}, "lead is nan in, less than 0.5 in"),
+        ({"twist": 0.0127}, None),
+        ({"twist": 0.0128}, "twist is 0.5039 in, more than 0.5 in"),
     ],
 )
-def test_a_metric_below_its_least_value_or_nan_is_unmet(robot, twist, texts):
-    metrics = dataclasses.replace(metrics_of(robot, CIRCLE, 0.0), twist=twist)
-    assert unmet_requirements(metrics, {"twist": 0.5 * INCH, "distance": 0.0}) == texts
+def test_a_metric_below_its_limit_a_cost_above_it_or_nan_is_unmet(robot, changes, text):
+    met = {"lead": 0.0127, "twist": 0.0127}
+    metrics = dataclasses.replace(metrics_of(robot, CIRCLE, 0.0), **met | changes)
+    limits = dict.fromkeys(met, 0.5 * INCH) | {"distance": 0.0}
+    assert unmet_requirements(metrics, limits) == ([] if text is None else [text])

@@ -120,7 +120,8 @@ def results(run: Run) -> list[tuple[str, str]]:
     if evaluations:
         effort.append(("time per evaluation", _time(wall_time / evaluations)))
     if best.empty:
-        return effort
+        last = run.evaluations["failure"].tail(1)
+        return effort + [("last failure", failure) for failure in last]
     fittest = run.fittest()
     starts = [run.initial_best(trial) for trial in best["trial"]]
     initial = max(starts, key=lambda gait: gait["fitness"])

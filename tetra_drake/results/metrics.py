@@ -106,9 +106,9 @@ def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[s
     0.05 in, less than 0.125 in". NaN meets no requirement."""
     texts, shown = [], current(metrics.units).shown
     for name, limit in require.items():
-        value, unit, most = getattr(metrics, name), UNITS[name], METRICS[name].most
-        is_met = value <= limit if most else value >= limit
+        value, unit, is_cost = getattr(metrics, name), UNITS[name], METRICS[name].is_cost
+        is_met = value <= limit if is_cost else value >= limit
         if not is_met:
-            beyond = "more" if most else "less"
+            beyond = "more" if is_cost else "less"
             texts.append(f"{name} is {shown(value, unit)}, {beyond} than {shown(limit, unit)}")
     return texts

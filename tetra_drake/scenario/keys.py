@@ -72,7 +72,7 @@ def _table_of_keys(rows: Sequence[Row]) -> str:
 def _table_of_metrics() -> str:
     rows, texts = [], _docstrings(Metrics)
     for name, metric in METRICS.items():
-        limit = "at most" if metric.most else "at least"
+        limit = "at most" if metric.is_cost else "at least"
         rows.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", texts[name]))
     headings = ["metric", "unit", "`require`", "robots", "what it is"]
     return Table(headings, rows, range(5)).markdown()

@@ -109,8 +109,9 @@ class Metric:
     least: bool = False
     """True if the least value of several simulations is recorded, not their mean."""
     most: bool = False
-    """True if the greatest value of several simulations is recorded. A requirement is then an upper
-    limit."""
+    """True if the greatest value of several simulations is recorded."""
+    is_cost: bool = False
+    """True if less is better. A requirement is then an upper limit."""
     is_share: bool = False
     """True for a share of time. It is shown in percent."""
     of_pose: bool = False
@@ -168,6 +169,7 @@ class Metrics:
         lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
         of_pose=True,
         needs=ROW,
+        is_cost=True,
     )
     """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
     lead: float = _metric(
@@ -179,7 +181,7 @@ class Metrics:
     )
     """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
     lateral_drift: float = _metric(
-        "m", "sideways", lambda walk: abs(walk.followed_way[1]), of_pose=True
+        "m", "sideways", lambda walk: abs(walk.followed_way[1]), of_pose=True, is_cost=True
     )
     """Sideways displacement, abs(y₁), at the end."""
     heading_change: float = _metric(
@@ -196,13 +198,17 @@ class Metrics:
     )
     """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
     the path bends left as seen along the motion, even if the robot walks backward."""
-    actuator_work: float = _metric("J", "of all actuators", lambda walk: walk.tally.effort.work[0])
+    actuator_work: float = _metric(
+        "J", "of all actuators", lambda walk: walk.tally.effort.work[0], is_cost=True
+    )
     """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
     max(0, -S dl/dt) for driven cables with signal S and length l."""
-    cost_of_transport: float = _metric("", "work / (weight x distance)", _cost_of_transport)
+    cost_of_transport: float = _metric(
+        "", "work / (weight x distance)", _cost_of_transport, is_cost=True
+    )
     """Actuator work divided by weight and by the centre's displacement over the ground, in the
     steady stretch. The displacement counts as at least 1 mm. Infinite without gravity."""
-    signal_rate: float = _metric("N/s", "how fast signals change", _signal_rate)
+    signal_rate: float = _metric("N/s", "how fast signals change", _signal_rate, is_cost=True)
     """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
     lifted: float = _metric(
         "",
@@ -228,17 +234,18 @@ class Metrics:
     """Travelling index of the signals in the steady stretch: 0 for a standing wave along the robot,
     1 for a travelling wave."""
     peak_actuator_force: float = _metric(
-        "N", "at any time", lambda walk: walk.tally.effort.peak_force[0], most=True
+        "N", "at any time", lambda walk: walk.tally.effort.peak_force[0], most=True, is_cost=True
     )
     """Greatest tension of a driven cable at any time."""
     mean_actuator_force: float = _metric(
         "N",
         "of all driven cables",
         lambda walk: walk.per_actuator_time * walk.tally.effort.impulse[0],
+        is_cost=True,
     )
     """Mean tension of the driven cables in the steady stretch."""
     peak_actuator_speed: float = _metric(
-        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True
+        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True, is_cost=True
     )
     """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
     for a winch, otherwise of the cable's length."""
@@ -246,10 +253,11 @@ class Metrics:
         "m/s",
         "winding or paying out",
         lambda walk: walk.per_actuator_time * walk.tally.effort.wound[0],
+        is_cost=True,
     )
     """Mean speed in the steady stretch, winding or paying out."""
     peak_actuator_power: float = _metric(
-        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True
+        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True, is_cost=True
     )
     """Greatest product of an actuator's tension and winding speed, at any time."""
     mean_actuator_power: float = _metric(
@@ -257,6 +265,7 @@ class Metrics:
         "effort of an actuator",
         lambda walk: walk.per_actuator_time * walk.tally.effort.pulled[0],
         most=True,
+        is_cost=True,
     )
     """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
     actuator_limited: float = _metric(
@@ -264,6 +273,7 @@ class Metrics:
         "time at a limit of an actuator",
         lambda walk: walk.per_actuator_time * walk.tally.effort.limited[0],
         most=True,
+        is_cost=True,
         is_share=True,
         needs=LIMITS,
     )
