@@ -299,8 +299,10 @@ def carried():
 def test_a_legend_names_bodies_and_the_ends_of_a_row_are_named_in_its_step(carried, walk):
     figure = time_lapse(carried)
     [legend] = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["n0 n4", "n1 n5", "n2 n3"]
-    shown = [to_hex(line.get_color()) for line in legend.get_lines()]
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["n0 n4", "n1 n5", "n2 n3", "path of the centre"]
+    *shown, way = [to_hex(line.get_color()) for line in legend.get_lines()]
+    assert way not in shown
     assert shown == struts(pictures(figure)[0])[1].ravel().tolist()
     first, last = pictures(one_step(row(walk), time=(0.0, 1.0)))[0].texts
     assert (first.get_text(), last.get_text()) == ("T1", "T5")
