@@ -102,6 +102,8 @@ def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
     assert "distance" not in turned and "best of each trial" not in turned
 
 
-def test_a_run_without_a_fitness_is_summed_up_by_its_effort(tmp_path):
+def test_a_run_without_a_fitness_is_summed_up_by_its_effort_and_its_last_failure(tmp_path):
     run = load_run(write_run(tmp_path / "run", [[[(None, 0)]]]))
-    assert [name for name, _ in results(run)] == ["evaluations", "time per evaluation"]
+    summary = dict(results(run))
+    assert [*summary] == ["evaluations", "time per evaluation", "last failure"]
+    assert summary["last failure"] == run.evaluations["failure"].iloc[-1]
