@@ -115,8 +115,8 @@ def MakeTensegrityDiagram(
         ground=robot.ground,
         witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
     )
-    pushed = robot.model.anchors.nodes.size + robot.model.loads.nodes.size
-    if robot.model.strut_contact.acts or pushed:
+    model = robot.model
+    if model.strut_contact.acts or model.anchors.nodes.size or model.loads.nodes.size:
         Attach(builder, plant, builder.AddNamedSystem("state_forces", StateForces(robot)))
 
     state = plant.get_state_output_port()

@@ -40,11 +40,8 @@ class HeldSignals(LeafSystem):
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         self._structure = structure = robot.structure
-        signals, cables, contacts = (
-            structure.signals,
-            len(structure.cables),
-            len(structure.contacts),
-        )
+        signals = structure.signals
+        cables, contacts = len(structure.cables), len(structure.contacts)
         self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
         self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
         self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
