@@ -27,13 +27,13 @@ VIEWS = {
 """Directions in World from the robot to the camera, by name of the view; `free` is the page's."""
 
 _GIF = "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=none"
-"""Filter of ffmpeg: colours of the video's own. Dithered frames would be three times as large."""
+"""Filter of ffmpeg: colours of the video itself. Dithered frames would be twice as large."""
 
 KINDS: dict[str, Any] = {
     ".mp4": {"codec": "libx264", "quality": 8},
     ".gif": {
         "codec": "gif",
-        "pix_fmt_out": "rgb8",
+        "pix_fmt_out": "pal8",
         "ffmpeg_log_level": "error",  # else a line for every equal pair of colours
         "output_params": ["-filter_complex", _GIF],
     },
