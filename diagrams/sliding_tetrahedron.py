@@ -23,6 +23,7 @@ from matplotlib.figure import Figure
 from one_tetrahedron import BASE, LEADING, TRAILING, Samples, let_go, weight
 from pydrake.geometry import Meshcat
 
+from tetra_drake.errors import InputError
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.options import quantity
 from tetra_drake.results.measures import intervals
@@ -135,5 +136,5 @@ if __name__ == "__main__":
     parser.add_argument("--out", type=Path, default=OUT, help="folder for the figures")
     try:
         main(**vars(parser.parse_args()))
-    except ValueError as error:
+    except InputError as error:
         sys.exit(f"sliding_tetrahedron.py: {error}")

@@ -14,7 +14,7 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.changes import given_changes
-from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.common_sections import by_separate_key, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
@@ -65,7 +65,8 @@ def sweep(
     swept = given_changes(changes, "sweep")
     changes = {key: _values(key, values) for key, values in swept.items()}
     combinations = list(itertools.product(*changes.values()))
-    scenarios = [base.with_changes(_by_key(changes, each)) for each in combinations]
+    grid = [dict(zip(changes, each, strict=True)) for each in combinations]
+    scenarios = [base.with_changes(by_separate_key(each)) for each in grid]
     outcomes = simulate_many(
         [changed for changed in scenarios for _ in walkers],
         walkers * len(scenarios),
@@ -85,12 +86,6 @@ def sweep(
         variables[name] = list(labels), numbers, {"units": unit or "1"}
     coordinates = {name: (name, *given) for name, given in labels.items()}
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
-
-
-def _by_key(joined: Iterable[str], values: Iterable[Any]) -> dict[str, Any]:
-    """Changes of a scenario: each value for all keys that are joined."""
-    pairs = zip(joined, values, strict=True)
-    return {key: value for keys, value in pairs for key in separate(keys)}
 
 
 def _values(key: str, given: Any) -> list[Any]:

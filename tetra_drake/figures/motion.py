@@ -141,8 +141,10 @@ def time_lapse(
         way = signed(float(walked.sel(time=now)), unit.decimals + 1)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
-    named = structure.bodies if len(looks) <= len(LINE_COLOURS) else ()
-    legend_below(page, dict(zip(named, looks, strict=False)) | {"path of the centre": _WAY})
+    legend = {"path of the centre": _WAY}
+    if len(looks) <= len(LINE_COLOURS):
+        legend = dict(zip(structure.bodies, looks, strict=True)) | legend
+    legend_below(page, legend)
     set_title(page, "Time lapse from above: time and distance walked")
     return page
 

@@ -6,13 +6,16 @@ file.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from collections.abc import Mapping
+from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.quantities import DampingPerLength, Force, Stiffness, Time
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Section, Varied
+
+Value = TypeVar("Value")
 
 Pathway = Literal["length", "load", "pitch"]
 """A signal that can be fed back to the oscillators; see physics.feedback."""
@@ -160,3 +163,8 @@ class Disturbances(Section):
 def separate(joined: str) -> list[str]:
     """Splits a key of `spreads` at its commas into scenario keys."""
     return [key.strip() for key in joined.split(",")]
+
+
+def by_separate_key(by_joined: Mapping[str, Value]) -> dict[str, Value]:
+    """Values by scenario key, from values for joined keys."""
+    return {key: value for joined, value in by_joined.items() for key in separate(joined)}

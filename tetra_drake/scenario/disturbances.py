@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.common_sections import by_separate_key, separate
 from tetra_drake.scenario.scenario import Scenario
 
 IterationSeed = tuple[int, int, int]
@@ -63,7 +63,7 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     The values are not checked: the largest changes were checked when the scenario was loaded.
     """
     numbers = scenario.numbers()
-    factors = {key: factor for joined, factor in draw.factors.items() for key in separate(joined)}
+    factors = by_separate_key(draw.factors)
     changed = scenario.with_numbers({key: x * numbers[key] for key, x in factors.items()})
     robot, terrain = changed.robot, changed.terrain
     if draw.moves is not None:
