@@ -45,8 +45,18 @@ class GaitSimulation:
     """The turn, in place of the gait's."""
 
     @classmethod
-    def of(cls, scenario: Scenario, driver: Driver, *, record: bool = False) -> Self:
+    def of(
+        cls,
+        scenario: Scenario,
+        driver: Driver,
+        *,
+        record: bool = False,
+        viewer: Viewer | None = None,
+        steering: SteeringSignal | None = None,
+    ) -> Self:
         """The simulation of a gait or a command. Raises InputError if it does not fit."""
         if isinstance(driver, Command):
-            return cls(commanded_robot(scenario, driver), driver.gait, record=record)
-        return cls(Robot.of(scenario), driver, record=record)
+            robot, gait = commanded_robot(scenario, driver), driver.gait
+        else:
+            robot, gait = Robot.of(scenario), driver
+        return cls(robot, gait, record=record, viewer=viewer, steering=steering)

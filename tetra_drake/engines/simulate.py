@@ -72,9 +72,10 @@ def simulate(
     given = gait if command is None else command
     if given is None:
         raise InputError("simulate", "gait", "is needed, or a command, or a controller")
-    simulation = GaitSimulation.of(scenario, _driver(given, scenario), record=record)
-    simulation = dataclasses.replace(simulation, viewer=viewer, steering=steering)
-    result = engine.simulate(simulation)
+    driver = _driver(given, scenario)
+    result = engine.simulate(
+        GaitSimulation.of(scenario, driver, record=record, viewer=viewer, steering=steering)
+    )
     return dataclasses.replace(result, scenario=scenario)  # a command's has no network
 
 
