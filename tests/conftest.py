@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 from helpers.analytic import BOWL, record_run, small_scenario
-from helpers.widths import WIDEST
 
-from tetra_drake.engines.compiled import lane_pool, lane_stepper
+from tetra_drake.engines.preparation import prepare
 from tetra_drake.errors import InputError
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import Structure
@@ -18,25 +17,10 @@ from tetra_drake.scenario.scenario import Scenario
 Refused = Callable[..., contextlib.AbstractContextManager[None]]
 
 
-ORDER = (
-    *("engines/compiled/test_many.py", "engines", "systems", "diagrams", "robot", "scenario"),
-    *("figures", "physics", "simd", "optimizers"),
-    *(f"evolution/test_{name}" for name in ("run", "trials", "evaluators", "kill", "cluster")),
-    *("analysis", "evolution", ""),
-)
-"""The folders of tests, those first that compile most; what walks in lanes is later in the second
-half, when the first test has compiled for it."""
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Orders the tests so that one of two worker processes compiles for both: the other one begins
-    in the middle, with tests that compile little."""
-
-    def rank(item: pytest.Item) -> int:
-        path = item.path.relative_to(Path(__file__).parent).as_posix()
-        return next(i for i, start in enumerate(ORDER) if path.startswith(start))
-
-    items.sort(key=rank)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compiles all kernels, before worker processes start."""
+    if not hasattr(session.config, "workerinput"):
+        prepare()
 
 
 @pytest.fixture(scope="session")
@@ -55,24 +39,6 @@ def structure(scenario: Scenario) -> Structure:
 def robot(scenario: Scenario) -> Robot:
     """The thesis's robot on its ground."""
     return Robot.of(scenario)
-
-
-@pytest.fixture(autouse=True, scope="session")
-def few_widths() -> Iterator[None]:
-    """One lane or as many as fit this processor, as each width is compiled for half a minute or
-    more; the numbers are the same with any."""
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (lane_pool, lane_stepper):
-            patch.setattr(module, "lanes_for", lambda walks: 1 if walks <= 1 else WIDEST)
-        yield
-
-
-@pytest.fixture
-def one_lane(monkeypatch) -> None:
-    """One lane for any number of robots, as a structure in which bodies are coupled otherwise than
-    in the row has kernels of its own."""
-    for module in (lane_pool, lane_stepper):
-        monkeypatch.setattr(module, "lanes_for", lambda walks: 1)
 
 
 @pytest.fixture

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers.actuations import FORCE, MOTOR, WINCH
-from helpers.widths import WIDEST
 
+from tetra_drake.engines.compiled.lane_engine import processor_lanes
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.robot.robot import AMPLITUDE
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
+
+LANES = processor_lanes()
 
 
 @pytest.fixture
@@ -103,9 +105,9 @@ def test_a_robot_that_fails_ends_its_episode_with_nothing(short):
 
 
 def test_robots_side_by_side_begin_again_when_they_end(short):
-    many = TensegrityVectorEnv(WIDEST, short, workers=1)
+    many = TensegrityVectorEnv(LANES, short, workers=1)
     start, _ = many.reset(seed=5)
-    assert len({row.tobytes() for row in start}) == WIDEST, "each has a draw"
+    assert len({row.tobytes() for row in start}) == LANES, "each has a draw"
     still = np.zeros(many.action_space.shape)
     for _ in range(9):
         _, _, terminated, truncated, info = many.step(still)
@@ -129,9 +131,9 @@ def test_an_action_of_wrong_shape_is_refused(short, action, refused):
 
 
 def test_actions_of_wrong_shape_are_refused(short, refused):
-    many = TensegrityVectorEnv(WIDEST, short)
+    many = TensegrityVectorEnv(LANES, short)
     many.reset(seed=0)
-    with refused("tetra_drake.gym", "actions", f"found the shape (8,), expected ({WIDEST}, 8)"):
+    with refused("tetra_drake.gym", "actions", f"found the shape (8,), expected ({LANES}, 8)"):
         many.step(np.zeros(8))
 
 

@@ -23,7 +23,6 @@ from tetra_drake.scenario.load import load_scenario, save_scenario
 STIFFNESS, FREE_LENGTH = "robot.cables.line.stiffness", "robot.cables.line.free_length"
 DAMPING, MASSES = "robot.cables.line.damping", "robot.masses.a, robot.masses.b"
 BOUNDS = {STIFFNESS: (100.0, 400.0), FREE_LENGTH: (0.3, 0.5)}
-pytestmark = pytest.mark.usefixtures("one_lane")
 NOISE, PULLS = 2e-4, (0.0, 4.0, 8.0, 12.0)
 
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
-from helpers.widths import WIDEST
 
 from tetra_drake.engines import interface
+from tetra_drake.engines.compiled.lane_engine import processor_lanes
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
@@ -15,7 +15,7 @@ from tetra_drake.robot.command import Command
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
 
-PERIOD, PERIODS = 0.02, 15
+PERIOD, PERIODS, LANES = 0.02, 15, processor_lanes()
 SPANS = {"!Force": 2.0, "!Winch": 0.01, "!TensionMotor": 1.0}
 """Actions differ from those at rest by up to this, in N, m and N."""
 
@@ -41,7 +41,7 @@ def go(simulation: Simulation, actions: np.ndarray) -> list:
 
 
 @pytest.mark.parametrize("actuation", [FORCE, WINCH, MOTOR])
-@pytest.mark.parametrize("count", [1, WIDEST])
+@pytest.mark.parametrize("count", [1, LANES])
 def test_steps_with_the_samples_of_a_command_give_its_digits(short, actuation, count):
     scenario = short.with_changes(actuation)
     simulation = Simulation(scenario, count=count, record=True, workers=1)
@@ -76,10 +76,10 @@ def test_rates_are_those_of_the_lengths(short):
 
 
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
-    alone = Simulation(short, count=WIDEST, workers=1)
+    alone = Simulation(short, count=LANES, workers=1)
     actions = drawn_actions(alone)
     expected = go(alone, actions)[-1]
-    simulation = Simulation(short, count=WIDEST, workers=1)
+    simulation = Simulation(short, count=LANES, workers=1)
     bad = actions.copy()
     bad[3, 2] = 1e9
     bad[4:, 2] = math.nan
@@ -88,8 +88,8 @@ def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
     assert 0.06 <= simulation.failures[2].time < 0.08
     with pytest.raises(Diverged):
         simulation.result(2)
-    others = [robot for robot in range(WIDEST) if robot != 2]
-    assert [simulation.failures[robot] for robot in others] == [None] * (WIDEST - 1)
+    others = [robot for robot in range(LANES) if robot != 2]
+    assert [simulation.failures[robot] for robot in others] == [None] * (LANES - 1)
     for ours, theirs in zip(found, expected, strict=True):
         assert np.array_equal(ours[others], theirs[others])
     simulation.reset(indices=[2])
@@ -97,17 +97,17 @@ def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
 
 
 def test_a_robot_that_starts_again_walks_as_before(short):
-    simulation = Simulation(short, count=WIDEST, workers=1)
+    simulation = Simulation(short, count=LANES, workers=1)
     actions = drawn_actions(simulation)
     for some in actions[:5]:
         simulation.step(some)
     again = simulation.reset(indices=[1])
-    assert again.time.tolist() == [0.0 if robot == 1 else 0.1 for robot in range(WIDEST)]
+    assert again.time.tolist() == [0.0 if robot == 1 else 0.1 for robot in range(LANES)]
     for k in range(10):
         mixed = actions[5 + k].copy()
         mixed[1] = actions[k][1]
         again = simulation.step(mixed)
-    whole = Simulation(short, count=WIDEST, workers=1)
+    whole = Simulation(short, count=LANES, workers=1)
     states = go(whole, actions)
     for robot, expected in ((0, states[-1]), (1, states[10])):
         for found, wanted in zip(again, expected, strict=True):
@@ -118,14 +118,14 @@ def test_seeds_repeat_disturbed_robots_bit_for_bit(short):
     spreads = {"robot.spacing": 0.02, "robot.cables.outer_stiffness": 0.1}
     settings = Disturbances(draws=1, spreads=spreads, start=0.01)
     disturbed = short.with_sections(disturbances=settings)
-    simulation = Simulation(disturbed, count=WIDEST, workers=1)
+    simulation = Simulation(disturbed, count=LANES, workers=1)
     actions = drawn_actions(simulation)
     plain = simulation.state.p_WN[0]
     seen = []
     for seed in (1, 1, 2):
         start = simulation.reset(seed=seed)
         ends = go(simulation, actions)[-1].p_WN
-        assert len({end.tobytes() for end in ends}) == WIDEST
+        assert len({end.tobytes() for end in ends}) == LANES
         assert not np.array_equal(start.p_WN[0], plain)
         seen.append(ends.tobytes())
     assert seen[0] == seen[1] != seen[2]

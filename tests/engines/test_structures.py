@@ -8,7 +8,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from helpers.kernels import forces_at, make_step
+from helpers.kernels import Stepper
 from helpers.structures import (
     driven_as_recorded,
     onto_recorded,
@@ -20,13 +20,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Sine
 
-from tetra_drake.engines.compiled.dynamics import Solver
-from tetra_drake.engines.compiled.rosenbrock import take_step
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS
-from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot, make_structure
@@ -65,9 +62,8 @@ def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
     scenario = load_scenario(name).with_sections(robot=driven_as_recorded(name))
     robot = Robot.of(scenario.with_changes(NO_BRISTLES))
     model, phase, h = robot.model, np.array(recorded["drive"]["phase"]), 1e-4
-    solver, work, forces = Solver.of(model), make_step(model), Forces.of(model)
-    modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
-    every, parts = round(INTERVAL / h), Packed((model, forces))
+    stepper, modes = Stepper(model), np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
+    every, parts, work = round(INTERVAL / h), Packed((model, stepper.forces)), stepper.work
 
     def signals(time: float) -> np.ndarray:
         return AMPLITUDE * np.sin(FREQUENCY * time + phase)
@@ -76,9 +72,7 @@ def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
     centres = [centre_of(work.state)]
     for i in range(10 * every):
         modes_after_step(parts, work.state, modes)
-        forces_at(model, work.state, modes, signals(i * h), forces, work.force)
-        take_step(model, solver, work, modes, forces, signals((i + 1) * h), h, False)
-        work.state[:] = work.end
+        stepper.take(modes, signals(i * h), signals((i + 1) * h), h)
         if (i + 1) % every == 0:
             centres.append(centre_of(work.state))
     compare_centres(robot, recorded, np.array(centres))

@@ -1,24 +1,76 @@
 """A step of the compiled engine, and the forces at a state, by themselves."""
 
-from tetra_drake.engines.compiled.dynamics import Solver
-from tetra_drake.engines.compiled.rosenbrock import Step
+import numpy as np
+
+from tetra_drake.engines.compiled.dynamics import Solver, implicit_matrix
+from tetra_drake.engines.compiled.rosenbrock import Step, take_step
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot, sizes_of
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled
-from tetra_drake.simd.lanes import Table
+from tetra_drake.simd.lanes import Real, Table
+from tetra_drake.simd.packed import Packed, unpacked
+
+Parts = Packed[tuple[Model, Solver, Forces, Step]]
 
 
-def make_step(robot: Model) -> Step:
-    """Room for a step of a robot."""
-    width = Solver.of(robot).schedule.width
-    return allocate(Step, sizes_of(robot) | {"width": width})
+class Stepper:
+    """A robot in steps of the compiled engine, without lanes."""
+
+    def __init__(self, robot: Model) -> None:
+        self.robot, self.solver, self.forces = robot, Solver.of(robot), Forces.of(robot)
+        blocks = len(self.solver.schedule.later)
+        self.work = allocate(Step, sizes_of(robot) | {"blocks": blocks})
+        self.parts: Parts = Packed((robot, self.solver, self.forces, self.work))
+
+    def force_at(self, state: np.ndarray, modes: np.ndarray, signals: np.ndarray) -> np.ndarray:
+        """The generalized force (6 bodies,) in the modes of contacts; `forces` has its parts."""
+        self.work.state[:] = state
+        compute_force(self.parts, modes, signals)
+        return self.work.force.copy()
+
+    def take(self, modes: np.ndarray, start: np.ndarray, end: np.ndarray, h: float) -> float:
+        """Moves `work.state` by a step h (s) with signals at its start and end. Returns the
+        estimate of its error."""
+        compute_force(self.parts, modes, start)
+        error = step_once(self.parts, modes, end, h)
+        self.work.state[:] = self.work.end
+        return error
+
+    def matrix(self, modes: np.ndarray, time: float) -> np.ndarray:
+        """The implicit matrix (6 bodies, 6 bodies) at the state of the last force_at()."""
+        blocks, lines = self.work.blocks, self.work.lines
+        blocks[:] = lines[:] = np.nan  # what is not written must not be read
+        write_matrix(self.parts, modes, time)
+        return written_out(blocks, self.solver)
+
+
+def written_out(blocks: np.ndarray, solver: Solver) -> np.ndarray:
+    """A symmetric matrix (6 bodies, 6 bodies) from its blocks."""
+    bodies = len(solver.schedule.first) - 1
+    matrix = np.zeros((bodies, bodies, 6, 6))
+    for body in range(bodies):
+        matrix[body, body] = blocks[body]
+    for pair, block in solver.schedule.blocks.items():
+        matrix[pair] = blocks[block]
+    upper = np.triu(matrix.swapaxes(1, 2).reshape(6 * bodies, 6 * bodies))
+    return upper + np.triu(upper, 1).T
 
 
 @compiled
-def forces_at(
-    robot: Model, state: Table, modes: Table, signals: Table, forces: Forces, generalized: Table
-) -> None:
-    """Writes the `forces` and the generalized force (6 bodies,) in the modes of contacts."""
-    move_robot(robot, state, forces)
-    compute_forces(robot, state, modes, signals, True, forces, generalized)
+def compute_force(parts: Parts, modes: Table, signals: Table) -> None:
+    robot, _, forces, work = unpacked(parts)
+    move_robot(robot, work.state, forces)
+    compute_forces(robot, work.state, modes, signals, True, forces, work.force)
+
+
+@compiled
+def step_once(parts: Parts, modes: Table, signals: Table, h: Real) -> Real:
+    robot, solver, forces, work = unpacked(parts)
+    return take_step(robot, solver, work, modes, forces, signals, h, False)
+
+
+@compiled
+def write_matrix(parts: Parts, modes: Table, time: Real) -> None:
+    robot, solver, forces, work = unpacked(parts)
+    implicit_matrix(robot, solver, modes, forces, time, work.lines, work.blocks)

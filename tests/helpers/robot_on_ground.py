@@ -7,6 +7,7 @@ from tetra_drake.physics.forces import Forces, add_ground_forces, move_contacts
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.robot.robot import make_model, make_structure
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.simd.packed import Packed
 
 REST = (0.0, 0.0, 0.0)
 TOUCHING = (0.0, 0.0, -1e-4)
@@ -60,7 +61,7 @@ class RobotOnGround:
         return time_to_mode_change(self.model, state, acceleration, self.modes, forces, 9.0)
 
     def margin_at(self, state: np.ndarray) -> float:
-        return mode_margin((self.model, Forces.of(self.model)), state, self.modes)
+        return mode_margin(Packed((self.model, Forces.of(self.model))), state, self.modes)
 
     def margin(self, v=REST, p=TOUCHING) -> float:
         return self.margin_at(self.state(v, p))

@@ -45,7 +45,7 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
     """Result and motion of a robot that walks by a seeded gait on the compiled engine."""
     prepared = Prepared.of(GaitSimulation(robot, seeded_gait(robot.scenario, seed), record=True))
-    engine = LaneEngine(prepared, width=1)
+    engine = LaneEngine(prepared)
     engine.load(0, prepared)
     while not engine.advance(100_000):
         pass

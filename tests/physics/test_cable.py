@@ -10,6 +10,7 @@ from tetra_drake.physics.cable import TENSION, CableLaw, cable_tension
 from tetra_drake.physics.forces import Forces, compute_cable_forces
 from tetra_drake.physics.model import Model
 from tetra_drake.robot.structure import AddBodies, Structure
+from tetra_drake.simd.packed import Packed
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def forces_of_cables(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
     forces, force = Forces.of(model), np.empty(30)
-    compute_cable_forces((model, forces), state, np.array(signals), force)
+    compute_cable_forces(Packed((model, forces)), state, np.array(signals), force)
     return force, forces.cable_forces[:, TENSION]
 
 

@@ -41,12 +41,12 @@ def places(robot: Robot) -> dict[str, np.ndarray]:
 
 def greatest_force(robot: Robot) -> float:
     """Greatest force left at rest, in N."""
-    return float(np.abs(force_at_rest(Unactuated.of(robot.model), robot.equilibrium.state)).max())
+    return float(np.abs(force_at_rest(Unactuated(robot.model), robot.equilibrium.state)).max())
 
 
 def tensions(robot: Robot) -> np.ndarray:
     """At rest, in N."""
-    resting = Unactuated.of(robot.model)
+    resting = Unactuated(robot.model)
     force_at_rest(resting, robot.equilibrium.state)
     return resting.forces.cable_forces[:, TENSION].copy()
 
@@ -231,7 +231,7 @@ def test_what_flies_off_the_ground_is_told(refused):
     ],
 )
 def test_stiffness_is_how_forces_change(robot):
-    resting, state = Unactuated.of(robot().model), robot().equilibrium.state
+    resting, state = Unactuated(robot().model), robot().equilibrium.state
     rng = np.random.default_rng(0)
     for _ in range(5):
         motion = 1e-6 * rng.normal(size=len(state) // 13 * 6)
@@ -260,7 +260,7 @@ def test_stiffness_is_how_forces_change_where_struts_touch(c, d):
     touching = {"strut_contact": "!HuntCrossley {stiffness: 1 MN/m, dissipation: 1 s/m}"}
     scenario = scenario_of(tree, **touching).with_sections(terrain=Flat())
     structure = Structure.of(scenario.robot.blueprint())
-    resting, state = Unactuated.of(make_model(scenario, structure)), structure.initial_state
+    resting, state = Unactuated(make_model(scenario, structure)), structure.initial_state
     pushes = force_at_rest(resting, state)
     assert np.abs(pushes).max() > 500.0
     rng = np.random.default_rng(0)
@@ -285,7 +285,7 @@ def test_struts_whose_axes_meet_have_a_finite_stiffness():
     touching = {"strut_contact": "!HuntCrossley {stiffness: 1 MN/m, dissipation: 1 s/m}"}
     scenario = scenario_of(tree | {"gravity": 0.0}, **touching)
     structure = Structure.of(scenario.robot.blueprint())
-    resting = Unactuated.of(make_model(scenario, structure))
+    resting = Unactuated(make_model(scenario, structure))
     assert not force_at_rest(resting, structure.initial_state).any()
     assert np.isfinite(stiffness_at_rest(resting)).all()
 

@@ -23,7 +23,7 @@ def test_rests_where_the_independent_simulation_does(name, data):
     np.testing.assert_allclose(ours[:, 2], theirs[:, 2], atol=1e-6)
     np.testing.assert_allclose(distances(ours), distances(theirs), atol=1e-6)
 
-    resting = Unactuated.of(robot.model)
+    resting = Unactuated(robot.model)
     force_at_rest(resting, structure.initial_state)
     tension = {cable["ends"][0] + cable["ends"][1]: i for i, cable in enumerate(recorded["cables"])}
     places = [tension["".join(name.split()[1:])] for name in structure.cable_names]

@@ -8,8 +8,6 @@ import rolling
 
 from tetra_drake.engines.simulation import Simulation
 
-pytestmark = pytest.mark.usefixtures("one_lane")
-
 
 @pytest.fixture(scope="module")
 def best():

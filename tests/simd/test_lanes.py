@@ -10,7 +10,6 @@ from decimal import Decimal
 import numba
 import numpy as np
 import pytest
-from helpers.widths import WIDTHS
 from numba.core.errors import TypingError
 
 from tetra_drake.simd.lanes import (
@@ -35,7 +34,7 @@ SPECIAL = [0.0, -0.0, 5e-324, 2.0**-1022, 1.0, -3.7, np.finfo(float).max, math.i
 SPECIAL += [math.nan]
 
 
-@pytest.fixture(params=[1, *WIDTHS])
+@pytest.fixture(params=[4, 8])
 def width(request: pytest.FixtureRequest) -> int:
     """Number of lanes."""
     return request.param

@@ -49,7 +49,7 @@ def study_equilibrium(robot: Robot) -> EquilibriumStudy:
     import pandas
 
     structure, equilibrium = robot.structure, robot.equilibrium
-    unactuated = Unactuated.of(robot.model)
+    unactuated = Unactuated(robot.model)
     force_at_rest(unactuated, equilibrium.state)
     loads = np.zeros(len(structure.node_names))
     loads[structure.contacts] = unactuated.forces.ground_forces[:, NORMAL]

@@ -290,7 +290,7 @@ class _MeasuredRest(Measured):
         except InputError:  # there may be no equilibrium with such values
             return Prediction(np.full(len(self.numbers), np.nan))
         p_WN = node_positions(robot.structure, rest.state).ravel()[self.places]
-        unactuated = Unactuated.of(robot.model)
+        unactuated = Unactuated(robot.model)
         force_at_rest(unactuated, rest.state)
         forces = unactuated.forces.cable_forces[self.cables, TENSION]
         frequencies = np.full(self.modes, np.nan)

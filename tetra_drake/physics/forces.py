@@ -266,27 +266,46 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
 
 
+def forces_of_motion(
+    robot: Model, states: np.ndarray, modes: np.ndarray, signals: np.ndarray, drives: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tables `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces`
+    (k, contacts, GROUND_FORCE_COLUMNS) of a motion with k samples; see forces_along()."""
+    forces, samples = Forces.of(robot), len(states)
+    cable_forces = np.empty((samples, *forces.cable_forces.shape))
+    ground_forces = np.empty((samples, *forces.ground_forces.shape))
+    generalized = np.empty((samples, 6 * robot.bodies.mass.size))
+    given = states, modes, signals, drives
+    forces_along(Packed((robot, forces)), *given, generalized, cable_forces, ground_forces)
+    return cable_forces, ground_forces
+
+
 @compiled
 def forces_along(
-    robot: Model,
+    parts: Parts,
     states: Table,
     modes: Table,
     signals: Table,
     drives: Table,
-    forces: Forces,
+    generalized: Table,
     cable_forces: Table,
     ground_forces: Table,
 ) -> None:
-    """Writes the forces of a motion with k samples: `cable_forces` (k, cables, CABLE_FORCE_COLUMNS)
-    and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
+    """Writes the forces of a motion with k samples: `generalized` (k, 6 bodies), `cable_forces`
+    (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
 
     The motion has states (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m) in N,
     and drives (k, drives).
     """
-    generalized = np.empty(6 * (states.shape[1] // 13))
+    robot, forces = unpacked(parts)
     for k in range(states.shape[0]):
         move_robot(robot, states[k], forces)
-        forces.drives[:, actuator.DRIVE] = drives[k]
-        compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
-        cable_forces[k] = forces.cable_forces
-        ground_forces[k] = forces.ground_forces
+        for i in range(drives.shape[1]):
+            forces.drives[i, actuator.DRIVE] = drives[k, i]
+        compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized[k])
+        for i in range(cable_forces.shape[1]):
+            for c in range(cable_forces.shape[2]):
+                cable_forces[k, i, c] = forces.cable_forces[i, c]
+        for i in range(ground_forces.shape[1]):
+            for c in range(ground_forces.shape[2]):
+                ground_forces[k, i, c] = forces.ground_forces[i, c]

@@ -12,8 +12,8 @@ import numpy as np
 from tetra_drake.files import write_whole
 from tetra_drake.physics import cable
 from tetra_drake.physics.actuator import has_drive, wound
-from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS, STICK_POINT
-from tetra_drake.physics.forces import Forces, forces_along
+from tetra_drake.physics.contact import STICK_POINT
+from tetra_drake.physics.forces import forces_of_motion
 from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, moved_nodes
@@ -91,7 +91,10 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     structure, bodies = robot.structure, len(robot.structure.bodies)
     nodes = np.array([moved_nodes(structure, state) for state in motion.states])
     poses = motion.states[:, : 7 * bodies].reshape(-1, bodies, 7)
-    cable_forces, ground_forces = _forces(robot, motion)
+    given = motion.states, motion.modes, motion.signals, motion.drives
+    cable_forces, ground_forces = forces_of_motion(robot.model, *given)
+    if motion.ground_forces is not None:
+        ground_forces = motion.ground_forces
     modes = np.sign(motion.modes[:, :, :STICK_POINT]).astype(np.int8)
     variables = {
         "p_WN": (nodes[..., P_WN : P_WN + 3], "m", "node position"),
@@ -133,18 +136,6 @@ def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
     if has_drive(actuator):
         lengths[:, driven] = wound(actuator, motion.drives, lengths[:, driven])
     return lengths
-
-
-def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Tables `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, 3)
-    of a motion."""
-    model, samples = robot.model, len(motion.times)
-    cable_forces = np.empty((samples, len(model.cables.signal), cable.CABLE_FORCE_COLUMNS))
-    ground_forces = np.empty((samples, len(model.ground.contacts), GROUND_FORCE_COLUMNS))
-    forces = Forces.of(model)
-    given = motion.states, motion.modes, motion.signals, motion.drives
-    forces_along(model, *given, forces, cable_forces, ground_forces)
-    return cable_forces, ground_forces if motion.ground_forces is None else motion.ground_forces
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:

@@ -69,7 +69,7 @@ def condensed(
             elongation = np.zeros(len(lengths))
             elongation[strut] = sign * ELONGATION * lengths[strut]
             p_BN = with_elongations(structure, elongation).p_BN
-            longer = Unactuated.of(unactuated.model._replace(p_BN=p_BN))
+            longer = Unactuated(unactuated.model._replace(p_BN=p_BN))
             axial = axial_forces(structure, longer, state)[elastic]
             ends.append((force_at_rest(longer, state), axial))
         step = 2.0 * ELONGATION * lengths[strut]

@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import LENGTH, PASSIVE
 from tetra_drake.physics.capsules import PARALLEL
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
-from tetra_drake.physics.forces import Forces, compute_forces, move_robot
+from tetra_drake.physics.forces import Forces, Parts, compute_forces, move_robot
 from tetra_drake.physics.kinematics import FORCE, P_WN, move_bodies
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.rigid_motions import rigid_motions
@@ -22,6 +22,7 @@ from tetra_drake.physics.stiffness import stiffness_matrix
 from tetra_drake.robot.statics import null_space
 from tetra_drake.simd.compiling import LOGGER, compiled
 from tetra_drake.simd.lanes import Table
+from tetra_drake.simd.packed import Packed, unpacked
 
 ROUNDING = 64 * np.finfo(float).eps
 """Largest force left in equilibrium, as a share of the robot's greatest stiffness times its
@@ -75,18 +76,18 @@ class Equilibrium(NamedTuple):
     """Number of contact nodes that bear a load."""
 
 
-class Unactuated(NamedTuple):
+class Unactuated:
     """A robot without actuation, with memory for its forces."""
 
-    model: Model
-    forces: Forces
-    """Forces at the state that was last computed."""
-
-    @classmethod
-    def of(cls, model: Model) -> Self:
+    def __init__(self, model: Model) -> None:
         """The robot of a model, with all cables passive."""
         cables = model.cables._replace(signal=np.full_like(model.cables.signal, PASSIVE))
-        return cls(model._replace(cables=cables), Forces.of(model))
+        self.model = model._replace(cables=cables)
+        self.forces = Forces.of(model)
+        """Forces at the state that was last computed."""
+        self.parts = Packed((self.model, self.forces))
+        self.radius = float(model.bodies.radius.max())
+        """Largest radius (m) of a body, which turns rotations into lengths."""
 
 
 def find_equilibrium(
@@ -102,7 +103,7 @@ def find_equilibrium(
         amounts = ", ".join(f"{force:.3g}" for force in unheld)
         problem = f"has no equilibrium: nothing holds it against the force [{amounts}] N"
         raise InputError(source, "robot", f"{problem} of its weight and loads")
-    robot = Unactuated.of(model)
+    robot = Unactuated(model)
     descent = _Descent(robot, start)
     most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
     announce_at, count = math.inf, 0
@@ -157,7 +158,7 @@ class _Descent:
 
     def __init__(self, robot: Unactuated, start: np.ndarray) -> None:
         self._robot = robot
-        self._radius = float(robot.model.bodies.radius.max())
+        self._radius = robot.radius
         self._reach = FIRST_REACH * self._radius
         self._shift = self._rounding = 0.0
         self._arrive(start, force_at_rest(robot, start))
@@ -275,7 +276,7 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     floats = not model.bodies.weight.any() and not model.ground.contacts.size
     kept = [3, 4, 2, 5, 0, 1] if floats else [3, 4, 2]  # in the order of rigid_motions()
     p_WB = state[: 7 * model.bodies.mass.size].reshape(-1, 7)[:, 4:]
-    centre, radius = p_WB.mean(axis=0), model.bodies.radius.max()
+    centre, radius = p_WB.mean(axis=0), robot.radius
     turns = np.broadcast_to(np.eye(3, 6), (len(p_WB), 3, 6))
     motions = np.concatenate([turns, rigid_motions((p_WB - centre) / radius)], axis=1)[:, :, kept]
     of_nodes = rigid_motions((nodes[:, P_WN : P_WN + 3] - centre) / radius)
@@ -323,38 +324,42 @@ def solve(factor: Table, right: Table) -> Table:
     return x
 
 
-@compiled
-def force_at_rest(robot: Unactuated, state: Table) -> Table:
+def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     """Generalized force (6 n,) at rest: [t_W / radius; f_W] at each body's origin. Contact nodes
     stick at their positions."""
-    model, forces = robot.model, robot.forces
-    modes = np.zeros((forces.ground_forces.shape[0], MODE_COLUMNS))
-    generalized = np.empty(6 * (state.size // 13))
-    move_robot(model, state, forces)
-    update_modes(state, forces.nodes, model.ground, forces.frames, modes)
-    compute_forces(model, state, modes, np.zeros(1), True, forces, generalized)
-    radius = model.bodies.radius.max()
-    for body in range(generalized.size // 6):
-        generalized[6 * body : 6 * body + 3] /= radius
-    return generalized
+    modes = np.zeros((len(robot.forces.ground_forces), MODE_COLUMNS))
+    force = np.empty(6 * robot.model.bodies.mass.size)
+    compute_forces_at_rest(robot.parts, state, modes, force)
+    force.reshape(-1, 6)[:, :3] /= robot.radius
+    return force
 
 
 @compiled
-def displaced(robot: Unactuated, state: Table, step: Table) -> Table:
+def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
+    """Writes the generalized force (6 n,) at rest. `modes` are of nodes in the air."""
+    robot, forces = unpacked(parts)
+    move_robot(robot, state, forces)
+    update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
+    compute_forces(robot, state, modes, np.zeros(1), True, forces, generalized)
+
+
+def displaced(robot: Unactuated, state: np.ndarray, step: np.ndarray) -> np.ndarray:
     """A state displaced by `step` (6 n,): rotation times radius, and translation, in m."""
     moved, motion = state.copy(), step.copy()
-    radius = robot.model.bodies.radius.max()
-    for body in range(step.size // 6):
-        motion[6 * body : 6 * body + 3] /= radius
-    move_bodies(state, motion, 1.0, moved)
+    motion.reshape(-1, 6)[:, :3] /= robot.radius
+    displace(state, motion, moved)
     return moved
+
+
+@compiled
+def displace(state: Table, motion: Table, moved: Table) -> None:
+    """Writes a state displaced by `motion` (6 n,) to `moved`; see move_bodies()."""
+    move_bodies(state, motion, 1.0, moved)
 
 
 def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
     """Stiffness matrix (6 n, 6 n) in N/m at the last computed state, for the displacements of
     displaced()."""
     matrix = stiffness_matrix(robot.model, robot.forces)
-    per_radius = np.tile(
-        np.repeat([1.0 / robot.model.bodies.radius.max(), 1.0], 3), len(matrix) // 6
-    )
+    per_radius = np.tile(np.repeat([1.0 / robot.radius, 1.0], 3), len(matrix) // 6)
     return per_radius[:, np.newaxis] * matrix * per_radius

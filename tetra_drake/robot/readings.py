@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple, Self
 import numpy as np
 
 from tetra_drake.physics import cable, contact, kinematics
-from tetra_drake.physics.forces import Forces, forces_along
+from tetra_drake.physics.forces import forces_of_motion
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.simd.allocation import allocate
@@ -99,7 +99,7 @@ def first_readings(robot: Robot) -> Readings:
         robot,
         time=0.0,
         state=robot.structure.initial_state,
-        modes=robot.starting_modes(),
+        modes=robot.starting_modes,
         signals=robot.commanded[0],
         drives=robot.starting_drives(),
     )
@@ -124,10 +124,9 @@ def readings_at(
         drives: states of the actuators (drives,).
         ground_forces: table `ground_forces` of an engine with its own law of contact.
     """
-    model, forces, sample = robot.model, Forces.of(robot.model), np.newaxis
-    cables, ground = np.copy(forces.cable_forces[sample]), np.copy(forces.ground_forces[sample])
-    given = state[sample], modes[sample], signals[sample], drives[sample]
-    forces_along(model, *given, forces, cables, ground)
+    cables, ground = forces_of_motion(
+        robot.model, state[np.newaxis], modes[np.newaxis], signals[np.newaxis], drives[np.newaxis]
+    )
     return Readings.of(
         robot.structure,
         time=time,
@@ -150,6 +149,8 @@ def write_pitch_rates(p_WN: Table, v_WN: Table, moving: int, rates: Table) -> No
     """Writes the pitch rates (N,) of robots, from positions and velocities (N, nodes, 3)."""
     nodes = np.empty((moving, kinematics.NODE_COLUMNS))
     for robot in range(rates.size):
-        nodes[:, kinematics.P_WN : kinematics.P_WN + 3] = p_WN[robot, :moving]
-        nodes[:, kinematics.V_WN : kinematics.V_WN + 3] = v_WN[robot, :moving]
+        for node in range(moving):
+            for axis in range(3):
+                nodes[node, kinematics.P_WN + axis] = p_WN[robot, node, axis]
+                nodes[node, kinematics.V_WN + axis] = v_WN[robot, node, axis]
         rates[robot] = kinematics.pitch_rate(nodes, moving)

@@ -30,6 +30,7 @@ from tetra_drake.scenario.actuator_kinds import DrivenCables
 from tetra_drake.scenario.common_sections import CpgSection
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.simd.packed import Packed
 
 AMPLITUDE = 0.5
 """Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""
@@ -189,11 +190,12 @@ class Robot:
         p_WN = node_positions(self.structure, self.structure.initial_state)
         return np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
 
+    @functools.cached_property
     def starting_modes(self) -> np.ndarray:
         """Modes of the contact nodes at t = 0 (see physics.contact). A node that touches the ground
         sticks."""
         modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
-        parts = self.model, Forces.of(self.model)
+        parts = Packed((self.model, Forces.of(self.model)))
         modes_after_step(parts, self.structure.initial_state, modes)
         return modes
 
@@ -258,7 +260,7 @@ def axial_forces_at_rest(scenario: Scenario, structure: Structure) -> np.ndarray
     """Axial forces (struts,) in N on the struts of a structure in equilibrium; negative in
     compression."""
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
-    return axial_forces(structure, Unactuated.of(model), structure.initial_state)
+    return axial_forces(structure, Unactuated(model), structure.initial_state)
 
 
 def _lift(scenario: Scenario, placed: Structure) -> float:

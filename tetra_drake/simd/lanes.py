@@ -38,6 +38,7 @@ Arrays of lanes
 
 from __future__ import annotations
 
+import functools
 import math
 import operator
 from collections.abc import Callable, Sequence
@@ -376,9 +377,13 @@ class FieldArray:
             raise ValueError(f"no field: {array.dtype}, {array.shape}, {array.strides}, {width=}")
         self.array, self.address = array, array.ctypes.data
         self.shape = array.shape if width is None else array.shape[:-1]
-        number = from_dtype(array.dtype) if width in (None, 1) else Lanes(width)
-        typed = [None] * len(self.shape) if any_size else [None, *self.shape[1:]]
-        self.kind = Field(number, tuple(typed))
+        typed = (None,) * len(self.shape) if any_size else (None, *self.shape[1:])
+        self.kind = _field(array.dtype, width, typed)
+
+
+@functools.cache  # numba needs longer to make a type than to find it
+def _field(dtype: np.dtype, width: int | None, lengths: tuple[int | None, ...]) -> Field:
+    return Field(from_dtype(dtype) if width in (None, 1) else Lanes(width), lengths)
 
 
 def lane_table(shape: tuple[int, ...], width: int, *, any_size: bool = False) -> FieldArray:

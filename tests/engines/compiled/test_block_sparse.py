@@ -29,15 +29,16 @@ def random_matrix(bodies: int, pairs: list[tuple[int, int]]) -> np.ndarray:
     return matrix
 
 
-def rows_of(matrix: np.ndarray, schedule: Schedule) -> np.ndarray:
-    """The matrix as rows; NaN below the diagonal, which nothing may read."""
-    blocks = matrix.reshape(len(matrix) // BLOCK, BLOCK, -1, BLOCK).swapaxes(1, 2)
-    rows = np.full((len(blocks), BLOCK, schedule.width), np.nan)
-    for i, row in enumerate(rows):
-        later = schedule.later[i, : schedule.count[i]]
-        row[:, : BLOCK * (1 + len(later))] = np.hstack([blocks[i, i], *blocks[i, later]])
-        row[np.tril_indices(BLOCK, -1)] = np.nan
-    return rows
+def blocks_of(matrix: np.ndarray, schedule: Schedule) -> np.ndarray:
+    """The matrix as blocks; NaN below the diagonal, which nothing may read."""
+    written_out = matrix.reshape(len(matrix) // BLOCK, BLOCK, -1, BLOCK).swapaxes(1, 2)
+    blocks = np.empty((len(schedule.later), BLOCK, BLOCK))
+    for body in range(len(written_out)):
+        blocks[body] = written_out[body, body]
+        blocks[body][np.tril_indices(BLOCK, -1)] = np.nan
+    for pair, block in schedule.blocks.items():
+        blocks[block] = written_out[pair]
+    return blocks
 
 
 @pytest.mark.parametrize("graph", GRAPHS)
@@ -45,13 +46,13 @@ def test_solves_what_it_was_made_of(graph):
     bodies, pairs = GRAPHS[graph]
     matrix, schedule = random_matrix(bodies, pairs), Schedule.of(bodies, pairs)
     right_side = np.random.default_rng(1).normal(size=BLOCK * bodies)
-    rows, x = rows_of(matrix, schedule), right_side.copy()
-    factorise(rows, schedule)
-    solve(rows, schedule, x)
+    blocks, x = blocks_of(matrix, schedule), right_side.copy()
+    factorise(blocks, schedule)
+    solve(blocks, schedule, x)
     np.testing.assert_allclose(x, np.linalg.solve(matrix, right_side), rtol=1e-9, atol=1e-12)
 
 
 def test_a_row_of_bodies_fills_nothing_in():
     schedule = Schedule.of(*GRAPHS["row"])
-    assert schedule.count.tolist() == [1, 1, 1, 1, 0]
-    assert schedule.width == 2 * BLOCK
+    assert list(schedule.blocks) == GRAPHS["row"][1]
+    assert not schedule.target.size

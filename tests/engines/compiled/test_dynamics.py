@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from helpers.anchored import scenario_of
-from helpers.kernels import forces_at, make_step
+from helpers.kernels import Stepper
 from helpers.states import disturbed, mass_matrix
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
-from tetra_drake.engines.compiled.dynamics import Solver, accelerate, implicit_matrix
+from tetra_drake.engines.compiled.dynamics import accelerate
 from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.kinematics import move_bodies
@@ -20,15 +20,14 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
+from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 def forces_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
     """All forces without actuation, and as forces on the bodies."""
-    forces, generalized = Forces.of(robot), np.empty(6 * (len(state) // 13))
-    signals = np.zeros(1 + robot.cables.signal.max())
-    forces_at(robot, state, modes, signals, forces, generalized)
-    return forces, generalized
+    stepper = Stepper(robot)
+    return stepper.forces, stepper.force_at(state, modes, np.zeros(1 + robot.cables.signal.max()))
 
 
 def damping_matrix_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> np.ndarray:
@@ -42,19 +41,9 @@ def implicit_matrix_of(
     robot: Model, state: np.ndarray, modes: np.ndarray, time: float
 ) -> np.ndarray:
     """The implicit matrix written out, (6 n, 6 n)."""
-    solver, forces = Solver.of(robot), forces_of(robot, state, modes)[0]
-    room = make_step(robot)
-    rows, lines = room.rows, room.lines
-    rows[:] = lines[:] = np.nan  # what is not written must not be read
-    implicit_matrix(robot, solver, modes, forces, time, lines, rows)
-    bodies, schedule = len(rows), solver.schedule
-    matrix = np.zeros((bodies, BLOCK, bodies, BLOCK))
-    for i, row in enumerate(rows):
-        matrix[i, :, i] = row[:, :BLOCK]
-        for a, j in enumerate(schedule.later[i, : schedule.count[i]]):
-            matrix[i, :, j] = row[:, BLOCK * (1 + a) : BLOCK * (2 + a)]
-    upper = np.triu(matrix.reshape(BLOCK * bodies, -1))
-    return upper + np.triu(upper, 1).T
+    stepper = Stepper(robot)
+    stepper.force_at(state, modes, np.zeros(1 + robot.cables.signal.max()))
+    return stepper.matrix(modes, time)
 
 
 def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, np.ndarray]:
@@ -63,7 +52,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     robot, structure = whole.model, whole.structure
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-    modes_after_step((robot, Forces.of(robot)), state, modes)
+    modes_after_step(Packed((robot, Forces.of(robot))), state, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes
 

@@ -5,14 +5,15 @@ import itertools
 import threading
 import time
 from concurrent.futures import CancelledError
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 import xarray
-from helpers.widths import WIDTHS
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.compiled.loop import Constants
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -82,10 +83,10 @@ def short(scenario: Scenario) -> Scenario:
 Ending = tuple[SimulationResult | SimulationFailure, Motion]
 
 
-def endings(walks: list[Prepared], width: int) -> list[Ending]:
+def endings(walks: list[Prepared]) -> list[Ending]:
     """Outcomes and motions in an engine whose lanes take the next gait when one has ended."""
     widest = max(walks, key=lambda walk: walk.robot.ground.heights.size)
-    engine = LaneEngine(widest, width=width)
+    engine = LaneEngine(widest)
     waiting, found = list(enumerate(walks)), dict[int, Ending]()
     in_place = dict[int, int]()
     while waiting or in_place:
@@ -119,8 +120,7 @@ def same(a: Ending, b: Ending) -> bool:
 
 
 @pytest.mark.parametrize("name", NEIGHBOURS)
-@pytest.mark.parametrize("width", WIDTHS)
-def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, width, name):
+def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, name):
     changes, expected = zip(*NEIGHBOURS[name], strict=True)
     robots = [Robot.of(short.with_changes(change)) for change in changes]
     gaits = [seeded_gait(short, i) for i in range(11)]
@@ -128,13 +128,13 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
         Prepared.of(GaitSimulation(robots[i % len(robots)], gait, record=True))
         for i, gait in enumerate(gaits)
     ]
-    alone = [endings([walk], 1)[0] for walk in walks]
+    alone = [endings([walk])[0] for walk in walks]
     assert tuple(type(outcome) for outcome, _ in alone[: len(robots)]) == expected
     assert not any(same(one, other) for one, other in itertools.pairwise(alone))
     wound = [np.ptp(motion.drives) > 0.0 for _, motion in alone if motion.drives.size]
     assert all(wound) and bool(wound) == ("actuation" in changes[0])
     for order in (range(11), range(10, -1, -1)):
-        found = endings([walks[i] for i in order], width)
+        found = endings([walks[i] for i in order])
         assert all(same(ending, alone[i]) for i, ending in zip(order, found, strict=True))
 
 
@@ -166,7 +166,7 @@ def test_every_gait_may_have_a_scenario_of_its_own(short, workers):
 
 def test_robots_that_differ_in_numbers_alone_share_an_engine(short):
     """Else disturbed robots would walk one after another."""
-    engine = LaneEngine(prepared(short), width=1)
+    engine = LaneEngine(prepared(short))
     stiff = {"robot.cables.outer_stiffness": "0.21 lbf/in", "robot.cables.damping": "0.04 lbf*s/in"}
     wide = {"robot.spacing": "3 in", "ground.stiffness": "20 lbf/in"}
     moved = {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}
@@ -174,6 +174,36 @@ def test_robots_that_differ_in_numbers_alone_share_an_engine(short):
         assert engine.accepts(prepared(short.with_changes(change))), change
     for change in ({"robot.tetrahedra": 3}, {"robot.cables.slack": True}):
         assert not engine.accepts(prepared(short.with_changes(change))), change
+
+
+def test_whatever_kernels_index_by_or_branch_on_is_part_of_the_kind(short):
+    """Else an engine would take a robot whose indices lead elsewhere in its tables."""
+    walk = prepared(short)
+    constants = walk.constants
+
+    def accepted(changed: Constants) -> bool:
+        return dataclasses.replace(walk, constants=changed).kind == walk.kind
+
+    solver = constants.solver
+    for robot in (
+        constants.robot._replace(slack=not constants.robot.slack),
+        constants.robot._replace(first_node=constants.robot.first_node + 1),
+        constants.robot._replace(p_BN=constants.robot.p_BN[1:]),
+    ):
+        assert not accepted(constants._replace(robot=robot))
+    wider = constants.robot._replace(p_BN=constants.robot.p_BN + 1.0)
+    assert accepted(constants._replace(robot=wider))
+
+    class WithTable(NamedTuple):  # a table that somebody adds
+        schedule: object
+        coupled: object
+        fill: object
+        added: object
+
+    first, second = (WithTable(*solver, added=np.array([number])) for number in (1, 2))
+    one, other = constants._replace(solver=first), constants._replace(solver=second)
+    kinds = [dataclasses.replace(walk, constants=each).kind for each in (one, other, one)]
+    assert kinds[0] == kinds[2] != kinds[1]
 
 
 def test_failures_stand_in_the_place_of_results(short):

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from helpers.kernels import forces_at, make_step
+from helpers.kernels import Stepper
 
-from tetra_drake.engines.compiled.dynamics import Solver
-from tetra_drake.engines.compiled.rosenbrock import larger, take_step
+from tetra_drake.engines.compiled.rosenbrock import larger
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
-from tetra_drake.physics.forces import Forces
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario
@@ -16,14 +14,14 @@ PULL = np.array([1.0, -2.0, 3.0, 0.5])
 """Rise of the signals per second, in 100 N."""
 
 
-class Stepper:
+class FrozenStepper(Stepper):
     """The robot on the ground, its nodes sticking or slipping, with frozen modes and rising
     signals: nothing jumps, so a method shows its order."""
 
     def __init__(self, scenario: Scenario) -> None:
         robot = Robot.of(scenario)
-        self.structure, self.robot = robot.structure, robot.model
-        self.solver = Solver.of(self.robot)
+        super().__init__(robot.model)
+        self.structure = robot.structure
         contacts = self.structure.contacts
         self.modes = np.zeros((len(contacts), MODE_COLUMNS))
         self.modes[:-1, CONTACT] = 1.0
@@ -31,8 +29,6 @@ class Stepper:
         self.modes[3:6, MODE + 1] = [-1.0, 1.0, 0.0]
         places = node_positions(self.structure, self.structure.initial_state)[contacts, :2]
         self.modes[:, STICK_POINT : STICK_POINT + 2] = places
-        self.work = make_step(self.robot)
-        self.forces = Forces.of(self.robot)
 
     def start(self) -> np.ndarray:
         """A state half a millimetre in the ground, all bodies sliding to one side and turning."""
@@ -46,19 +42,13 @@ class Stepper:
         """The state after so many equal steps, and the estimated error of the first."""
         h, work = duration / steps, self.work
         work.state[:] = self.start()
-        estimates = []
-        for i in range(steps):
-            robot, modes, forces = self.robot, self.modes, self.forces
-            forces_at(robot, work.state, modes, 1e2 * PULL * i * h, forces, work.force)
-            signals = 1e2 * PULL * (i + 1) * h
-            estimate = take_step(robot, self.solver, work, modes, forces, signals, h, False)
-            estimates.append(estimate)
-            work.state[:] = work.end
+        pull = 1e2 * PULL * h
+        estimates = [self.take(self.modes, pull * i, pull * (i + 1), h) for i in range(steps)]
         return work.state.copy(), estimates[0]
 
 
 @pytest.fixture
-def stepper(scenario: Scenario) -> Stepper:
+def stepper(scenario: Scenario) -> FrozenStepper:
     # With a fortieth of the damping of cables and ground: the stiffer an equation, the shorter the
     # steps from which on a method shows its order.
     soft = {
@@ -67,7 +57,7 @@ def stepper(scenario: Scenario) -> Stepper:
         "ground.damping": "5e3 N*s/m^2",
     }
     soft["ground.stiffness"] = "200 N/m"  # so that the weight keeps the nodes in the ground
-    return Stepper(scenario.with_changes(soft))
+    return FrozenStepper(scenario.with_changes(soft))
 
 
 def test_half_the_step_has_a_quarter_of_the_error(stepper):

@@ -6,7 +6,6 @@ A vector over bodies has 6 numbers per body, rotation before translation, in the
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -36,12 +35,10 @@ class Solver(NamedTuple):
     """Positions of the blocks of the implicit matrix, and the schedule of its elimination."""
 
     schedule: Schedule
-    columns: Table
-    """First column of the block of each pair of coupled bodies (pairs,)."""
-    fill_bodies: Table
-    """Index of the body whose rows contain the block, for each block of fill-in (blocks,)."""
-    fill_columns: Table
-    """First column of each block of fill-in (blocks,)."""
+    coupled: Table
+    """Index of the block of each pair of coupled bodies (pairs,)."""
+    fill: Table
+    """Indices of the blocks of fill-in."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
@@ -54,17 +51,9 @@ class Solver(NamedTuple):
     def _of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
         """The solver for a number of bodies and the coupled pairs among them."""
         schedule = Schedule.of(bodies, pairs)
-        fill = sorted(schedule.blocks - set(pairs))
-        return cls(
-            schedule,
-            columns=_indices(schedule.column_of(*pair) for pair in pairs),
-            fill_bodies=_indices(body for body, _ in fill),
-            fill_columns=_indices(schedule.column_of(*pair) for pair in fill),
-        )
-
-
-def _indices(numbers: Iterable[int]) -> np.ndarray:
-    return np.array(list(numbers), dtype=np.int64)
+        blocks = schedule.blocks
+        coupled = np.array([blocks.pop(pair) for pair in pairs], dtype=np.int64)
+        return cls(schedule, coupled, fill=np.array(list(blocks.values()), dtype=np.int64))
 
 
 @inlined
@@ -122,56 +111,55 @@ def implicit_matrix(
     forces: Forces,
     time: Real,
     lines: Table,
-    rows: Table,
+    blocks: Table,
 ) -> None:
     """Writes the implicit matrix: mass matrix + time * damping matrix + time² * stiffness of
     contacts and anchors.
 
-    `rows` has the form of block_sparse; `time` is in s. The damping of cables, normal forces and
+    `blocks` has the form of block_sparse; `time` is in s. The damping of cables, normal forces and
     stiction makes the equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
     """
-    for body in range(rows.shape[0]):
+    for body in range(robot.bodies.mass.size):
         for r in range(BLOCK):
             for c in range(r, BLOCK):
-                rows[body, r, c] = 0.0
-    for k in range(solver.fill_bodies.size):
-        body, first = solver.fill_bodies[k], solver.fill_columns[k]
+                blocks[body, r, c] = 0.0
+    for i in range(solver.fill.size):
         for r in range(BLOCK):
-            for c in range(first, first + BLOCK):
-                rows[body, r, c] = 0.0
+            for c in range(BLOCK):
+                blocks[solver.fill[i], r, c] = 0.0
     couplings = robot.couplings
-    for pair in range(solver.columns.size):
+    for pair in range(solver.coupled.size):
         first, last = couplings.first_cable[pair], couplings.first_cable[pair + 1]
         for cable in range(first, last, CABLES_AT_ONCE):
-            add_cables(robot, solver, forces, time, pair, cable, lines, rows)
+            add_cables(robot, solver, forces, time, pair, cable, lines, blocks)
     for i in range(couplings.held.size):
-        add_held_cable(robot, forces, i, time, rows)
-    add_masses(robot, forces.inertia, rows)
+        add_held_cable(robot, forces, i, time, blocks)
+    add_masses(robot, forces.inertia, blocks)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, contact.CONTACT] != 0.0):
-            add_contact(modes, forces, robot.ground, i, time, rows)
+            add_contact(modes, forces, robot.ground, i, time, blocks)
     for i in range(robot.anchors.nodes.size):
-        add_anchor(robot.anchors, forces.nodes, i, time, rows)
+        add_anchor(robot.anchors, forces.nodes, i, time, blocks)
 
 
 @inlined
-def add_masses(robot: Model, inertia_W: Table, rows: Table) -> None:
-    """Adds the mass matrix to the rows. `inertia_W` is Forces.inertia."""
-    for body in range(rows.shape[0]):
+def add_masses(robot: Model, inertia_W: Table, blocks: Table) -> None:
+    """Adds the mass matrix to the blocks. `inertia_W` is Forces.inertia."""
+    for body in range(robot.bodies.mass.size):
         mass = robot.bodies.mass[body]
         if robot.isotropic:
             moment = robot.bodies.inertia[body, inertia.XX]
             for r in range(3):
-                rows[body, r, r] += moment
+                blocks[body, r, r] += moment
         else:
-            rows[body, 0, 0] += inertia_W[body, inertia.XX]
-            rows[body, 1, 1] += inertia_W[body, inertia.YY]
-            rows[body, 2, 2] += inertia_W[body, inertia.ZZ]
-            rows[body, 0, 1] += inertia_W[body, inertia.XY]
-            rows[body, 0, 2] += inertia_W[body, inertia.XZ]
-            rows[body, 1, 2] += inertia_W[body, inertia.YZ]
+            blocks[body, 0, 0] += inertia_W[body, inertia.XX]
+            blocks[body, 1, 1] += inertia_W[body, inertia.YY]
+            blocks[body, 2, 2] += inertia_W[body, inertia.ZZ]
+            blocks[body, 0, 1] += inertia_W[body, inertia.XY]
+            blocks[body, 0, 2] += inertia_W[body, inertia.XZ]
+            blocks[body, 1, 2] += inertia_W[body, inertia.YZ]
         for r in range(3, BLOCK):
-            rows[body, r, r] += mass
+            blocks[body, r, r] += mass
 
 
 @inlined
@@ -183,7 +171,7 @@ def add_cables(
     pair: int,
     first: int,
     lines: Table,
-    rows: Table,
+    blocks: Table,
 ) -> None:
     """Adds time * damping * l lᵀ for cables of a pair of bodies, from cable `first` on, at most
     CABLES_AT_ONCE.
@@ -195,30 +183,29 @@ def add_cables(
     write_lines(robot, forces, time, pair, first, lines)
     rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
     adds = first > robot.couplings.first_cable[pair]  # the block has a sum already
-    turn = solver.columns[pair]  # first column of the front body's rotation
-    shift = turn + 3  # and of its translation
+    block = solver.coupled[pair]
     weights = column(lines, WEIGHT)
     for r in range(3):
         u = weighted(weights, column(lines, U + r))
         w = weighted(weights, column(lines, W + r))
         d = weighted(weights, column(lines, D + r))
         for c in range(r, 3):
-            rows[rear, r, c] += product(u, column(lines, U + c))
-            rows[front, r, c] += product(w, column(lines, W + c))
+            blocks[rear, r, c] += product(u, column(lines, U + c))
+            blocks[front, r, c] += product(w, column(lines, W + c))
             dd = product(d, column(lines, D + c))
-            rows[rear, 3 + r, 3 + c] += dd
-            rows[front, 3 + r, 3 + c] += dd
-            put(-dd, adds, rear, 3 + r, shift + c, rows)
+            blocks[rear, 3 + r, 3 + c] += dd
+            blocks[front, 3 + r, 3 + c] += dd
+            put(-dd, adds, block, 3 + r, 3 + c, blocks)
             if c > r:
-                put(-dd, adds, rear, 3 + c, shift + r, rows)
+                put(-dd, adds, block, 3 + c, 3 + r, blocks)
         for c in range(3):
-            put(product(u, column(lines, W + c)), adds, rear, r, turn + c, rows)
+            put(product(u, column(lines, W + c)), adds, block, r, c, blocks)
             ud = product(u, column(lines, D + c))
-            rows[rear, r, 3 + c] -= ud
-            put(ud, adds, rear, r, shift + c, rows)
+            blocks[rear, r, 3 + c] -= ud
+            put(ud, adds, block, r, 3 + c, blocks)
             wd = product(w, column(lines, D + c))
-            rows[front, r, 3 + c] += wd
-            put(-wd, adds, rear, 3 + c, turn + r, rows)
+            blocks[front, r, 3 + c] += wd
+            put(-wd, adds, block, 3 + c, r, blocks)
 
 
 @inlined
@@ -244,15 +231,15 @@ def write_lines(
 
 
 @inlined
-def put(value: Real, adds: bool, body: int, r: int, c: int, rows: Table) -> None:
-    """Writes a value to the rows, or adds it if `adds`.
+def put(value: Real, adds: bool, block: int, r: int, c: int, blocks: Table) -> None:
+    """Writes a value to a block, or adds it if `adds`.
 
     If all blocks were set to zero first, a step would take 2 to 5 % longer.
     """
     if adds:
-        rows[body, r, c] += value
+        blocks[block, r, c] += value
     else:
-        rows[body, r, c] = value
+        blocks[block, r, c] = value
 
 
 # Columns of `lines` are tuples, as registers are not filled from loops over six numbers.
@@ -280,7 +267,7 @@ def product(x: Column, y: Column) -> Real:
 
 @inlined
 def add_contact(
-    modes: Table, forces: Forces, ground: contact.Ground, i: int, time: Real, rows: Table
+    modes: Table, forces: Forces, ground: contact.Ground, i: int, time: Real, blocks: Table
 ) -> None:
     """Adds time * damping + time² * stiffness of a contact node, in lanes where it touches."""
     nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
@@ -299,61 +286,61 @@ def add_contact(
     x = to_world(a[0], b[0], c[0], frames, i, ground.flat)
     y = to_world(a[1], b[1], c[1], frames, i, ground.flat)
     z = to_world(a[2], b[2], c[2], frames, i, ground.flat)
-    add_diagonal(nodes, node, body, (x[0], y[1], z[2]), rows)
+    add_diagonal(nodes, node, body, (x[0], y[1], z[2]), blocks)
     xy, xz, yz = x[1], x[2], y[2]
     if any_lane((xy != 0.0) | (xz != 0.0) | (yz != 0.0)):
-        add_off_diagonal(nodes, node, body, (xy, xz, yz), rows)
+        add_off_diagonal(nodes, node, body, (xy, xz, yz), blocks)
 
 
 @inlined
-def add_held_cable(robot: Model, forces: Forces, i: int, time: Real, rows: Table) -> None:
+def add_held_cable(robot: Model, forces: Forces, i: int, time: Real, blocks: Table) -> None:
     """Adds time * damping of cable i, which runs from a fixed node."""
     node, body = robot.cables.node_b[i], robot.couplings.held[i]
     damping = time * forces.cable_forces[i, TENSION_PER_RATE]
     x, y, z = vector_at(forces.cable_forces, i, DIRECTION)
     diagonal = damping * x * x, damping * y * y, damping * z * z
-    add_diagonal(forces.nodes, node, body, diagonal, rows)
+    add_diagonal(forces.nodes, node, body, diagonal, blocks)
     across = damping * x * y, damping * x * z, damping * y * z
-    add_off_diagonal(forces.nodes, node, body, across, rows)
+    add_off_diagonal(forces.nodes, node, body, across, blocks)
 
 
 @inlined
-def add_anchor(anchors: AnchorSprings, nodes: Table, i: int, time: Real, rows: Table) -> None:
+def add_anchor(anchors: AnchorSprings, nodes: Table, i: int, time: Real, blocks: Table) -> None:
     """Adds time * damping + time² * stiffness of an anchor."""
     k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
     c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
     k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
-    add_diagonal(nodes, anchors.nodes[i], anchors.carriers[i], k, rows)
+    add_diagonal(nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
 
 
 @inlined
 def add_diagonal(
-    nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
+    nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], blocks: Table
 ) -> None:
     """Adds Jᵀ diag(k_x, k_y, k_z) J for a node at p from its body's origin. J = [-[p]x 1] gives the
     node's velocity from the body's."""
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     k_x, k_y, k_z = k
-    rows[body, 0, 0] += p_y * p_y * k_z + p_z * p_z * k_y
-    rows[body, 1, 1] += p_z * p_z * k_x + p_x * p_x * k_z
-    rows[body, 2, 2] += p_x * p_x * k_y + p_y * p_y * k_x
-    rows[body, 0, 1] -= p_x * p_y * k_z
-    rows[body, 0, 2] -= p_x * p_z * k_y
-    rows[body, 1, 2] -= p_y * p_z * k_x
-    rows[body, 0, 4] -= p_z * k_y
-    rows[body, 0, 5] += p_y * k_z
-    rows[body, 1, 3] += p_z * k_x
-    rows[body, 1, 5] -= p_x * k_z
-    rows[body, 2, 3] -= p_y * k_x
-    rows[body, 2, 4] += p_x * k_y
-    rows[body, 3, 3] += k_x
-    rows[body, 4, 4] += k_y
-    rows[body, 5, 5] += k_z
+    blocks[body, 0, 0] += p_y * p_y * k_z + p_z * p_z * k_y
+    blocks[body, 1, 1] += p_z * p_z * k_x + p_x * p_x * k_z
+    blocks[body, 2, 2] += p_x * p_x * k_y + p_y * p_y * k_x
+    blocks[body, 0, 1] -= p_x * p_y * k_z
+    blocks[body, 0, 2] -= p_x * p_z * k_y
+    blocks[body, 1, 2] -= p_y * p_z * k_x
+    blocks[body, 0, 4] -= p_z * k_y
+    blocks[body, 0, 5] += p_y * k_z
+    blocks[body, 1, 3] += p_z * k_x
+    blocks[body, 1, 5] -= p_x * k_z
+    blocks[body, 2, 3] -= p_y * k_x
+    blocks[body, 2, 4] += p_x * k_y
+    blocks[body, 3, 3] += k_x
+    blocks[body, 4, 4] += k_y
+    blocks[body, 5, 5] += k_z
 
 
 @inlined
 def add_off_diagonal(
-    nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
+    nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], blocks: Table
 ) -> None:
     """Adds Jᵀ K J as add_diagonal() does, for the symmetric matrix K of k_xy, k_xz and k_yz."""
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
@@ -362,16 +349,16 @@ def add_off_diagonal(
     a = p_y * xz - p_z * xy, p_y * yz, -p_z * yz
     b = -p_x * xz, p_z * xy - p_x * yz, p_z * xz
     c = p_x * xy, -p_y * xy, p_x * yz - p_y * xz
-    rows[body, 0, 0] += p_y * a[2] - p_z * a[1]
-    rows[body, 0, 1] += p_z * a[0] - p_x * a[2]
-    rows[body, 0, 2] += p_x * a[1] - p_y * a[0]
-    rows[body, 1, 1] += p_z * b[0] - p_x * b[2]
-    rows[body, 1, 2] += p_x * b[1] - p_y * b[0]
-    rows[body, 2, 2] += p_x * c[1] - p_y * c[0]
+    blocks[body, 0, 0] += p_y * a[2] - p_z * a[1]
+    blocks[body, 0, 1] += p_z * a[0] - p_x * a[2]
+    blocks[body, 0, 2] += p_x * a[1] - p_y * a[0]
+    blocks[body, 1, 1] += p_z * b[0] - p_x * b[2]
+    blocks[body, 1, 2] += p_x * b[1] - p_y * b[0]
+    blocks[body, 2, 2] += p_x * c[1] - p_y * c[0]
     for column in range(3):
-        rows[body, 0, 3 + column] += a[column]
-        rows[body, 1, 3 + column] += b[column]
-        rows[body, 2, 3 + column] += c[column]
-    rows[body, 3, 4] += xy
-    rows[body, 3, 5] += xz
-    rows[body, 4, 5] += yz
+        blocks[body, 0, 3 + column] += a[column]
+        blocks[body, 1, 3 + column] += b[column]
+        blocks[body, 2, 3 + column] += c[column]
+    blocks[body, 3, 4] += xy
+    blocks[body, 3, 5] += xz
+    blocks[body, 4, 5] += yz

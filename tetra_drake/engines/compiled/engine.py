@@ -24,11 +24,11 @@ class CompiledEngine(Engine):
 
     def prepare(self, scenario: Scenario) -> None:
         simulation = GaitSimulation(Robot.of(scenario), seeded_gait(scenario))
-        LaneEngine(Prepared.of(simulation), width=1)
+        LaneEngine(Prepared.of(simulation))
 
     def simulate(self, simulation: GaitSimulation) -> SimulationResult:
         prepared = Prepared.of(simulation)
-        engine = LaneEngine(prepared, width=1)
+        engine = LaneEngine(prepared)
         engine.load(0, prepared)
         while not engine.advance(BODY_STEPS):
             check_time()

@@ -36,15 +36,15 @@ of the operating system."""
 
 
 class LaneEngine:
-    """Simulates similar robots (see accepts()) in a number of lanes."""
+    """Simulates similar robots (see accepts()) in the lanes of this processor."""
 
-    def __init__(self, first: Prepared, *, width: int, readings: Readings | None = None) -> None:
-        """An engine with `width` lanes for robots like `first`. Compiles its kernel if necessary.
+    def __init__(self, first: Prepared, *, readings: Readings | None = None) -> None:
+        """An engine for robots like `first`. Compiles its kernel if necessary.
 
         There are as many places for robots as lanes. With `readings`, robots are simulated in
         control periods, and there is a place for each row.
         """
-        robot = first.robot
+        robot, width = first.robot, processor_lanes()
         places = width if readings is None else len(readings.time)
         paused = 0 if readings is None else places
         if readings is None:
@@ -235,15 +235,13 @@ def _failure(status: int, *, time: float, scenario: Scenario) -> SimulationFailu
     return Diverged(time=time, reason=reasons[status])
 
 
-def lanes_for(gaits: float) -> int:
-    """Fastest number of lanes for simulating a number of gaits on one core of this machine.
+def processor_lanes() -> int:
+    """Number of lanes on this processor, for any number of robots, so that one kernel is compiled.
 
-    The results do not depend on the number of lanes. Eight doubles fill a register of AVX-512. With
-    narrower registers, eight lanes would need more registers than there are, so four are faster.
+    The results do not depend on it. Eight doubles fill a register of AVX-512. With narrower
+    registers, eight lanes would need more registers than there are, so four are faster.
     """
-    if gaits <= 1:
-        return 1
-    return 8 if gaits > 4 and "+avx512f" in processor_features() else 4
+    return 8 if "+avx512f" in processor_features() else 4
 
 
 def processor_features() -> str:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.engines.compiled.lane_engine import LaneEngine, processor_lanes
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.errors import InputError, TimeBudgetExceeded
@@ -39,8 +39,8 @@ class _Job:
 
 
 class LanePool:
-    """Simulates gaits on the compiled engine in several threads. Each thread has as many lanes as
-    the waiting gaits fill. The end of the `with` block cancels unfinished gaits."""
+    """Simulates gaits on the compiled engine in several threads, each in lanes of its own. The end
+    of the `with` block cancels unfinished gaits."""
 
     def __init__(self, threads: int) -> None:
         """Starts the threads. Raises InputError if `threads` is less than 1."""
@@ -89,7 +89,7 @@ class LanePool:
         crew = _Crew(self._robots)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
-                if not crew.load(job, among=len(jobs)):
+                if not crew.load(job):
                     with self._changed:
                         self._waiting.appendleft(job)
             try:
@@ -110,7 +110,7 @@ class LanePool:
             count = crew.idle_lanes
             if not crew.jobs:
                 share = math.ceil(len(self._waiting) / len(self._threads))
-                count = min(share, lanes_for(share))
+                count = min(share, processor_lanes())
             return [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
 
 
@@ -139,25 +139,23 @@ class _Crew:
         """Jobs by place."""
         self._robots = robots
         self._engine: LaneEngine | None = None
-        self._engines: dict[int, LaneEngine] = {}
-        """Engines by number of lanes."""
 
     @property
     def idle_lanes(self) -> int:
         """Number of idle lanes."""
         return len(self._engine.idle) if self._engine else 0
 
-    def load(self, job: _Job, *, among: int) -> bool:
-        """Puts a job in an idle lane. Returns False if the job must wait until all lanes are idle.
-
-        If all lanes are idle, an engine is chosen that fits `among` jobs.
-        """
+    def load(self, job: _Job) -> bool:
+        """Puts a job in an idle lane. Returns False if the job must wait until all lanes are
+        idle."""
         try:
             prepared = Prepared.of(self._simulation(job))
-            engine = self._engine if self.jobs else self._engine_for(prepared, lanes_for(among))
+            engine = self._engine
             if engine is None or not engine.accepts(prepared):
-                return False
-            self._engine, place = engine, engine.idle[0]
+                if self.jobs:
+                    return False
+                engine = self._engine = LaneEngine(prepared)
+            place = engine.idle[0]
             engine.load(place, prepared)
         except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
@@ -196,10 +194,4 @@ class _Crew:
         """Ends all jobs with the same error."""
         for job in self.jobs.values():
             job.future.set_exception(error)
-        self.jobs, self._engine, self._engines = {}, None, {}
-
-    def _engine_for(self, prepared: Prepared, width: int) -> LaneEngine:
-        engine = self._engines.get(width)
-        if engine is None or not engine.accepts(prepared):
-            engine = self._engines[width] = LaneEngine(prepared, width=width)
-        return engine
+        self.jobs, self._engine = {}, None

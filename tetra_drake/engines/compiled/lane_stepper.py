@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from tetra_drake.engines.compiled import loop
-from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.stepper import Stepper
@@ -26,10 +26,8 @@ class LaneStepper(Stepper):
         prepared = self._first = Prepared.of(first)
         self._share = math.ceil(count / threads)
         self._shares = [slice(i, i + self._share) for i in range(0, count, self._share)]
-        width = lanes_for(self._share)
         self._engines = [
-            LaneEngine(prepared, width=width, readings=self.readings.rows(share))
-            for share in self._shares
+            LaneEngine(prepared, readings=self.readings.rows(share)) for share in self._shares
         ]
         self._pool = ThreadPoolExecutor(len(self._engines))
 

@@ -15,6 +15,16 @@ def numbers_of(values: Any) -> np.ndarray:
     return np.concatenate([np.zeros(0), *(array.ravel() for array in _arrays(values))])
 
 
+def shared(values: Any) -> Any:
+    """Everything of NamedTuples of arrays that lanes share: indices, truths, and the shapes of the
+    tables of real numbers."""
+    if isinstance(values, tuple):
+        return tuple(shared(value) for value in values)
+    if not isinstance(values, np.ndarray):
+        return values
+    return (values.shape, None if _is_real(values) else values.tobytes())
+
+
 def views(values: Any, numbers: np.ndarray) -> Any:
     """NamedTuples like `values`, with views of `numbers` (numbers, ...) in place of the arrays of
     real numbers. Other values stay as they are."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Solver
+from tetra_drake.engines.compiled.lane_tables import shared
 from tetra_drake.engines.compiled.loop import Constants, LaneState
 from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation
 from tetra_drake.physics.actuator import DRIVE, Limits
@@ -74,28 +76,13 @@ class Prepared:
         start = start._replace(signals=robot.commanded[0], drives=drives)
         return dataclasses.replace(self, robot=robot, start=start)
 
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Properties that all simulations on one LaneEngine must share."""
-        structure, ground = self.robot.structure, self.robot.ground
-        cables = structure.cables
-        return (
-            structure.first_node.tobytes(),
-            structure.struts.tobytes(),
-            structure.contacts.tobytes(),
-            # One field at a time, because the bytes of a multi-field view include all fields.
-            *(cables[name].tobytes() for name in ("node_a", "node_b", "signal")),
-            len(structure.node_names),
-            self.robot.model.anchors.nodes.tobytes(),
-            self.robot.model.loads.nodes.tobytes(),
-            structure.isotropic,
-            self.robot.model.slack,
-            self.live,
-            ground.flat,
-            ground.friction.kind,
-            self.robot.model.actuator.kind,
-            self.robot.model.strut_contact.acts,
-        )
+    @functools.cached_property
+    def kind(self) -> object:
+        """What all simulations on one LaneEngine must share. The kernel has one range of inhibiting
+        neurons for all lanes; see LaneEngine.load()."""
+        none = np.zeros(0)
+        network = self.constants.network._replace(first=none, beyond=none)
+        return self.live, shared(self.constants._replace(network=network))
 
     @property
     def live(self) -> bool:
@@ -159,7 +146,7 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
     start, signals = allocate(LaneState, sizes_in_lanes(robot, solver)), robot.structure.signals
     start.tally.begins[0] = steady_start(robot.scenario)
     start.step.state[:] = robot.structure.initial_state
-    start.modes[:] = robot.starting_modes()
+    start.modes[:] = robot.starting_modes
     if len(robot.commanded):
         start.signals[:] = robot.commanded[0]
     start.drives[:, DRIVE] = robot.starting_drives()
@@ -170,5 +157,5 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
 
 def sizes_in_lanes(robot: Robot, solver: Solver) -> dict[str, int]:
     """Sizes of a robot's tables in lanes, for allocate()."""
-    signals, width = robot.structure.signals, solver.schedule.width
-    return sizes_of(robot.model) | {"signals": signals, "width": width}
+    blocks = len(solver.schedule.later)
+    return sizes_of(robot.model) | {"signals": robot.structure.signals, "blocks": blocks}

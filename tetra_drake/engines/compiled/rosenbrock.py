@@ -62,8 +62,8 @@ class Step(NamedTuple):
     q1: Annotated[Table, "6 * bodies"]
     mean_rate: Annotated[Table, "6 * bodies"]
     """Mean rate of the positions, 3/2 q1 + 1/2 q2."""
-    rows: Annotated[Table, "bodies", BLOCK, "width"]
-    """Implicit matrix; see Schedule.width."""
+    blocks: Annotated[Table, "blocks", BLOCK, BLOCK]
+    """Implicit matrix; see block_sparse."""
     lines: Annotated[Table, dynamics.CABLES_AT_ONCE, dynamics.LINE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Inertia at the beginning of the step."""
@@ -93,8 +93,8 @@ def take_step(
     size, scaled = work.force.size, GAMMA * step
     bodies = size // BLOCK
     first = state.size - size
-    dynamics.implicit_matrix(robot, solver, modes, forces, scaled, work.lines, work.rows)
-    factorise(work.rows, solver.schedule)
+    dynamics.implicit_matrix(robot, solver, modes, forces, scaled, work.lines, work.blocks)
+    factorise(work.blocks, solver.schedule)
     if not robot.isotropic:
         for body in range(bodies):
             for c in range(INERTIA_COLUMNS):
@@ -107,7 +107,7 @@ def take_step(
     for i in range(size):
         work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
         k1[i] = work.force[i] + work.change[i]
-    solve(work.rows, solver.schedule, k1)
+    solve(work.blocks, solver.schedule, k1)
 
     for i in range(size):
         q1[i] = velocity[i] + scaled * k1[i]
@@ -119,7 +119,7 @@ def take_step(
         for j in range(BLOCK):
             i = BLOCK * body + j
             k2[i] = work.end_force[i] - 2.0 * gained[j] - work.change[i]
-    solve(work.rows, solver.schedule, k2)
+    solve(work.blocks, solver.schedule, k2)
 
     for i in range(size):
         q2 = velocity[i] + step * k1[i] - 2.0 * q1[i] + scaled * k2[i]

@@ -1,0 +1,87 @@
+"""Preparation: all kernels are compiled once, so that nothing later waits for the compiler.
+
+A kernel is compiled for the types of its arguments. These are the same for all robots, scenarios
+and numbers of robots, so one short use of each kernel compiles it for all.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba.core import event
+
+from tetra_drake.engines.compiled.lane_engine import LaneEngine
+from tetra_drake.engines.compiled.prepared import Prepared
+from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.mujoco import pull_cables
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.readings import Readings, pitch_rates
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.terrain_kinds import Incline
+
+FUNCTIONS = 440
+"""Number of functions that numba compiles in prepare(), roughly."""
+_BRIEF = {f"simulation.{key}": "10 ms" for key in ("duration", "sample_period")}
+_BRIEF |= {"simulation.steady_from": "0 s"}
+
+
+def prepare(tell: Callable[[], None] = lambda: None) -> None:
+    """Compiles all kernels for this processor. Later runs reuse the machine code.
+
+    It takes half a minute on two cores: a second process compiles the kernel of the lanes. `tell`
+    is called for each compiled function, about FUNCTIONS times.
+    """
+    program = f"from {__name__} import *; compile_lanes(lambda: print(end='.', flush=True))"
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as lanes:
+        try:
+            compile_others(tell)
+            while lanes.stdout and lanes.stdout.read(1):
+                tell()
+        finally:
+            lanes.kill()
+    compile_lanes(tell)  # reads the machine code of the other process
+
+
+def compile_lanes(tell: Callable[[], None]) -> None:
+    """Compiles the kernel of the compiled engine."""
+    scenario = load_scenario("thesis").with_changes(_BRIEF | {"engine": "!Compiled"})
+    with event.install_listener("numba:compile", _Count(tell)):
+        LaneEngine(Prepared.of(GaitSimulation(Robot.of(scenario), seeded_gait(scenario))))
+
+
+def compile_others(tell: Callable[[], None]) -> None:
+    """Compiles the kernels without lanes."""
+    witness = "!Drake {scheme: runge_kutta3, mode_changes: witness}"
+    uses: dict[str, dict[str, Any]] = {
+        "feedback": {"engine": witness},
+        "motors": {"engine": "!Drake", "terrain": Incline(slope=0.01)},
+    }
+    robot = Robot.of(load_scenario("prism"))
+    with event.install_listener("numba:compile", _Count(tell)):
+        for name, changes in uses.items():
+            scenario = load_scenario(name).with_changes({**_BRIEF, **changes})
+            _ = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+        _ = robot.equilibrium
+        pitch_rates(Readings.empty(robot.structure, 1), robot.structure)
+        model, none = robot.model, np.zeros(0)
+        pull_cables(model.cables, model.actuator, model.slack, none, none, none, 0.0, none, none)
+
+
+class _Count(event.Listener):
+    """Listener that tells each compilation at its end."""
+
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell = tell
+
+    def on_start(self, event: event.Event) -> None:
+        pass
+
+    def on_end(self, event: event.Event) -> None:
+        self._tell()
