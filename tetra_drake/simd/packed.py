@@ -131,7 +131,7 @@ def _unbox(kind: PackedKind, value: Any, c: Any) -> NativeValue:
 class _Attributes(AttributeTemplate):
     key = PackedKind
 
-    def generic_resolve(self, packed: Any, name: str) -> Any:
+    def generic_resolve(self, packed: Any, name: str) -> Any:  # type: ignore[override]
         return packed.members[packed.names.index(name)] if name in packed.names else None
 
 
