@@ -23,6 +23,7 @@ Functions, and the main attributes of their results:
     Simulation          robots in control periods: reset(), step(actions), state
     fit                 values of scenario keys that meet measurements: parameters, scenario
     MotionCapture, Rest measurements for fit(): motion over time; shape, tensions, frequencies
+    prepare             compiles everything once, so that nothing later waits
     load_command        commands for actuators from a file, for simulate(scenario, command=...)
 
 Figures are functions in tetra_drake.figures: gait_diagram(result) from
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from tetra_drake.analysis.measurements import MotionCapture as MotionCapture
     from tetra_drake.analysis.measurements import Rest as Rest
     from tetra_drake.analysis.sweep import sweep as sweep
+    from tetra_drake.engines.preparation import prepare as prepare
     from tetra_drake.engines.simulate import simulate as simulate
     from tetra_drake.engines.simulate import simulate_many as simulate_many
     from tetra_drake.engines.simulation import Simulation as Simulation
@@ -70,6 +72,7 @@ _HOMES = {
     "load_result": "tetra_drake.report.result_folder",
     "load_run": "tetra_drake.evolution.run",
     "load_scenario": "tetra_drake.scenario.load",
+    "prepare": "tetra_drake.engines.preparation",
     "seeded_gait": "tetra_drake.robot.gait",
     "simulate": "tetra_drake.engines.simulate",
     "simulate_many": "tetra_drake.engines.simulate",

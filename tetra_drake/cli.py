@@ -89,6 +89,7 @@ def make_parser() -> Command:
             _fit,
             _cpg,
             _structure,
+            _prepare,
         ],
         common=common,
     )
@@ -151,8 +152,8 @@ def _simulate(
 
     Example: tetra-drake simulate --scenario coulomb --seed 3 --out out
     """
-    from tetra_drake.engines.interface import check_can_be_watched
-    from tetra_drake.engines.simulate import prepare, simulate
+    from tetra_drake.engines.interface import check_can_be_watched, engine_of
+    from tetra_drake.engines.simulate import simulate
     from tetra_drake.prototype.command_file import load_command
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
@@ -166,7 +167,7 @@ def _simulate(
     if meshcat:
         check_can_be_watched(chosen)
     check_result_folder(out)
-    prepare(chosen)
+    engine_of(chosen).prepare(chosen)
     view = None
     if meshcat:
         from tetra_drake.visualization.live import open_view
@@ -603,6 +604,31 @@ def _structure(
         write_whole(sdf, make_sdf(robot.structure, rest, name=robot.scenario.name))
         text += f"\nwrote {sdf}"
     print(text)
+
+
+def _prepare() -> None:
+    """Compile everything.
+
+    Compiles the kernels of all engines for this processor, once, in half a minute on two cores.
+    Later commands find the machine code. Otherwise a command compiles what it needs.
+
+    Args:
+
+    Example: tetra-drake prepare
+    """
+    from tetra_drake.engines.preparation import FUNCTIONS, prepare
+    from tetra_drake.evolution.progress import Display
+
+    title, done = "compiled functions", 0
+
+    def tell() -> None:
+        nonlocal done
+        done = min(done + 1, FUNCTIONS - 1)
+        display.stage(title, done, FUNCTIONS)
+
+    with Display(sys.stdout) as display:
+        prepare(tell)
+        display.stage(title, FUNCTIONS, FUNCTIONS)
 
 
 def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:

@@ -150,8 +150,3 @@ def check_scenario(scenario: Scenario) -> None:
         raise InputError(scenario.name, "robot.actuated", problem)
     Robot.of(scenario).network(seeded_gait(scenario))
     engine_of(scenario).check(scenario)
-
-
-def prepare(scenario: Scenario) -> None:
-    """Compiles the kernels of the scenario's engine, so that later simulations need not wait."""
-    engine_of(scenario).prepare(scenario)

@@ -70,13 +70,13 @@ def evaluator_of(
     `warn` gets the reason.
     """
     from tetra_drake.engines.interface import engine_of
-    from tetra_drake.engines.simulate import prepare
 
     scenario, workers = evaluate.scenario, workers or available_cores()
-    lane_pool = engine_of(scenario).lane_pool
+    engine = engine_of(scenario)
+    lane_pool = engine.lane_pool
     if executor is None and lane_pool is not None:
         return InLanes(evaluate, lane_pool(workers))
-    prepare(scenario)
+    engine.prepare(scenario)
     if executor is not None:
         return OnExecutor(evaluate, executor, workers)
     if problem := _why_not_sent(evaluate):

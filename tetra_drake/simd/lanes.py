@@ -27,7 +27,7 @@ The same kernel for one simulation
     `select`, `any_lane` and the other functions also take floats and booleans. Fields and arrays
     have the same indexing. So the same kernels run in lanes and in LeafSystems with NumPy arrays.
     In type hints, Real is a float or Lanes, Truth is a bool or Mask, and Table is an array or a
-    Field. A field with one lane contains float64; there is no Lanes(1).
+    Field.
 
 Arrays of lanes
     A `Field` is the array of a kernel: `field[i, j]` is a number, such as Lanes(W). In Python,
@@ -383,7 +383,7 @@ class FieldArray:
 
 @functools.cache  # numba needs longer to make a type than to find it
 def _field(dtype: np.dtype, width: int | None, lengths: tuple[int | None, ...]) -> Field:
-    return Field(from_dtype(dtype) if width in (None, 1) else Lanes(width), lengths)
+    return Field(from_dtype(dtype) if width is None else Lanes(width), lengths)
 
 
 def lane_table(shape: tuple[int, ...], width: int, *, any_size: bool = False) -> FieldArray:
@@ -487,9 +487,9 @@ def _lower_setitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
 
 
 @_intrinsic
-def by_lane(context: Any, field: Field) -> Any:
+def by_lane(context: Any, field: Any) -> Any:
     """The memory of a field of lanes, as a field of floats (..., W)."""
-    width = field.number.width if isinstance(field.number, Lanes) else 1
+    width = field.number.width
     floats = Field(types.float64, (*field.lengths, width))
 
     def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:

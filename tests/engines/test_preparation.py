@@ -1,0 +1,70 @@
+"""Preparation: after it, nothing that the package ships waits for a compiler."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numba.core import event
+
+from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.gym import TensegrityEnv
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
+from tetra_drake.scenario.terrain_kinds import Incline
+
+
+@pytest.fixture
+def compiled() -> Iterator[list[str]]:
+    """Names of the kernels of this package that are compiled during a test."""
+    recorder = event.RecordingListener()
+    names: list[str] = []
+    with event.install_listener("numba:compile", recorder):
+        yield names
+        functions = [record.data["dispatcher"].py_func for _, record in recorder.buffer]
+        names += [f.__qualname__ for f in functions if f.__module__.startswith("tetra_drake")]
+    assert not names
+
+
+def brief(name: str, engine: str) -> Scenario:
+    """A shipped scenario for a twentieth of a second on an engine."""
+    scenario, times = load_scenario(name), {"duration": "50 ms", "steady_from": "10 ms"}
+    changes = {f"simulation.{key}": time for key, time in times.items()}
+    return scenario.with_changes(changes | {"engine": engine})
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_no_shipped_scenario_compiles_anything(name):
+    for engine in ("!Compiled", "!Drake"):
+        scenario = brief(name, engine)
+        result = simulate(scenario, seeded_gait(scenario), record=True)
+        assert result.trajectory.tension.size > 0
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("name", shipped_structures())
+def test_no_structure_compiles_anything_as_it_rests(name):
+    assert np.isfinite(Robot.of(load_scenario(name)).equilibrium.state).all()
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("count", [2, 5, 64])
+def test_no_number_of_robots_compiles_anything(count):
+    scenario = brief("coulomb", "!Compiled")
+    assert len(simulate_many(scenario, [seeded_gait(scenario, i) for i in range(count)])) == count
+    robots = Simulation("rover", count=count)
+    assert (robots.step(robots.rest).time > 0.0).all()
+
+
+@pytest.mark.usefixtures("compiled")
+def test_no_environment_and_no_other_engine_compiles_anything():
+    environment = TensegrityEnv("rover")
+    environment.reset(seed=0)
+    environment.step(environment.action_space.sample())
+    level = {"friction.stiffness": "0 N/m", "terrain": Incline(slope=0.0)}
+    scenario = brief("motors", "!Mujoco").with_changes(level)
+    assert simulate(scenario, seeded_gait(scenario)).metrics.distance_in != 0.0
