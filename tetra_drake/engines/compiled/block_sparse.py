@@ -1,9 +1,9 @@
 """Block-sparse linear systems: symmetric, positive definite, with 6 x 6 blocks per pair of bodies.
 
 Bodies are eliminated in their order. A schedule is made once from the pairs of coupled bodies. A
-system is stored as `blocks` (blocks, 6, 6). Block i is body i's own block, of which the upper half
-is used. Then, in compressed rows, each body has a block for each later body coupled to it, directly
-or by fill-in. In a row of tetrahedra each body is only coupled to the next one, and the system is
+system is stored as `blocks` (blocks, 6, 6). Block i is body i's own block; its upper half is used.
+Then, in compressed rows, each body has a block for each later body coupled to it, directly or by
+fill-in. In a row of tetrahedra each body is only coupled to the next one, and the system is
 block-tridiagonal.
 """
 
