@@ -24,7 +24,7 @@ def draw(value):
 
 
 def saved(folder, value=1.0):
-    save_figure(draw(value), folder, "line")
+    save_figure(draw(value), folder, "line", kinds=["svg", "png", "pdf"])
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
@@ -35,9 +35,8 @@ def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
         assert saved(tmp_path / "b") == files
         assert matplotlib.rcParams["lines.linewidth"] == 9.0
     assert saved(tmp_path / "c", value=2.0)["line.svg"] != files["line.svg"]
-    assert set(files) == {"line.svg", "line.png"}
-    assert b"<svg" in files["line.svg"] and b"<dc:date>" not in files["line.svg"]
-    assert files["line.png"].startswith(b"\x89PNG")
+    starts = {"line.svg": b"<?xml", "line.png": b"\x89PNG", "line.pdf": b"%PDF"}
+    assert {name: files[name][: len(start)] for name, start in starts.items()} == starts
 
 
 def test_a_legend_is_read_row_by_row():
@@ -52,23 +51,13 @@ def test_a_legend_is_read_row_by_row():
     assert sorted(names, key=lambda name: (-round(places[name].y0), places[name].x0)) == names
 
 
-def test_a_figure_can_be_a_pdf(tmp_path):
-    for folder in ("a", "b"):
-        save_figure(draw(1.0), tmp_path / folder, "line", kinds=["pdf"])
-    first, second = ((tmp_path / folder / "line.pdf").read_bytes() for folder in ("a", "b"))
-    assert first == second and first.startswith(b"%PDF")
-    assert len(list((tmp_path / "a").iterdir())) == 1
-
-
 def test_ticks_have_the_common_look_whoever_draws_them():
     with matplotlib.rc_context({"xtick.labelsize": 20.0, "grid.color": "red"}):
         figure = draw(1.0)
         figure.draw_without_rendering()
     ticks = figure.axes[0].xaxis.get_major_ticks()
-    assert len(ticks) > 1
-    assert {(tick.label1.get_fontsize(), tick.gridline.get_color()) for tick in ticks} == {
-        (8.5, "0.86")
-    }
+    looks = {(tick.label1.get_fontsize(), tick.gridline.get_color()) for tick in ticks}
+    assert looks == {(8.5, "0.86")}
 
 
 def test_a_name_is_no_formula_but_a_text_in_the_common_style_may_be():
