@@ -137,15 +137,6 @@ def test_figures_of_analyses(check, tmp_path):
     check(robustness, judgement_by_hand())
 
 
-def test_a_narrow_comparison_has_numbers_of_simulations(tmp_path):
-    path = write_run(tmp_path / "run", [[[(float(i), 0) for i in range(40)]]])
-    figure = comparison(compare([path], reach=0.01), width_in=3.4)
-    for panel in figure.axes:
-        low, high = panel.get_xlim()
-        numbers = zip(panel.get_xticks(), panel.get_xticklabels(), strict=True)
-        assert [text.get_text() for x, text in numbers if low <= x <= high] == ["10", "20"]
-
-
 def test_one_body_has_no_distances_to_others(check):
     alone = gait_of("five").trajectory.isel(body=slice(0, 1))
     check(relative_distances, result_of(make_row(), alone))
