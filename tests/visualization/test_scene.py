@@ -47,7 +47,6 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
         above = p_WV[:, 2] - ground_heights(p_WV[:, :2], ground) + radius
         walls = p_WV[:, 2] < p_WV[:, 2].min() + 1e-6 if path == "/floor/relief" else False
         assert np.abs(above[~walls] if path == "/floor/relief" else above - 3e-4).max() < 1.1e-4
-    for p_WV in vertices.values():
         assert (p_WV[:, :2].min(axis=0) < points.min(axis=(0, 1))[:2] - 6.0 * INCH).all()
         assert (p_WV[:, :2].max(axis=0) > points.max(axis=(0, 1))[:2] + 6.0 * INCH).all()
 
@@ -63,8 +62,6 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
     middle = (floor[1:, :-1] + floor[:-1, :-1]) / 2
     error = ground_heights(middle[..., :2], ground) - middle[..., 2]
     assert np.abs(error).max() < 0.01 * INCH
-    if isinstance(terrain, Incline):
-        assert floor.shape[:2] == (67, 19)  # nothing between whole inches
 
 
 @pytest.mark.parametrize("inches", [60, 1200])
@@ -73,8 +70,8 @@ def test_a_large_flat_floor_has_lines_every_six_inches(inches, robot):
     floor = scene.floor_points(robot.ground, corners, INCHES)
     spacing = 1 if inches == 60 else 6
     assert np.diff(floor[:, 0, 0]) == pytest.approx(spacing * INCH)
-    assert floor[0, 0].tolist() == pytest.approx([-6 * INCH, -600 * INCH, 0.0])
-    assert floor[-1, -1].tolist() == pytest.approx([inches * INCH, 600 * INCH, 0.0])
+    ends = np.array([[-6, -600, 0], [inches, 600, 0]]) * INCH
+    np.testing.assert_allclose(floor[[0, -1], [0, -1]], ends, atol=1e-12)
 
 
 def test_bodies_of_any_structure_have_their_struts_and_nodes():
@@ -96,8 +93,6 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
         (path,) = (path for path in shapes if path.endswith(f"/node {name}"))
         assert shapes[path]["radius"] == radius
         np.testing.assert_allclose(moved[path][:3, 3], p_BN, rtol=0, atol=1e-12)
-    cables = {path.split("/")[2] for path in shapes if path.startswith("/cables/")}
-    assert cables == {"actuated", "passive"}
 
 
 def test_a_sample_places_bodies_and_cables_and_colours_feet():
