@@ -2,6 +2,7 @@
 
 import nbformat
 import notebook
+import pytest
 from helpers.shorter import shortened
 
 IN_A_NOTEBOOK = """\
@@ -26,6 +27,7 @@ def test_the_notebook_has_the_cells_of_the_scripts_and_their_outputs():
     assert len(pictures) == len(notebook.SCRIPTS)  # each figure is shown once
 
 
+@pytest.mark.slow
 def test_its_cells_run_and_values_are_shown_as_tables(tmp_path):
     made = notebook.make_notebook()
     for cell in made.cells:

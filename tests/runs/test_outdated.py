@@ -48,10 +48,6 @@ def test_a_run_is_up_to_date_where_it_is_repeated(tiny):
     assert outdated.why_outdated("tiny", TINY, tiny) == ""
 
 
-def test_what_is_not_recorded_is_outdated(tmp_path):
-    assert outdated.why_outdated("tiny", TINY, tmp_path) == "not recorded"
-
-
 def test_the_keys_that_differ_are_named(tiny):
     stiffer = other(robot__cables__outer_stiffness="0.3 lbf/in")
     assert "robot.cables.outer_stiffness" in outdated.why_outdated("tiny", stiffer, tiny)

@@ -41,17 +41,10 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     kept = {"README.md", "map.png"}
     for name in (*kept, "figures"):
         (out / "tiny" / name).write_text("of an older run")
-    old = {"wall_s": 1e9, "cores_s": 1e9}
-    record.save_times({"tiny": {"evolution": old}, "other": {"pages": old}}, out)
     record.record("tiny", TINY, scratch=scratch, out=out)
-    times = record.load_times(out)
-    assert times["tiny"].keys() == {"evolution", "analysis", "pages"}
-    assert times["tiny"]["evolution"]["wall_s"] < 1e4, "the time of the older run counts no more"
-    assert times["other"]["pages"] == old
     run = load_run(out / "tiny")
     assert run.manifest.thinned and run.manifest.scenario == TINY.scenario("tiny")
     assert run.evaluations.groupby("trial").size().tolist() == [8, 8]
-    assert run.reevaluations.empty
     assert elites(run)["kept"].notna().all()
     made = {"manifest.json", "scenario.yaml", "trial_00", "trial_01", "elites.jsonl.xz"}
     shown = {"replay.html", "walking.png", "walking.gif", "gait.svg", "analysis.json"}

@@ -14,7 +14,6 @@ from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.source import load_source
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.terrain_kinds import HeightField
@@ -73,9 +72,7 @@ def runs(tmp_path_factory):
 def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
     run, thinned = runs
     assert len(thinned.evaluations) == len(run.evaluations)
-    assert (
-        len(thinned.with_parameters) < 0.8 * len(run.with_parameters) == 0.8 * len(run.evaluations)
-    )
+    assert len(thinned.with_parameters) < 0.8 * len(run.with_parameters)
     fitness = run.evaluations.groupby("trial")["fitness"]
     rises = run.evaluations[run.evaluations["fitness"] == fitness.cummax()]
     last = pandas.concat([last_population(run, 0), last_population(run, 1)])
@@ -96,9 +93,6 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == after["twist"].dropna().tolist()
     assert thinned.with_parameters["clearance"].notna().any() and after["clearance"].isna().all()
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])
-    trial, index = after.iloc[0][["trial", "index"]]
-    with pytest.raises(Exception, match="genome"):
-        thinned.gait(trial, index)
 
 
 def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
@@ -109,7 +103,6 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
     assert on_map[0] == on_map[1]
     assert [0, ALONE] in on_map[0] and [0, BEYOND] in on_map[0] and [0, EDGE] not in on_map[0]
-    assert load_source(thinned.directory).gaits == load_source(run.directory).gaits
     ours, theirs = (compare([r.directory], reach=0.01).trials for r in (thinned, run))
     assert ours.drop(columns="run").equals(theirs.drop(columns="run"))
     assert thinned.reevaluations["distance"].equals(run.reevaluations["distance"])
