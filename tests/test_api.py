@@ -108,13 +108,6 @@ def test_a_run_stands_for_its_scenario_and_its_best_gait():
     result = td.simulate(run.scenario, run.best_gait())
     assert td.simulate("runs/demo", run).metrics == result.metrics
     assert td.simulate(run, run).metrics == td.simulate(result, run).metrics == result.metrics
-    assert td.seeded_gait(run, 3) == td.seeded_gait(run.scenario, 3)
-
-
-def test_a_folder_in_the_place_of_a_gait_says_how_its_best_gait_is_had():
-    with pytest.raises(InputError) as caught:
-        td.simulate("runs/demo", "runs/demo")
-    assert caught.value.source == "runs/demo" and "load_run('runs/demo')" in caught.value.problem
 
 
 @pytest.mark.parametrize(
@@ -123,6 +116,7 @@ def test_a_folder_in_the_place_of_a_gait_says_how_its_best_gait_is_had():
         (lambda: td.seeded_gait("quick", -1), ("seeded_gait", "seed")),
         (lambda: td.simulate(td.seeded_gait("quick"), "quick"), ("scenario", "")),
         (lambda: td.simulate("quick", 5), ("gait", "")),
+        (lambda: td.simulate("runs/demo", "runs/demo"), ("runs/demo", "")),
         (lambda: td.load_result(None), ("load_result", "folder")),
         (lambda: td.load_gait(5, td.load_scenario("quick")), ("load_gait", "path")),
         (lambda: td.evolve("quick", 5), ("evolve", "out")),

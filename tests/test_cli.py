@@ -110,6 +110,7 @@ def test_a_name_that_no_file_can_have_is_refused_in_one_line(command, unchanged,
     assert refusal(f"{command} b\0", capsys).startswith(r"tetra-drake: b\x00: ")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is full")
 def test_a_full_disk_behind_the_output_is_told_in_one_line():
     line = [sys.executable, "-m", "tetra_drake", "structure", "prism"]

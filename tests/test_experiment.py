@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from unittest.mock import MagicMock
 
 import pytest
 from helpers.analytic import Bowl, RandomSearch, in_threads, read_record, small_scenario
@@ -63,32 +64,16 @@ def interrupting():
 QUICK = {"reevaluate": False, "report": False}
 
 
-class Told(Progress):
-    """Keeps what it is told."""
-
-    def __init__(self):
-        self.warnings, self.stages, self.shown = [], [], []
-
-    def warn(self, text):
-        self.warnings.append(text)
-
-    def show(self, statuses):
-        self.shown.append(sum(status.evaluations for status in statuses))
-
-    def stage(self, title, done, total, text=""):
-        self.stages.append((done, total))
-
-
 def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports, monkeypatch):
-    progress = Told()
+    progress = MagicMock(spec=Progress)
     run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
     assert run.manifest.seed == 3
     assert run.evaluations["engine"].tolist() == ["compiled"] * 8
     assert run.reevaluations["engine"].tolist() == ["drake"] * 5
     assert reports == [tmp_path / "run"]
-    assert progress.shown[0] == 0 and progress.shown[-1] == 8
-    assert progress.stages == [(done, 5) for done in range(6)]
-    assert progress.warnings == []
+    assert sum(status.evaluations for status in progress.show.call_args.args[0]) == 8
+    assert [call.args[1:3] for call in progress.stage.mock_calls] == [(i, 5) for i in range(6)]
+    progress.warn.assert_not_called()
     # A run that is complete is resumed without an engine.
     monkeypatch.delattr("tetra_drake.experiment.evaluator_of")
     again = tetra_drake.evolve(None, tmp_path / "run", resume=True, progress=progress)
@@ -147,39 +132,7 @@ def test_wrong_arguments_are_refused_at_once(tiny, tmp_path, run_small, refused,
     assert not (tmp_path / "new").exists()
 
 
-def test_a_run_is_resumed_only_as_what_it_is(
-    tiny, tmp_path, refused, capsys, interrupting, reports
-):
-    method = {"objective": Heaviest(2.0), "optimizer": RandomSearch} | QUICK
-    whole = tetra_drake.evolve(tiny, tmp_path / "whole", **method)
-    assert whole.evaluations["fitness"].tolist() == pytest.approx(
-        (2.0 + 2.0 * whole.evaluations["distance"]).tolist()
-    )
-    assert whole.reevaluations.empty and reports == []
-    assert whole.manifest.method.objective == f'{__name__}.Heaviest {{"factor": 2.0}}'
-    for other in (None, Heaviest(3.0)):
-        with refused(whole.directory, "objective", "Heaviest"):
-            reevaluate(whole.directory, other)
-
-    run = tmp_path / "run"
-    with pytest.raises(KeyboardInterrupt):
-        tetra_drake.evolve(tiny, run, executor=interrupting, workers=2, **method)
-    begun = read_record(run)
-    for changed, key in (
-        ({"objective": None}, "objective"),
-        ({"objective": Heaviest(3.0)}, "objective"),
-        ({"optimizer": SteadyState}, "optimizer"),
-    ):
-        with refused(run, key, ""):
-            tetra_drake.evolve(None, run, resume=True, **method | changed)
-    assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
-    assert "objective=" in capsys.readouterr().err
-    assert read_record(run) == begun
-    tetra_drake.evolve(None, run, resume=True, **method)
-    assert read_record(run) == read_record(tmp_path / "whole")
-
-
-def make_objective(factor):
+def scaled(factor):
     """Objectives of the same name."""
 
     def objective(result):
@@ -188,22 +141,44 @@ def make_objective(factor):
     return objective
 
 
-def test_no_record_is_of_two_objectives_of_one_name(tiny, tmp_path, refused, interrupting):
-    run = tmp_path / "run"
+@pytest.mark.parametrize(
+    ("objective", "others", "fact"),
+    [
+        (Heaviest(2.0), (None, Heaviest(3.0)), "Heaviest"),
+        (scaled(2.0), (scaled(3.0), scaled(-2.0)), "evaluation 0"),
+    ],
+)
+def test_a_run_is_resumed_only_by_its_own_method(
+    tiny, tmp_path, refused, capsys, interrupting, objective, others, fact
+):
+    run, whole = tmp_path / "run", tmp_path / "whole"
+    method = {"objective": objective, "optimizer": RandomSearch} | QUICK
+
+    def resume(**changes):
+        return tetra_drake.evolve(None, run, resume=True, **method | changes)
 
     def refuse_others():
         recorded = read_record(run)
-        for objective in (make_objective(3.0), make_objective(-2.0)):
-            with refused(run, "objective", "evaluation 0"):
-                tetra_drake.evolve(None, run, resume=True, objective=objective, **QUICK)
+        for other in others:
+            with refused(run, "objective", fact):
+                resume(objective=other)
+        with refused(run, "optimizer", ""):
+            resume(optimizer=SteadyState)
+        assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
+        assert "objective=" in capsys.readouterr().err
         assert read_record(run) == recorded
 
     with pytest.raises(KeyboardInterrupt):
-        begin = {"objective": make_objective(2.0), "executor": interrupting, "workers": 2}
-        tetra_drake.evolve(tiny, run, **begin, **QUICK)
+        tetra_drake.evolve(tiny, run, executor=interrupting, workers=2, **method)
     refuse_others()
-    tetra_drake.evolve(None, run, resume=True, objective=make_objective(2.0), **QUICK)
+    evaluations = resume().evaluations
     refuse_others()
+    expected = 2.0 + 2.0 * evaluations["distance"]
+    assert evaluations["fitness"].values == pytest.approx(expected.values)
+    tetra_drake.evolve(tiny, whole, **method)
+    assert read_record(run) == read_record(whole)
+    with refused(run, "objective", ""):
+        reevaluate(run, None)
 
 
 def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeypatch):
@@ -220,20 +195,20 @@ def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeyp
 def test_what_cannot_be_evaluated_again_is_named(tiny, tmp_path, reports, monkeypatch):
     compiled_alone = tiny.with_changes({"simulation.duration": "3000 s"})
     monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
-    progress = Told()
+    progress = MagicMock(spec=Progress)
     run = tetra_drake.evolve(compiled_alone, tmp_path / "run", progress=progress)
     assert reports == [run.directory] and run.reevaluations.empty
-    (warning,) = progress.warnings
+    (warning,) = progress.warn.call_args.args
     assert "Drake diagram" in warning and "cpg.listing_step" in warning
 
 
 def test_a_gain_that_hardly_acts_is_named_when_a_run_begins(tiny, tmp_path):
-    out, progress = tmp_path / "run", Told()
+    out, progress = tmp_path / "run", MagicMock(spec=Progress)
     weak = tiny.with_changes({"cpg.gain": "0.1 N"})
     tetra_drake.evolve(weak, out, progress=progress, **QUICK)
     tetra_drake.evolve(None, out, resume=True, progress=progress, **QUICK)
-    (warning,) = progress.warnings
-    assert "cpg.gain 0.1 N" in warning
+    progress.warn.assert_called_once()
+    assert "cpg.gain 0.1 N" in progress.warn.call_args.args[0]
 
 
 SMALL = ("--trials", "1", "--evaluations", "18", "--workers", "1")
@@ -245,16 +220,6 @@ def evolve(monkeypatch, reports):
     for module in ("experiment", "evolution.reevaluation"):
         monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", lambda *_, **__: in_threads())
     return lambda *options: cli.main(["evolve", *map(str, options)])
-
-
-def test_a_switch_leaves_out_the_diagram_at_the_end(evolve, tmp_path, monkeypatch):
-    again = []
-    monkeypatch.setattr(
-        "tetra_drake.evolution.reevaluation.reevaluate", lambda out, *_, **__: again.append(out)
-    )
-    for name, options in (("run", ()), ("without", ("--no-reevaluate",))):
-        assert evolve(*SMALL, "--engine", "compiled", "--out", tmp_path / name, *options) == 0
-    assert again == [tmp_path / "run"]
 
 
 def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, tmp_path, capsys):

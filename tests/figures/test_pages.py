@@ -82,7 +82,10 @@ def drawn_texts(monkeypatch):
     return drawn_texts
 
 
-@pytest.fixture(params=[7.0, 3.4, pytest.param((5.0, 8.0), marks=pytest.mark.slow)], ids=repr)
+SLOW = pytest.mark.slow
+
+
+@pytest.fixture(params=[7.0, 3.4, pytest.param((5.0, 8.0), marks=SLOW)], ids=repr)
 def check(drawn_texts, request):
     """check(draw, *data): checks a figure on a page of its own of some width, or on a given one."""
 
@@ -101,24 +104,19 @@ def check(drawn_texts, request):
     return check
 
 
-ROBOTS = [
-    *("five", "long names"),  # they have the most text
-    *(pytest.param(name, marks=pytest.mark.slow) for name in ("three", "twelve")),
-]
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "robot",
+    ["five", "long names"] + [pytest.param(name, marks=SLOW) for name in ("three", "twelve")],
+)
 @pytest.mark.parametrize("draw", OF_A_GAIT)
 def test_figures_of_a_gait(draw, robot, check):
     check(draw, gait_of(robot))
 
 
 @pytest.mark.parametrize("draw", OF_A_GAIT)
-def test_time_and_units_are_known_or_refused(draw, refused):
+def test_a_time_that_was_not_simulated_is_refused(draw, refused):
     with refused("figure", "time", "20 to 30 s"):
         draw(gait_of("five"), time=(20.0, 30.0))
-    with refused("units", "", "furlong"):
-        draw(gait_of("five"), units="furlong")
 
 
 def test_figures_of_a_run(check, tmp_path):

@@ -17,8 +17,6 @@ def draw(value):
     page = page_of(None, height_in=3.0)
     panel = page.subplots()
     panel.plot([0.0, 1.0], [0.0, value], label="a line")
-    panel.axvspan(0.2, 0.4)
-    panel.set_title("title")
     panel.legend()
     return page
 

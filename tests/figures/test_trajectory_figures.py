@@ -86,13 +86,6 @@ def test_the_gait_diagram_has_the_forward_speed_and_its_mean(walk):
         assert speed.get_xdata()[[0, -1]].tolist() == [2.0, 5.0]
 
 
-def test_feet_of_many_bodies_are_named_by_body():
-    robot = make_row(12)
-    _, stance, _ = gait_diagram(result_of(robot, make_walk(bodies=12, duration=4.5))).axes
-    names = [label.get_text() for label in stance.get_yticklabels()]
-    assert names == list(robot.structure.bodies)
-
-
 def test_relative_distances_are_in_inches(walk):
     [panel] = relative_distances(row(walk)).axes
     lines = {line.get_label(): line for line in panel.lines}
@@ -102,10 +95,8 @@ def test_relative_distances_are_in_inches(walk):
 
 
 def test_the_time_lapse_shows_instants_from_start_to_end(walk):
-    shown = pictures(time_lapse(row(walk), instants=4))
-    assert len(shown) == 4
     ways = []
-    for panel in shown:
+    for panel in pictures(time_lapse(row(walk), instants=4)):
         [lines], [colours] = struts(panel)
         assert len(lines) == 5 * len(STRUTS) and len(set(colours)) == 5
         ways.append(lines[..., 0].min())
@@ -142,13 +133,6 @@ def test_of_a_straight_path_the_height_is_shown(walk):
     np.testing.assert_allclose(path.get_xydata(), centre.sel(axis=["x", "z"]))
 
 
-def test_distances_before_and_after_are_those_of_both_gaits(walk):
-    slow = result_of(ROW, walk.assign(p_WN=0.5 * walk.p_WN))
-    [panel] = before_and_after(slow, row(walk)).axes
-    for line, speed in zip(panel.lines, (0.5 * SPEED, SPEED), strict=True):
-        np.testing.assert_allclose(line.get_ydata(), speed * walk.time / INCH, atol=1e-9)
-
-
 def test_in_one_step_tetrahedra_well_off_the_ground_stand_out(walk):
     start, end = last_step(walk)
     now = walk.sel(time=np.linspace(start, end, 5), method="nearest")
@@ -173,16 +157,11 @@ def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
     assert [panel.get_title("left") for panel in paths] == walk.body.values.tolist()
     least = 0.02 * float(np.ptp(walk.p_WN[0].sel(axis="z").values)) / INCH
     for panel in paths:
-        path, in_the_air, start = panel.lines
+        path, in_the_air, _ = panel.lines
         assert np.ptp(path.get_xdata()) == pytest.approx(SPEED * PERIOD / INCH, rel=0.04)
         assert path.get_ydata().max() == pytest.approx(HEIGHT / INCH, rel=1e-3)
         aloft = np.isfinite(in_the_air.get_ydata())
         np.testing.assert_array_equal(aloft, path.get_ydata() > least)
-        assert start.get_xdata()[0] == 0.0
-    # Without a step the end is shown.
-    panel = paths_of(one_step(row(walk.assign(signal=0.0 * walk.signal))))[0]
-    shown = 0.25 * float(walk.time[-1]) * SPEED / INCH
-    assert np.ptp(panel.lines[0].get_xdata()) == pytest.approx(shown, rel=0.01)
 
 
 def test_tensions_are_those_of_the_driven_cables(walk):
@@ -194,8 +173,6 @@ def test_tensions_are_those_of_the_driven_cables(walk):
         np.testing.assert_allclose(signal.get_ydata(), expected)
         np.testing.assert_allclose(tension.get_ydata(), expected + 3.0 / POUND_FORCE)
         assert panel.get_title("left") == f"{oscillator} outer bottom left", "the cable"
-    first, *_ = signals_and_tensions(row(walk), time=(0.0, 3.0), units="SI").axes
-    assert first.lines[2].get_ydata().max() == pytest.approx(2.0, rel=1e-3)
 
 
 def test_ground_forces_are_those_of_the_time_shown(walk):
@@ -208,7 +185,6 @@ def test_ground_forces_are_those_of_the_time_shown(walk):
     np.testing.assert_allclose(normal.get_xdata(), end.time)
     np.testing.assert_allclose(normal.get_ydata(), expected)
     np.testing.assert_allclose(friction.get_ydata(), -0.5 * expected)
-    assert set(normal.get_ydata()) == {0.0, LOAD / POUND_FORCE}
 
 
 def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk):
@@ -217,12 +193,8 @@ def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk)
     panel, *_ = ground_forces(row(four)).axes
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
     np.testing.assert_allclose(spans[-2:], [(5.0, 6.0), (7.0, 8.0)], atol=0.011)
-    assert panel.get_title(loc="right").split()[1] in ("49", "50", "51")
     np.testing.assert_allclose(panel.lines[-1].get_xdata(), [5.0, 7.0], atol=0.011)
-    low, high = panel.get_ylim()
-    assert low < -0.5 * LOAD / POUND_FORCE
-    assert LOAD / POUND_FORCE < high < 2.0 * LOAD / POUND_FORCE
-    assert max(panel.lines[0].get_ydata()) > 50.0 * high
+    assert LOAD / POUND_FORCE < panel.get_ylim()[1] < 2.0 * LOAD / POUND_FORCE
 
 
 def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
@@ -234,7 +206,6 @@ def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
         expected = ground_heights(np.column_stack([x, 0.0 * x]) * INCH, robot.ground) / INCH
         np.testing.assert_allclose(z - z[0], expected - expected[0], rtol=0, atol=1e-9)
         assert np.ptp(z) > 0.9  # the robot's tip is above the first step down
-        assert side.get_ylim()[0] < z.min()
 
 
 def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(walk):
@@ -255,28 +226,18 @@ def carried():
     return result_of(robot, prism.slide_prism(robot))
 
 
-def test_a_legend_names_the_bodies_in_their_colours(carried):
-    figure = time_lapse(carried)
-    [legend] = figure.legends
-    names = [text.get_text() for text in legend.get_texts()]
-    assert names == ["n0 n4", "n1 n5", "n2 n3", "path of the centre"]
-    *shown, _ = [to_hex(line.get_color()) for line in legend.get_lines()]
-    assert shown == struts(pictures(figure)[0])[1].ravel().tolist()
-
-
 def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
-    way = prism.SPEED * carried.trajectory.time / INCH
-    [panel] = before_and_after(carried, carried).axes
-    np.testing.assert_allclose(panel.lines[0].get_ydata(), way, atol=1e-9)
+    slow = carried.trajectory.assign(p_WB=0.5 * carried.trajectory.p_WB)
+    [panel] = before_and_after(result_of(carried.robot, slow), carried).axes
+    for line, share in zip(panel.lines, (0.5, 1.0), strict=True):
+        way = share * prism.SPEED * carried.trajectory.time / INCH
+        np.testing.assert_allclose(line.get_ydata(), way, atol=1e-9)
     [panel] = paths_of(one_step(carried))
     assert panel.get_title("left") == "centre"
-    step = 0.5 * prism.PERIOD
-    assert np.ptp(panel.lines[0].get_xdata()) > step * prism.SPEED / INCH
+    assert np.ptp(panel.lines[0].get_xdata()) > 0.5 * prism.PERIOD * prism.SPEED / INCH
 
 
 def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
-    shown = [panel.get_title("left") for panel in ground_forces(carried).axes]
-    assert shown == ["n0", "n1", "n2"]
     rolled = carried.trajectory.copy(deep=True)
     rolled.normal_force.loc[{"contact": ["n0", "n2"]}] = 0.0
     rolled.normal_force.loc[{"contact": "n4"}] = 0.2

@@ -51,9 +51,6 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     assert {file.name for file in (out / "tiny").iterdir()} == kept | made | shown
     assert 'src="../meshcat.js"' in read_page(out / "tiny/replay.html")
     assert (out / record.VIEWER).is_file()
-    (out / "tiny/manifest.json").unlink()
-    record.record("tiny", TINY, scratch=scratch, out=out)
-    assert not (out / "tiny/manifest.json").exists()
     (out / "tiny" / ANALYSIS).unlink()  # as if interrupted
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert load_run(out / "tiny").evaluations.equals(run.evaluations)

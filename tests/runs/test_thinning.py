@@ -1,7 +1,5 @@
 """A thinned run: the gaits that matter are whole, every evaluation is there."""
 
-import math
-
 import numpy as np
 import pandas
 import pytest
@@ -9,7 +7,6 @@ from helpers.analytic import in_threads
 from helpers.synthetic_run import tiny_scenario, write_run
 from thinning import last_population, thin
 
-from tetra_drake.analysis.comparison import compare
 from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
@@ -42,7 +39,7 @@ def metrics_of(trial, i, fitness):
     special = {ALONE: (0.1, 0.45), EDGE: (1.00001 / 3.0, 0.59), BEYOND: (0.5, 0.59)}
     index, lifted = special.get(i if trial == 0 else -1, (0.9, 0.5))
     numbers = {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
-    return numbers | {"lateral_drift": -1e-17, "clearance": 1.0}
+    return numbers | {"clearance": 1.0}
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +74,6 @@ def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
     rises = run.evaluations[run.evaluations["fitness"] == fitness.cummax()]
     last = pandas.concat([last_population(run, 0), last_population(run, 1)])
     again = run.evaluations.query("trial == 0 and index == @AGAIN")
-    assert AGAIN not in rises["index"].values and AGAIN not in last["index"].values
     for matter in (run.initial(), rises, run.best(BEST_GAITS), last, again, elites(run)):
         rows = run.evaluations.loc[matter.index].drop(columns="wall_time_s")
         kept = thinned.evaluations.loc[matter.index].drop(columns="wall_time_s")
@@ -98,15 +94,11 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
 def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     run, thinned = runs
     assert thinned.fittest().equals(run.fittest())
-    assert thinned.best(99)["tau_a_s"].notna().all()
     assert run_text(thinned).replace(str(thinned.directory), str(run.directory)) == run_text(run)
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
     assert on_map[0] == on_map[1]
     assert [0, ALONE] in on_map[0] and [0, BEYOND] in on_map[0] and [0, EDGE] not in on_map[0]
-    ours, theirs = (compare([r.directory], reach=0.01).trials for r in (thinned, run))
-    assert ours.drop(columns="run").equals(theirs.drop(columns="run"))
     assert thinned.reevaluations["distance"].equals(run.reevaluations["distance"])
-    assert math.isnan(thinned.reevaluations["tau_a_s"].item())
 
 
 def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused, monkeypatch):

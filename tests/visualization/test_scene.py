@@ -102,15 +102,13 @@ def test_a_sample_places_bodies_and_cables_and_colours_feet():
     scene.place_robot(meshcat, robot.structure, walk, per_newton=1e-4)
     page = meshcat.StaticHtml()
     moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands(page, "set_transform")}
-    np.testing.assert_array_equal(moved["/robot/T3"][:3, 3], walk.p_WB.values[0, 2])
     for path, cable in zip(scene.cable_paths(robot.structure), robot.structure.cables, strict=True):
         start, end = walk.p_WN.values[0, [cable["node_a"], cable["node_b"]]]
         matrix = moved[path]
         np.testing.assert_allclose(matrix[:3, 3] - matrix[:3, 2] / 2, start, rtol=0, atol=1e-12)
         np.testing.assert_allclose(matrix[:3, 3] + matrix[:3, 2] / 2, end, rtol=0, atol=1e-12)
-    colours = {
-        c["path"]: c["value"] for c in commands(page, "set_property") if c["property"] == "color"
-    }
+    told = [c for c in commands(page, "set_property") if c["property"] == "color"]
+    colours = {c["path"]: c["value"] for c in told}
     lifted, stands = (colours[f"/robot/{body}/node {body} bottom_left"] for body in ("T1", "T2"))
     assert lifted != stands
     assert stands[:3] == pytest.approx(hex2color(scene.COLOURS["stance"]))
