@@ -192,23 +192,18 @@ def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeyp
         tetra_drake.evolve(None, tmp_path / "run", resume=True, **QUICK)
 
 
-def test_what_cannot_be_evaluated_again_is_named(tiny, tmp_path, reports, monkeypatch):
-    compiled_alone = tiny.with_changes({"simulation.duration": "3000 s"})
+def test_what_hardly_acts_is_named_when_a_run_begins_and_what_has_no_diagram_at_its_end(
+    tiny, tmp_path, reports, monkeypatch
+):
     monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
-    progress = MagicMock(spec=Progress)
-    run = tetra_drake.evolve(compiled_alone, tmp_path / "run", progress=progress)
-    assert reports == [run.directory] and run.reevaluations.empty
-    (warning,) = progress.warn.call_args.args
-    assert "Drake diagram" in warning and "cpg.listing_step" in warning
-
-
-def test_a_gain_that_hardly_acts_is_named_when_a_run_begins(tiny, tmp_path):
-    out, progress = tmp_path / "run", MagicMock(spec=Progress)
-    weak = tiny.with_changes({"cpg.gain": "0.1 N"})
-    tetra_drake.evolve(weak, out, progress=progress, **QUICK)
+    progress, out = MagicMock(spec=Progress), tmp_path / "run"
+    odd = tiny.with_changes({"simulation.duration": "3000 s", "cpg.gain": "0.1 N"})
+    run = tetra_drake.evolve(odd, out, progress=progress)
+    assert reports == [out] and run.reevaluations.empty
     tetra_drake.evolve(None, out, resume=True, progress=progress, **QUICK)
-    progress.warn.assert_called_once()
-    assert "cpg.gain 0.1 N" in progress.warn.call_args.args[0]
+    weak, compiled_alone = (call.args[0] for call in progress.warn.mock_calls)
+    assert "cpg.gain 0.1 N" in weak
+    assert "Drake diagram" in compiled_alone and "cpg.listing_step" in compiled_alone
 
 
 SMALL = ("--trials", "1", "--evaluations", "18", "--workers", "1")

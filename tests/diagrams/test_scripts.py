@@ -54,18 +54,11 @@ def test_signals_and_bodies_are_shown_live():
 CHECKOUT = Path(__file__).parents[2]
 TUTORIALS = CHECKOUT / "diagrams" / "tutorials"
 NAMES = sorted(file.stem for file in TUTORIALS.glob("*.py"))
-LONGEST = 55  # lines
-
-
-def test_there_are_sixteen_each_short_and_with_its_picture():
-    assert [int(name[:2]) for name in NAMES] == list(range(1, 17))
-    for name in NAMES:
-        assert len((TUTORIALS / f"{name}.py").read_text("utf-8").splitlines()) <= LONGEST, name
-        assert (TUTORIALS / f"{name}.png").is_file()
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_a_tutorial_imports_is_there(name):
+def test_what_a_tutorial_imports_is_there_and_so_is_its_picture(name):
+    assert (TUTORIALS / f"{name}.png").is_file()
     for node in ast.walk(ast.parse((TUTORIALS / f"{name}.py").read_text("utf-8"))):
         if isinstance(node, ast.ImportFrom):
             module = importlib.import_module(node.module)

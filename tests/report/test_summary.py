@@ -4,7 +4,6 @@ import dataclasses
 import math
 import re
 
-import numpy as np
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
@@ -12,7 +11,6 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.report.summary import ground_text, result_text, results
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain_kinds import HeightField
 from tetra_drake.scenario.units import INCH
 
 
@@ -63,14 +61,6 @@ def test_requirements_that_are_not_met_are_named(tiny, result):
 def test_the_ground_is_named_with_its_terrain_and_friction(scenario, changes, words):
     text = ground_text(load_scenario(scenario).with_changes(changes))
     assert all(word in text for word in words)
-
-
-def test_the_ground_of_a_height_file_is_named_without_its_folder(tmp_path):
-    np.save(tmp_path / "a.npy", np.zeros((3, 3)))
-    field = HeightField(file=str(tmp_path / "a.npy"), cell=0.0254)
-    text = ground_text(load_scenario("thesis").with_changes({"terrain": field}))
-    assert field.file in text and "1 in" in text
-    assert str(tmp_path) not in text
 
 
 def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):

@@ -21,14 +21,13 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.terrain_kinds import Incline
-from tetra_drake.scenario.units import INCH, INCHES, POUND_FORCE
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.visualization.browser import do, wait_until_loaded
 from tetra_drake.visualization.replay import (
     RESOLUTION,
     frame_samples,
     ground_forces,
     pack_page,
-    round_force,
     save_replay,
 )
 from tetra_drake.visualization.scene import COLOURS, THICKEST, THINNEST, cable_paths, drawn_radii
@@ -174,13 +173,6 @@ def test_arrows_are_the_forces_of_the_ground(scenario, frames, film):
     arrows = film["arrows"].reshape(expected.shape)
     np.testing.assert_allclose(arrows, expected, rtol=0, atol=ROUNDING)
     np.testing.assert_array_equal(film["touches"] > 0.0, frames["in_contact"].values > 0)
-
-
-@pytest.mark.parametrize(
-    ("pounds", "rounded"), [(0.0301, 0.05), (0.05, 0.05), (0.9, 1.0), (17.0, 20.0)]
-)
-def test_an_inch_of_an_arrow_is_a_round_force(pounds, rounded):
-    assert round_force(pounds * POUND_FORCE, INCHES) == pytest.approx(rounded * POUND_FORCE)
 
 
 def test_forces_on_a_slope_are_turned_with_it():

@@ -64,16 +64,6 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
     assert np.abs(error).max() < 0.01 * INCH
 
 
-@pytest.mark.parametrize("inches", [60, 1200])
-def test_a_large_flat_floor_has_lines_every_six_inches(inches, robot):
-    corners = np.array([[-6, -600], [inches, 600]])
-    floor = scene.floor_points(robot.ground, corners, INCHES)
-    spacing = 1 if inches == 60 else 6
-    assert np.diff(floor[:, 0, 0]) == pytest.approx(spacing * INCH)
-    ends = np.array([[-6, -600, 0], [inches, 600, 0]]) * INCH
-    np.testing.assert_allclose(floor[[0, -1], [0, -1]], ends, atol=1e-12)
-
-
 def test_bodies_of_any_structure_have_their_struts_and_nodes():
     structure = prism.make_prism().structure
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
