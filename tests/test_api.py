@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers.brief import BRIEF
 
 import tetra_drake as td
 from tetra_drake.errors import InputError
@@ -21,20 +22,10 @@ from tetra_drake.robot.gait import save_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-SHORT = {
-    "engine": "!Compiled",
-    "simulation.duration": "0.5 s",
-    "simulation.steady_from": "0.1 s",
-    "evolution.evaluations": 6,
-    "evolution.trials": 1,
-    "optimizer.population": 4,
-    "optimizer.tournament": 2,
-}
-
 
 @functools.wraps(load_scenario)
 def load_short(name: str) -> Scenario:
-    return load_scenario(name).with_changes(SHORT)
+    return load_scenario(name).with_changes(BRIEF)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers import quick_figures
 from helpers.actuations import MOTOR
+from helpers.brief import BRIEF
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
@@ -15,14 +16,6 @@ from tetra_drake.files import write_whole
 from tetra_drake.report.result_folder import load_result
 from tetra_drake.scenario.load import load_scenario
 
-BRIEF = {
-    "engine": "!Compiled",
-    "simulation.duration": "0.3 s",
-    "simulation.steady_from": "0.1 s",
-    "evolution.trials": 1,
-    "evolution.evaluations": 6,
-    "optimizer": {"population": 4, "tournament": 2},
-}
 FIELD = {"robot.contacts": "all", "terrain": "!HeightField {file: heights.txt, cell: 0.5 m}"}
 MAP = {"optimizer": {"_tag": "QualityDiversity", "cells": [2, 2]}}
 SCENARIOS = {

@@ -66,11 +66,10 @@ def test_missing_and_damaged_files_are_refused_by_name(folder, name, damage):
     [
         ("body", lambda dataset: dataset.isel(body=slice(2))),
         ("tension", lambda dataset: dataset.drop_vars("tension")),
-        ("p_WN", lambda dataset: dataset.transpose(..., "time")),
         ("p_WB", lambda dataset: dataset.assign(p_WB=dataset.p_WB.where(False))),
         ("time", lambda dataset: dataset.isel(time=slice(None, None, -1))),
     ],
-    ids=["robot", "missing", "dimensions", "nan", "backward"],
+    ids=["robot", "missing", "nan", "backward"],
 )
 def test_another_trajectory_than_the_scenarios_is_refused(
     folder, result, key, change, refused, monkeypatch

@@ -3,6 +3,7 @@
 import pytest
 import record
 from analyse import ANALYSIS
+from helpers.brief import BRIEF
 from helpers.meshcat_page import read_page
 
 from tetra_drake.analysis.elites import elites
@@ -10,10 +11,8 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 MAP = QualityDiversity(cells=[2, 2], draws=1)
-SMALL = {"engine": "!Compiled", "robot.tetrahedra": 2, "optimizer": MAP}
-SHORT = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.1 s"}
-FEW = {"evolution.trials": 2, "evolution.evaluations": 8}
-TINY = record.Experiment("two tetrahedra", "thesis", SMALL | SHORT | FEW, film=True)
+FEW = {"robot.tetrahedra": 2, "optimizer": MAP, "evolution.trials": 2, "evolution.evaluations": 8}
+TINY = record.Experiment("two tetrahedra", "thesis", BRIEF | FEW, film=True)
 
 
 @pytest.fixture
