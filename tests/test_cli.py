@@ -68,7 +68,7 @@ def refusal(command, capsys):
 @pytest.mark.parametrize(
     ("command", "source", "values"),
     [
-        ("", ": COMMAND", ""),
+        ("", "", "COMMAND"),
         ("simulate --seed 1 --gait good.json", " simulate", "--gait --seed"),
         ("simulate --sceanrio thesis", " simulate", "--sceanrio '--scenario'?"),
         ("figures a --width 3.4", " figures", "--width '3.4' '3.4 in'"),

@@ -127,7 +127,6 @@ def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
     assert text(page, "reached") == f"walked {x[-1] - x[0]:.1f} in"
     page.locator("#time").fill("2")
     assert text(page, "clock") == "2.0 / 5.0 s"
-    page.locator("#speed").select_option("2")
     page.locator("#play").click()
     page.wait_for_function("parseFloat(document.getElementById('clock').value) > 2.1")
     page.locator("#play").click()
