@@ -104,13 +104,17 @@ def check(drawn_texts, request):
     return check
 
 
-@pytest.mark.parametrize(
-    "robot",
-    ["five", "long names"] + [pytest.param(name, marks=SLOW) for name in ("three", "twelve")],
-)
+@pytest.mark.parametrize("robot", ["five", "long names", pytest.param("three", marks=SLOW)])
 @pytest.mark.parametrize("draw", OF_A_GAIT)
 def test_figures_of_a_gait(draw, robot, check):
     check(draw, gait_of(robot))
+
+
+@SLOW
+@pytest.mark.parametrize("check", [7.0], indirect=True)
+@pytest.mark.parametrize("draw", OF_A_GAIT)
+def test_figures_of_twelve_bodies_have_room_on_their_own_page(draw, check):
+    check(draw, gait_of("twelve"))
 
 
 @pytest.mark.parametrize("draw", OF_A_GAIT)
