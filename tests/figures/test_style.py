@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 from tetra_drake.figures.style import (
     common_style,
     figure_function,
-    legend_below,
     page_of,
     save_figure,
 )
@@ -35,18 +34,6 @@ def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
     assert saved(tmp_path / "c", value=2.0)["line.svg"] != files["line.svg"]
     starts = {"line.svg": b"<?xml", "line.png": b"\x89PNG", "line.pdf": b"%PDF"}
     assert {name: files[name][: len(start)] for name, start in starts.items()} == starts
-
-
-def test_a_legend_is_read_row_by_row():
-    page = Figure(figsize=(6.0, 2.0))
-    with common_style():
-        names = [f"a line of this name, {i}" for i in range(5)]
-        legend_below(page, {name: {} for name in names})
-        page.draw_without_rendering()
-    places = {text.get_text(): text.get_window_extent() for text in page.legends[0].get_texts()}
-    rows = {round(place.y0) for place in places.values()}
-    assert 1 < len(rows) < 5
-    assert sorted(names, key=lambda name: (-round(places[name].y0), places[name].x0)) == names
 
 
 def test_ticks_have_the_common_look_whoever_draws_them():

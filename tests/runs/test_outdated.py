@@ -3,6 +3,7 @@
 import outdated
 import pytest
 import record
+from helpers.brief import BRIEF
 from thinning import thin
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -10,19 +11,9 @@ from tetra_drake.experiment import evolve
 from tetra_drake.optimizers import cma_es
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 
-TINY = record.Experiment(
-    "two tetrahedra",
-    "thesis",
-    {
-        "engine": "!Compiled",
-        "robot.tetrahedra": 2,
-        "optimizer": CmaEs(sample=8),
-        "simulation.duration": "1.6 s",
-        "simulation.steady_from": "0.1 s",
-        "evolution.trials": 2,
-        "evolution.evaluations": 24,
-    },
-)
+FEW = {"robot.tetrahedra": 2, "optimizer": CmaEs(sample=8), "simulation.duration": "1.6 s"}
+FEW |= {"evolution.trials": 2, "evolution.evaluations": 24}
+TINY = record.Experiment("two tetrahedra", "thesis", BRIEF | FEW)
 
 
 def other(**changes):
