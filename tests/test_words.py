@@ -20,7 +20,7 @@ def test_docstrings_and_comments_use_none_of_these_phrases() -> None:
         for file in sorted((ROOT / folder).rglob("*.py")):
             with tokenize.open(file) as stream:
                 for token in tokenize.generate_tokens(stream.readline):
-                    if token.string[0:1] == "#" or token.line.lstrip().startswith('"""'):
+                    if token.string.startswith("#") or token.line.lstrip().startswith('"""'):
                         text = " ".join(token.string.split())
                         found += [(file.name, token.start[0], *PHRASES.findall(text))]
     assert len(found) > 1000

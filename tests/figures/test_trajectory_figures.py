@@ -227,7 +227,7 @@ def carried():
 
 
 def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
-    slow = carried.trajectory.assign(p_WB=0.5 * carried.trajectory.p_WB)
+    slow = carried.trajectory.assign(p_WN=0.5 * carried.trajectory.p_WN)
     [panel] = before_and_after(result_of(carried.robot, slow), carried).axes
     for line, share in zip(panel.lines, (0.5, 1.0), strict=True):
         way = share * prism.SPEED * carried.trajectory.time / INCH
