@@ -99,3 +99,4 @@ def test_what_is_written_simulates_to_the_same_digits(written):
     walked = simulate(result.scenario, result.gait).metrics.distance
     assert walked == result.metrics.distance
     assert simulate(run, run).metrics.distance == run.fittest()["distance"]
+    assert run.reevaluations.empty, "by --no-reevaluate"
