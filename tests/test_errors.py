@@ -11,7 +11,6 @@ LONG = 100_000 * "x"
     ("problem", "kept"),
     [
         (f"found '{LONG}', expected a number", "', expected a number"),
-        (f"found '{LONG.replace('xx', 'x ')}', expected a number", "', expected a number"),
         ("word " * 20_000, "word"),
     ],
 )

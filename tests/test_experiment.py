@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from unittest.mock import MagicMock
 
 import pytest
 from helpers.analytic import Bowl, RandomSearch, in_threads, read_record, small_scenario
@@ -15,7 +16,6 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.optimizers.steady_state import SteadyState
-from tetra_drake.scenario.optimizer_kinds import CmaEs
 from tetra_drake.scenario.terrain_kinds import Steps
 
 
@@ -61,38 +61,19 @@ def interrupting():
     return Interrupting
 
 
-class Told(Progress):
-    """Keeps what it is told."""
-
-    def __init__(self):
-        self.warnings, self.stages, self.shown = [], [], []
-
-    def warn(self, text):
-        self.warnings.append(text)
-
-    def show(self, statuses):
-        self.shown.append(sum(status.evaluations for status in statuses))
-
-    def stage(self, title, done, total, text=""):
-        self.stages.append((done, total))
+QUICK = {"reevaluate": False, "report": False}
 
 
 def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports, monkeypatch):
-    progress = Told()
+    progress = MagicMock(spec=Progress)
     run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
     assert run.manifest.seed == 3
     assert run.evaluations["engine"].tolist() == ["compiled"] * 8
     assert run.reevaluations["engine"].tolist() == ["drake"] * 5
     assert reports == [tmp_path / "run"]
-    assert progress.shown[0] == 0 and progress.shown[-1] == 8
-    assert progress.stages == [(done, 5) for done in range(6)]
-    assert progress.warnings == []
-    # What is missing is evaluated again on the diagram, by the fitness of the scenario.
-    path = tmp_path / "run" / "trial_00" / "reevaluations.jsonl"
-    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
-    again = reevaluate(tmp_path / "run", workers=1).reevaluations
-    assert again["fitness"].equals(run.reevaluations["fitness"])
-    assert again["engine"].tolist() == ["drake"] * 5
+    assert sum(status.evaluations for status in progress.show.call_args.args[0]) == 8
+    assert [call.args[1:3] for call in progress.stage.mock_calls] == [(i, 5) for i in range(6)]
+    progress.warn.assert_not_called()
     # A run that is complete is resumed without an engine.
     monkeypatch.delattr("tetra_drake.experiment.evaluator_of")
     again = tetra_drake.evolve(None, tmp_path / "run", resume=True, progress=progress)
@@ -100,30 +81,21 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
 
 
 def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
-    on_diagram = tiny.with_changes({"engine": "!Drake"})
     step = Steps(height=0.02, depth=1.0, count=1, start=0.02)
-    for scenario, objective, problem in (
-        (on_diagram.with_changes({"terrain": step}), None, "below the ground"),
-        (None, None, "is needed"),
+    for scenario, problem in (
+        (tiny.with_changes({"engine": "!Drake", "terrain": step}), "below the ground"),
+        (tiny.with_changes({"evolution.evaluations": 3}), "evolution.evaluations: .*4"),
+        (None, "is needed"),
     ):
         with pytest.raises(InputError, match=problem):
-            tetra_drake.evolve(scenario, tmp_path / "run", objective=objective)
-    assert not (tmp_path / "run").exists()
-
-
-def test_a_scenario_with_fewer_evaluations_than_the_population_is_not_evolved(
-    tiny, tmp_path, refused
-):
-    scenario = tiny.with_changes({"evolution.evaluations": 3})
-    with refused(scenario.name, "evolution.evaluations", "4"):
-        tetra_drake.evolve(scenario, tmp_path / "run")
+            tetra_drake.evolve(scenario, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
 def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
     def evolve(seed, **options):
-        options |= {"reevaluate": False, "report": False}
-        return tetra_drake.evolve(tiny, tmp_path / "run", seed=seed, overwrite=True, **options)
+        options |= QUICK | {"overwrite": True}
+        return tetra_drake.evolve(tiny, tmp_path / "run", seed=seed, **options)
 
     first, second = evolve(1), evolve(2)
     assert (second.manifest.seed, len(second.evaluations)) == (2, len(first.evaluations))
@@ -138,17 +110,18 @@ def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
     assert (tmp_path / "run" / "trial_00").is_dir()
 
 
-WRONG = {
-    "workers": (0, -1, 1.5),
-    "seed": (-1, "1"),
-    "optimizer": ("!CmaEs",),
-    "objective": (1.0,),
-    "executor": (2,),
-    "progress": (print,),
-}
-
-
-@pytest.mark.parametrize(("key", "value"), [(k, v) for k, values in WRONG.items() for v in values])
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("workers", 0),
+        ("workers", 1.5),
+        ("seed", "1"),
+        ("optimizer", "!CmaEs"),
+        ("objective", 1.0),
+        ("executor", 2),
+        ("progress", print),
+    ],
+)
 def test_wrong_arguments_are_refused_at_once(tiny, tmp_path, run_small, refused, key, value):
     run = run_small()
     before = read_record(run)
@@ -159,45 +132,7 @@ def test_wrong_arguments_are_refused_at_once(tiny, tmp_path, run_small, refused,
     assert not (tmp_path / "new").exists()
 
 
-def test_a_run_is_resumed_only_as_what_it_is(
-    tiny, tmp_path, refused, capsys, interrupting, reports
-):
-    method = {"objective": Heaviest(2.0), "optimizer": RandomSearch}
-    method |= {"reevaluate": False, "report": False}
-    whole = tetra_drake.evolve(tiny, tmp_path / "whole", **method)
-    assert whole.evaluations["fitness"].tolist() == pytest.approx(
-        (2.0 + 2.0 * whole.evaluations["distance"]).tolist()
-    )
-    assert whole.reevaluations.empty and reports == []
-    assert whole.iterations["note"].tolist() == ["wide", "wide"]
-    assert whole.manifest.method.objective == f'{__name__}.Heaviest {{"factor": 2.0}}'
-    for other in (None, Heaviest(3.0)):
-        with refused(whole.directory, "objective", "Heaviest"):
-            reevaluate(whole.directory, other)
-
-    run = tmp_path / "run"
-    with pytest.raises(KeyboardInterrupt):
-        tetra_drake.evolve(tiny, run, executor=interrupting, workers=2, **method)
-    begun = read_record(run)
-    for changed, key in (
-        ({"objective": None}, "objective"),
-        ({"objective": Heaviest(3.0)}, "objective"),
-        ({"optimizer": SteadyState}, "optimizer"),
-        ({"seed": 1}, "seed"),
-        ({"scenario": tiny.with_changes({"evolution.trials": 2})}, "evolution.trials"),
-    ):
-        with refused(run, key, ""):
-            tetra_drake.evolve(
-                **({"scenario": None, "out": run, "resume": True} | method | changed)
-            )
-    assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
-    assert "objective=" in capsys.readouterr().err
-    assert read_record(run) == begun
-    tetra_drake.evolve(None, run, resume=True, **method)
-    assert read_record(run) == read_record(tmp_path / "whole")
-
-
-def make_objective(factor):
+def scaled(factor):
     """Objectives of the same name."""
 
     def objective(result):
@@ -206,34 +141,44 @@ def make_objective(factor):
     return objective
 
 
-def test_no_record_is_of_two_objectives_of_one_name(tiny, tmp_path, refused, interrupting):
-    run, quick = tmp_path / "run", {"reevaluate": False, "report": False}
+@pytest.mark.parametrize(
+    ("objective", "others", "fact"),
+    [
+        (Heaviest(2.0), (None, Heaviest(3.0)), "Heaviest"),
+        (scaled(2.0), (scaled(3.0), scaled(-2.0)), "evaluation 0"),
+    ],
+)
+def test_a_run_is_resumed_only_by_its_own_method(
+    tiny, tmp_path, refused, capsys, interrupting, objective, others, fact
+):
+    run, whole = tmp_path / "run", tmp_path / "whole"
+    method = {"objective": objective, "optimizer": RandomSearch} | QUICK
+
+    def resume(**changes):
+        return tetra_drake.evolve(None, run, resume=True, **method | changes)
 
     def refuse_others():
         recorded = read_record(run)
-        for objective in (make_objective(3.0), make_objective(-2.0)):
-            with refused(run, "objective", "evaluation 0"):
-                tetra_drake.evolve(None, run, resume=True, objective=objective, **quick)
+        for other in others:
+            with refused(run, "objective", fact):
+                resume(objective=other)
+        with refused(run, "optimizer", ""):
+            resume(optimizer=SteadyState)
+        assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
+        assert "objective=" in capsys.readouterr().err
         assert read_record(run) == recorded
 
     with pytest.raises(KeyboardInterrupt):
-        begin = {"objective": make_objective(2.0), "executor": interrupting, "workers": 2}
-        tetra_drake.evolve(tiny, run, **begin, **quick)
+        tetra_drake.evolve(tiny, run, executor=interrupting, workers=2, **method)
     refuse_others()
-    tetra_drake.evolve(None, run, resume=True, objective=make_objective(2.0), **quick)
+    evaluations = resume().evaluations
     refuse_others()
-
-
-def test_the_scenarios_optimiser_is_used_and_recorded(tiny, tmp_path, refused):
-    kind = CmaEs(population=4, sample=0)
-    scenario = tiny.with_changes({"optimizer": kind, "evolution.evaluations": 10})
-    run, quick = tmp_path / "run", {"reevaluate": False, "report": False}
-    evolved = tetra_drake.evolve(scenario, run, **quick)
-    assert evolved.iterations["population"].tolist() == [4, 4, 4]
-    assert len(evolved.evaluations) == 10
-    assert evolved.manifest.method.optimizer == "CmaEs"
-    with refused(run, "optimizer", ""):
-        tetra_drake.evolve(None, run, resume=True, optimizer=SteadyState, **quick)
+    expected = 2.0 + 2.0 * evaluations["distance"]
+    assert evaluations["fitness"].values == pytest.approx(expected.values)
+    tetra_drake.evolve(tiny, whole, **method)
+    assert read_record(run) == read_record(whole)
+    with refused(run, "objective", ""):
+        reevaluate(run, None)
 
 
 def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeypatch):
@@ -244,26 +189,21 @@ def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeyp
     older = {**run.manifest.versions, "numpy": "0.9"}
     write_manifest(run.directory, replace(run.manifest, versions=older))
     with pytest.warns(RuntimeWarning, match=r"numpy 0\.9"):
-        tetra_drake.evolve(None, tmp_path / "run", resume=True, reevaluate=False, report=False)
+        tetra_drake.evolve(None, tmp_path / "run", resume=True, **QUICK)
 
 
-def test_what_cannot_be_evaluated_again_is_named(tiny, tmp_path, reports, monkeypatch):
-    compiled_alone = tiny.with_changes({"simulation.duration": "3000 s"})
+def test_what_hardly_acts_is_named_when_a_run_begins_and_what_has_no_diagram_at_its_end(
+    tiny, tmp_path, reports, monkeypatch
+):
     monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
-    progress = Told()
-    run = tetra_drake.evolve(compiled_alone, tmp_path / "run", progress=progress)
-    assert reports == [run.directory] and run.reevaluations.empty
-    (warning,) = progress.warnings
-    assert "Drake diagram" in warning and "cpg.listing_step" in warning
-
-
-def test_a_gain_that_hardly_acts_is_named_when_a_run_begins(tiny, tmp_path):
-    out, quick, progress = tmp_path / "run", {"reevaluate": False, "report": False}, Told()
-    weak = tiny.with_changes({"cpg.gain": "0.1 N"})
-    tetra_drake.evolve(weak, out, progress=progress, **quick)
-    tetra_drake.evolve(None, out, resume=True, progress=progress, **quick)
-    (warning,) = progress.warnings
-    assert "cpg.gain 0.1 N" in warning
+    progress, out = MagicMock(spec=Progress), tmp_path / "run"
+    odd = tiny.with_changes({"simulation.duration": "3000 s", "cpg.gain": "0.1 N"})
+    run = tetra_drake.evolve(odd, out, progress=progress)
+    assert reports == [out] and run.reevaluations.empty
+    tetra_drake.evolve(None, out, resume=True, progress=progress, **QUICK)
+    weak, compiled_alone = (call.args[0] for call in progress.warn.mock_calls)
+    assert "cpg.gain 0.1 N" in weak
+    assert "Drake diagram" in compiled_alone and "cpg.listing_step" in compiled_alone
 
 
 SMALL = ("--trials", "1", "--evaluations", "18", "--workers", "1")
@@ -277,30 +217,16 @@ def evolve(monkeypatch, reports):
     return lambda *options: cli.main(["evolve", *map(str, options)])
 
 
-def test_a_switch_leaves_out_the_diagram_at_the_end(evolve, tmp_path, monkeypatch):
-    again = []
-    monkeypatch.setattr(
-        "tetra_drake.evolution.reevaluation.reevaluate", lambda out, *_, **__: again.append(out)
-    )
-    for name, options in (("run", ()), ("without", ("--no-reevaluate",))):
-        assert evolve(*SMALL, "--engine", "compiled", "--out", tmp_path / name, *options) == 0
-    assert again == [tmp_path / "run"]
-
-
 def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, tmp_path, capsys):
     out = tmp_path / "run"
     evolve(*SMALL, "--out", out)
     whole = read_record(out)
-    evaluations = out / "trial_00" / "evaluations.jsonl"
-    evaluations.write_bytes(evaluations.read_bytes()[:-100])
     for options in ((), SMALL):
         assert evolve("--out", out, "--resume", *options) == 0
         assert read_record(out) == whole
     assert capsys.readouterr().err == ""
     for option, value, key in (
         ("--trials", 2, "evolution.trials"),
-        ("--evaluations", 20, "evolution.evaluations"),
-        ("--engine", "compiled", "engine"),
         ("--scenario", "thesis", "simulation.duration"),
         ("--seed", 1, "seed"),
     ):
@@ -312,11 +238,9 @@ def test_an_interrupted_run_says_how_to_continue(
     evolve, tmp_path, capsys, monkeypatch, interrupting
 ):
     out = tmp_path / "my run"
-    broken = {"evaluate": Bowl(), "make": interrupting, "workers": 1}
+    broken = OnExecutor(evaluate=Bowl(), make=interrupting, workers=1)
     interrupting.left = 17
-    monkeypatch.setattr(
-        "tetra_drake.experiment.evaluator_of", lambda *_, **__: OnExecutor(**broken)
-    )
+    monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: broken)
     assert evolve(*SMALL, "--out", out) == 130
     printed = capsys.readouterr()
     assert f"tetra-drake evolve --out '{out}' --resume" in printed.err

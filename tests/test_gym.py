@@ -44,14 +44,9 @@ def episode(env: gymnasium.Env, *, seed: int) -> tuple[np.ndarray, list[float], 
 @pytest.mark.filterwarnings("ignore:.*infinity")
 @pytest.mark.parametrize("name", [WALK, ROLL])
 def test_the_environments_pass_gymnasiums_checks(name):
-    check_env(gymnasium.make(name).unwrapped, skip_render_check=True)
-
-
-def test_one_environment_walks_and_one_rolls():
-    walks, rolls = (gymnasium.make(name).unwrapped for name in (WALK, ROLL))
-    assert walks._episodes.simulation.scenario.name == "coulomb"
-    assert "rolled" in rolls._episodes.simulation.scenario.objective
-    assert rolls.action_space.shape == (24,)
+    env = gymnasium.make(name).unwrapped
+    assert ("rolled" in env._episodes.simulation.scenario.objective) == (name == ROLL)
+    check_env(env, skip_render_check=True)
 
 
 @pytest.mark.parametrize("actuation", [FORCE, WINCH, MOTOR])
@@ -77,7 +72,7 @@ def test_seeds_repeat_episodes_bit_for_bit(short):
     assert first[2:] == (False, True), "it ends with the time"
 
 
-@pytest.mark.parametrize("objective", ["", "speed", "cost_of_transport", "lead"])
+@pytest.mark.parametrize("objective", ["", "speed", "cost_of_transport", "rolled"])
 def test_the_rewards_of_an_episode_are_the_fitness(short, objective):
     chosen = short.with_sections(objective={objective: 2.0}) if objective else short
     env = TensegrityEnv(chosen)
@@ -87,14 +82,6 @@ def test_the_rewards_of_an_episode_are_the_fitness(short, objective):
     assert fitness != 0.0
     dense = np.flatnonzero(rewards[:-1])
     assert (dense.size > 5) == (objective != "cost_of_transport")
-
-
-def test_the_reward_of_rolling_is_known_within_an_episode(short):
-    env = TensegrityEnv(short.with_sections(objective={"rolled": 2.0}), control_period=1e-3)
-    rewards = episode(env, seed=3)[1]
-    fitness = env._episodes.simulation.result().fitness
-    assert sum(rewards) == pytest.approx(fitness, rel=1e-9)
-    assert sum(rewards[:-1]) == pytest.approx(fitness, rel=0.05)
 
 
 def test_a_robot_that_fails_ends_its_episode_with_nothing(short):
@@ -122,19 +109,16 @@ def test_robots_side_by_side_begin_again_when_they_end(short):
     assert np.array_equal(many.reset(seed=5)[0], start)
 
 
-@pytest.mark.parametrize("action", [np.zeros(3), np.zeros((2, 4)), 0.0, "left"])
-def test_an_action_of_wrong_shape_is_refused(short, action, refused):
-    env = TensegrityEnv(short, grouped=True)
-    env.reset(seed=0)
-    with refused("tetra_drake.gym", "actions", "found", "(4,)"):
-        env.step(action)
-
-
-def test_actions_of_wrong_shape_are_refused(short, refused):
-    many = TensegrityVectorEnv(LANES, short)
-    many.reset(seed=0)
-    with refused("tetra_drake.gym", "actions", f"found the shape (8,), expected ({LANES}, 8)"):
-        many.step(np.zeros(8))
+def test_an_action_of_wrong_shape_is_refused(short, refused):
+    env, many = TensegrityEnv(short, grouped=True), TensegrityVectorEnv(LANES, short)
+    for each, action, expected in (
+        (env, np.zeros((2, 4)), "(4,)"),
+        (env, "left", "(4,)"),
+        (many, np.zeros(8), f"found the shape (8,), expected ({LANES}, 8)"),
+    ):
+        each.reset(seed=0)
+        with refused("tetra_drake.gym", "actions", expected):
+            each.step(action)
 
 
 def test_without_gymnasium_the_import_tells_what_to_install(monkeypatch, refused):

@@ -46,10 +46,8 @@ def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def commands(page: str) -> list[list[str]]:
     """The arguments of each command `tetra-drake` in the snippets of a page."""
-    lines = [line for snippet in snippets("sh", page) for line in snippet.splitlines()]
-    return [
-        shlex.split(line.rpartition("tetra-drake ")[2]) for line in lines if "tetra-drake " in line
-    ]
+    lines = re.findall(r"tetra-drake (.*)", "\n".join(snippets("sh", page)))
+    return [shlex.split(line) for line in lines]
 
 
 def test_the_commands_of_all_pages_are_commands_with_their_options() -> None:
@@ -89,13 +87,9 @@ def test_the_commands_run(work: Path) -> None:
 def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     """All scenarios end after a second."""
     loaded = td.load_scenario
+    short = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
     monkeypatch.setattr(
-        td,
-        "load_scenario",
-        lambda name: loaded(name).with_changes(
-            {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
-        ),
-        raising=False,
+        td, "load_scenario", lambda name: loaded(name).with_changes(short), raising=False
     )
 
 

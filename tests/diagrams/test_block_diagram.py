@@ -31,7 +31,6 @@ def test_blocks_ports_in_use_and_their_connections_are_shown(robot):
     edges = [line for line in source.splitlines() if "->" in line]
     assert len(edges) == len(robot.connection_map()) + robot.num_output_ports()
     assert '"cables":y0:e -> "forces":u0:w' in edges
-    assert '"ground":y3:e -> "diagram outputs":u6:w' in edges
 
 
 def test_a_missing_graphviz_is_named(robot, tmp_path, refused, monkeypatch):

@@ -1,8 +1,5 @@
 """Figures of one gait show its motion, for any structure."""
 
-import functools
-import itertools
-
 import numpy as np
 import pytest
 from helpers import prism
@@ -38,16 +35,10 @@ DOWNSTAIRS = {
 ROW = make_row()
 
 
-@functools.cache
-def walk_of(bodies, duration=9.0):
-    """A walk that no test may change."""
-    return make_walk(bodies=bodies, duration=duration)
-
-
-@pytest.fixture
+@pytest.fixture(scope="module")
 def walk():
     """A walk of five tetrahedra, which no test may change."""
-    return walk_of(5)
+    return make_walk()
 
 
 def row(trajectory):
@@ -66,27 +57,22 @@ def pictures(figure):
 
 
 def test_stance_bars_show_when_feet_bear_load(walk):
-    signals, stance, speed = gait_diagram(row(walk)).axes
+    _, stance, speed = gait_diagram(row(walk)).axes
     start, end = last_step(walk)
     shown = end - 3.0 * (end - start), end
     np.testing.assert_allclose(speed.get_xlim(), shown, atol=0.02)
     feet = [label.get_text() for label in stance.get_yticklabels()]
-    pairs = [(f"T{i} right", f"T{i} left") for i in range(1, 6)]
-    assert feet == list(itertools.chain(*pairs)), "the rear is below; the tip never stands"
-    rows = stance.get_yticks()
-    bars = {}
-    for collection in stance.collections:
-        for path in collection.get_paths():
-            (x0, y0), (x1, y1) = path.vertices.min(axis=0), path.vertices.max(axis=0)
-            foot = feet[int(np.argmin(np.abs(rows - (y0 + y1) / 2)))]
-            bars.setdefault(foot, []).append((x0, x1))
-    for body in range(5):
-        begins = np.arange(0.0, 10.0, PERIOD) + (0.0 if body % 2 else PERIOD / 2)
+    expected = [f"T{i} {side}" for i in range(1, 6) for side in ("right", "left")]
+    assert feet == expected, "the rear is below; the tip never stands"
+    for i, (bars, row_of_foot) in enumerate(
+        zip(stance.collections, stance.get_yticks(), strict=True)
+    ):
+        corners = np.array([path.vertices[[0, 2]] for path in bars.get_paths()])
+        np.testing.assert_allclose(corners[..., 1].mean(axis=1), row_of_foot)
+        begins = np.arange(0.0, 10.0, PERIOD) + (0.0 if i // 2 % 2 else PERIOD / 2)
         spans = [np.clip([begin, begin + PERIOD / 2], *shown) for begin in begins]
         expected = [span for span in spans if np.ptp(span) > 0.02]
-        for foot in pairs[body]:
-            np.testing.assert_allclose(bars[foot], expected, atol=0.025)
-    assert len(signals.get_yticklabels()) == 4
+        np.testing.assert_allclose(np.sort(corners[..., 0], axis=1), expected, atol=0.025)
     duties = [float(text.get_text().split()[0]) for text in stance.texts]
     np.testing.assert_allclose(duties, 50.0, atol=2.0)
 
@@ -100,36 +86,21 @@ def test_the_gait_diagram_has_the_forward_speed_and_its_mean(walk):
         assert speed.get_xdata()[[0, -1]].tolist() == [2.0, 5.0]
 
 
-def test_feet_of_many_bodies_are_named_by_body():
-    robot = make_row(12)
-    _, stance, _ = gait_diagram(result_of(robot, walk_of(12, 4.5))).axes
-    names = [label.get_text() for label in stance.get_yticklabels()]
-    assert names == list(robot.structure.bodies)
-
-
 def test_relative_distances_are_in_inches(walk):
     [panel] = relative_distances(row(walk)).axes
     lines = {line.get_label(): line for line in panel.lines}
     assert "T1" not in lines
     for i, name in enumerate(walk.body.values[1:], start=1):
-        np.testing.assert_allclose(lines[name].get_xdata(), walk.time)
         np.testing.assert_allclose(lines[name].get_ydata(), i * 2.94, rtol=1e-6, atol=1e-12)
-    [panel] = relative_distances(row(walk), units="SI").axes
-    assert panel.get_ylim()[1] < 1.0
 
 
 def test_the_time_lapse_shows_instants_from_start_to_end(walk):
-    shown = pictures(time_lapse(row(walk), instants=4))
-    assert len(shown) == 4
     ways = []
-    for panel in shown:
+    for panel in pictures(time_lapse(row(walk), instants=4)):
         [lines], [colours] = struts(panel)
         assert len(lines) == 5 * len(STRUTS) and len(set(colours)) == 5
         ways.append(lines[..., 0].min())
     np.testing.assert_allclose(ways, SPEED * np.array([0.0, 3.0, 6.0, 9.0]) / INCH, atol=1e-9)
-    titles = [panel.get_title("left").split() for panel in shown]
-    assert [float(title[0]) for title in titles] == [0.0, 3.0, 6.0, 9.0]
-    assert [float(title[2]) for title in titles] == [0.0, 1.18, 2.36, 3.54]
     part = pictures(time_lapse(row(walk), instants=2, time=(3.0, 6.0), units="SI"))
     assert [panel.get_title("left") for panel in part] == ["3 s: +0.0300 m", "6 s: +0.0600 m"]
 
@@ -143,9 +114,7 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
     x, y = radius * np.sin(angle), radius * (1.0 - np.cos(angle))
     p_WB[..., 0], p_WB[..., 1] = x[:, None], y[:, None]
     turned = walk.assign(q_WB=(walk.q_WB.dims, q_WB), p_WB=(walk.p_WB.dims, p_WB))
-    figure = path_of_the_centre(row(turned), instants=4)
-    figure.draw_without_rendering()
-    [panel] = figure.axes
+    [panel] = path_of_the_centre(row(turned), instants=4).axes
     assert panel.get_aspect() == 1.0
     path, start, end = panel.lines
     np.testing.assert_allclose(path.get_xydata() * INCH, np.column_stack([x, y]), atol=1e-12)
@@ -155,8 +124,6 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
     headings = np.arctan2(arrows.V, arrows.U)
     np.testing.assert_allclose(headings, angle[[0, 300, 600, 900]], atol=1e-9)
     np.testing.assert_allclose(arrows.XY, path.get_xydata()[[0, 300, 600, 900]])
-    for shown, drawn in ((panel.get_xlim(), x / INCH), (panel.get_ylim(), y / INCH)):
-        assert shown[0] < drawn.min() <= drawn.max() < shown[1]
 
 
 def test_of_a_straight_path_the_height_is_shown(walk):
@@ -164,13 +131,6 @@ def test_of_a_straight_path_the_height_is_shown(walk):
     [path] = panel.lines
     centre = walk.p_WB.mean("body")
     np.testing.assert_allclose(path.get_xydata(), centre.sel(axis=["x", "z"]))
-
-
-def test_distances_before_and_after_are_those_of_both_gaits(walk):
-    slow = result_of(ROW, walk.assign(p_WN=0.5 * walk.p_WN))
-    [panel] = before_and_after(slow, row(walk)).axes
-    for line, speed in zip(panel.lines, (0.5 * SPEED, SPEED), strict=True):
-        np.testing.assert_allclose(line.get_ydata(), speed * walk.time / INCH, atol=1e-9)
 
 
 def test_in_one_step_tetrahedra_well_off_the_ground_stand_out(walk):
@@ -197,16 +157,11 @@ def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
     assert [panel.get_title("left") for panel in paths] == walk.body.values.tolist()
     least = 0.02 * float(np.ptp(walk.p_WN[0].sel(axis="z").values)) / INCH
     for panel in paths:
-        path, in_the_air, start = panel.lines
+        path, in_the_air, _ = panel.lines
         assert np.ptp(path.get_xdata()) == pytest.approx(SPEED * PERIOD / INCH, rel=0.04)
         assert path.get_ydata().max() == pytest.approx(HEIGHT / INCH, rel=1e-3)
         aloft = np.isfinite(in_the_air.get_ydata())
         np.testing.assert_array_equal(aloft, path.get_ydata() > least)
-        assert start.get_xdata()[0] == 0.0
-    # Without a step the end is shown.
-    panel = paths_of(one_step(row(walk.assign(signal=0.0 * walk.signal))))[0]
-    shown = 0.25 * float(walk.time[-1]) * SPEED / INCH
-    assert np.ptp(panel.lines[0].get_xdata()) == pytest.approx(shown, rel=0.01)
 
 
 def test_tensions_are_those_of_the_driven_cables(walk):
@@ -218,25 +173,6 @@ def test_tensions_are_those_of_the_driven_cables(walk):
         np.testing.assert_allclose(signal.get_ydata(), expected)
         np.testing.assert_allclose(tension.get_ydata(), expected + 3.0 / POUND_FORCE)
         assert panel.get_title("left") == f"{oscillator} outer bottom left", "the cable"
-        assert not panel.patches
-    first, *_ = signals_and_tensions(row(walk), time=(0.0, 3.0), units="SI").axes
-    [start_up] = first.patches
-    assert start_up.get_x() + start_up.get_width() == 1.25
-    assert first.lines[2].get_ydata().max() == pytest.approx(2.0, rel=1e-3)
-
-
-def test_a_column_shows_the_signals_of_the_same_cables():
-    groups = [["outer top", "inner top"], ["inner bottom_right"], ["inner bottom_left"]]
-    driven = {"robot.actuation": groups}
-    motion = make_walk(bodies=3, duration=1.0, changes=driven)
-    figure = signals_and_tensions(result_of(make_row(3, driven), motion))
-    figure.draw_without_rendering()
-    assert len(figure.axes) == 6
-    cables = {}
-    for panel in figure.axes:
-        _, name = panel.get_title("left").split(" ", 1)
-        cables.setdefault(round(panel.get_position().x0, 3), set()).add(name)
-    assert [len(names) for names in cables.values()] == [1, 1, 1]
 
 
 def test_ground_forces_are_those_of_the_time_shown(walk):
@@ -249,7 +185,6 @@ def test_ground_forces_are_those_of_the_time_shown(walk):
     np.testing.assert_allclose(normal.get_xdata(), end.time)
     np.testing.assert_allclose(normal.get_ydata(), expected)
     np.testing.assert_allclose(friction.get_ydata(), -0.5 * expected)
-    assert set(normal.get_ydata()) == {0.0, LOAD / POUND_FORCE}
 
 
 def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk):
@@ -258,12 +193,8 @@ def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk)
     panel, *_ = ground_forces(row(four)).axes
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
     np.testing.assert_allclose(spans[-2:], [(5.0, 6.0), (7.0, 8.0)], atol=0.011)
-    assert panel.get_title(loc="right").split()[1] in ("49", "50", "51")
     np.testing.assert_allclose(panel.lines[-1].get_xdata(), [5.0, 7.0], atol=0.011)
-    low, high = panel.get_ylim()
-    assert low < -0.5 * LOAD / POUND_FORCE
-    assert LOAD / POUND_FORCE < high < 2.0 * LOAD / POUND_FORCE
-    assert max(panel.lines[0].get_ydata()) > 50.0 * high
+    assert LOAD / POUND_FORCE < panel.get_ylim()[1] < 2.0 * LOAD / POUND_FORCE
 
 
 def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
@@ -275,7 +206,6 @@ def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
         expected = ground_heights(np.column_stack([x, 0.0 * x]) * INCH, robot.ground) / INCH
         np.testing.assert_allclose(z - z[0], expected - expected[0], rtol=0, atol=1e-9)
         assert np.ptp(z) > 0.9  # the robot's tip is above the first step down
-        assert side.get_ylim()[0] < z.min()
 
 
 def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(walk):
@@ -296,33 +226,18 @@ def carried():
     return result_of(robot, prism.slide_prism(robot))
 
 
-def test_a_legend_names_bodies_and_the_ends_of_a_row_are_named_in_its_step(carried, walk):
-    figure = time_lapse(carried)
-    [legend] = figure.legends
-    names = [text.get_text() for text in legend.get_texts()]
-    assert names == ["n0 n4", "n1 n5", "n2 n3", "path of the centre"]
-    *shown, way = [to_hex(line.get_color()) for line in legend.get_lines()]
-    assert way not in shown
-    assert shown == struts(pictures(figure)[0])[1].ravel().tolist()
-    first, last = pictures(one_step(row(walk), time=(0.0, 1.0)))[0].texts
-    assert (first.get_text(), last.get_text()) == ("T1", "T5")
-    middle = walk.p_WN.sel(axis=["x", "y"])[0].values.reshape(5, 4, 2).mean(axis=1) / INCH
-    np.testing.assert_allclose([first.get_position(), last.get_position()], middle[[0, -1]])
-
-
 def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
-    way = prism.SPEED * carried.trajectory.time / INCH
-    [panel] = before_and_after(carried, carried).axes
-    np.testing.assert_allclose(panel.lines[0].get_ydata(), way, atol=1e-9)
+    slow = carried.trajectory.assign(p_WN=0.5 * carried.trajectory.p_WN)
+    [panel] = before_and_after(result_of(carried.robot, slow), carried).axes
+    for line, share in zip(panel.lines, (0.5, 1.0), strict=True):
+        way = share * prism.SPEED * carried.trajectory.time / INCH
+        np.testing.assert_allclose(line.get_ydata(), way, atol=1e-9)
     [panel] = paths_of(one_step(carried))
     assert panel.get_title("left") == "centre"
-    step = 0.5 * prism.PERIOD
-    assert np.ptp(panel.lines[0].get_xdata()) > step * prism.SPEED / INCH
+    assert np.ptp(panel.lines[0].get_xdata()) > 0.5 * prism.PERIOD * prism.SPEED / INCH
 
 
 def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
-    shown = [panel.get_title("left") for panel in ground_forces(carried).axes]
-    assert shown == ["n0", "n1", "n2"]
     rolled = carried.trajectory.copy(deep=True)
     rolled.normal_force.loc[{"contact": ["n0", "n2"]}] = 0.0
     rolled.normal_force.loc[{"contact": "n4"}] = 0.2

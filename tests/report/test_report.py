@@ -16,8 +16,6 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.formatting import rounded
 from tetra_drake.report.run_figures import simulate_shown_gaits
 from tetra_drake.report.run_page import render_report, write_report
-from tetra_drake.report.summary import ground_text
-from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH
 
 from .conftest import COSTS, TRIALS
@@ -30,7 +28,7 @@ class Page(HTMLParser):
 
     def __init__(self, source):
         super().__init__()
-        self.open, self.tags, self.texts, self.table, self.cells = [], [], {}, [], []
+        self.open, self.tags, self.texts, self.table = [], [], {}, []
         self.feed(source)
         self.close()
         assert self.open == []
@@ -43,7 +41,6 @@ class Page(HTMLParser):
             self.table.append([])
         elif tag in ("td", "th"):
             self.table[-1].append("")
-            self.cells.append((dict(attributes), self.table[-1], len(self.table[-1]) - 1))
         if tag not in ("meta", "link", "img", "br"):
             self.open.append(tag)
             self.texts[tag].append("")
@@ -61,10 +58,6 @@ class Page(HTMLParser):
         """The cells of the last row that begins so."""
         return {cells[0]: cells[1:] for cells in self.table}.get(heading)
 
-    def titled_cells(self):
-        """Attributes and texts of the cells that have a title."""
-        return [(values, row[at]) for values, row, at in self.cells if "title" in values]
-
     def attributes(self, name):
         return [values[name] for _, values in self.tags if name in values]
 
@@ -75,7 +68,8 @@ def run(tmp_path_factory):
     directory = tmp_path_factory.mktemp("runs") / "run"
     metrics = {fitness: {"cost_of_transport": cost} for fitness, cost in COSTS.items()}
     metrics[4.0] |= {"lifted_shares": [0.25, 0.0, 0.5]}
-    write_run(directory, TRIALS, scenario=tiny_scenario(name=EVIL), metrics=metrics)
+    scenario = tiny_scenario(name=EVIL).with_changes({"require": {"lead": "0.5 in"}})
+    write_run(directory, TRIALS, scenario=scenario, metrics=metrics)
     names = [path.name for path in write_report(directory)]
     assert names == ["figures", "replay.html", "report.html"]
     return directory
@@ -106,9 +100,7 @@ def test_figures_are_files_and_in_the_page(run, page):
     drawn = [path.read_text(encoding="utf-8") for path in (run / "figures").glob("*.svg")]
     assert len(drawn) >= 9
     images = [values["src"].split(",", 1) for tag, values in page.tags if tag == "img"]
-    assert {kind for kind, _ in images} == {"data:image/svg+xml"}
     assert {unquote(svg) for _, svg in images} == {" ".join(svg.split()) for svg in drawn}
-    assert all(page.texts["figcaption"])
 
 
 def test_it_needs_no_network_and_links_relatively(run, source, page):
@@ -122,15 +114,12 @@ def test_it_needs_no_network_and_links_relatively(run, source, page):
     without_pictures = re.sub(r'"data:(image[^"]*|,)"', "", source)
     for elsewhere in ("data:", "http", "url(", "@import"):
         assert elsewhere not in without_pictures
-    assert len(source) < 3e6
 
 
 def test_names_are_escaped(source, page):
     assert EVIL not in source
     assert "script" not in {tag for tag, _ in page.tags}
-    for tag in ("h1", "title"):
-        (text,) = page.texts[tag]
-        assert text.startswith(EVIL)
+    assert all(page.texts[tag][0].startswith(EVIL) for tag in ("h1", "title"))
 
 
 def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page):
@@ -138,29 +127,17 @@ def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page
     assert ["0", "1.00", "1.50", "5", "1"] in page.table
     assert ["1", "0.750", "2.00", "5", ""] in page.table
     settings = page.texts["li"]
-    assert "robot.tetrahedra 3" in settings
-    assert "simulation.steady_from 0.1 s" in settings
+    assert {"robot.tetrahedra 3", "simulation.steady_from 0.1 s"} <= set(settings)
     assert not any("damping" in text for text in settings)
     assert page.row("simulated time") == ["0.3 s"]
+    assert page.row("required") == ["lead: 0.5 in"]
 
 
-def test_the_best_gait_walks_first_then_its_evolution_and_settings_come_last(page):
-    kinds = [tag for tag, _ in page.tags if tag in ("iframe", "h2", "img")]
-    assert kinds[:3] == ["h2", "iframe", "img"]
-    (frame,) = (values for tag, values in page.tags if tag == "iframe")
-    assert frame["src"] == "replay.html"
-    titles = ["The best gait", "How it evolved", "Numbers", "Motion and forces", "Settings"]
-    assert page.texts["h2"][:-1] == titles
-
-
-def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page):
+def test_the_best_gait_is_shown_with_its_weights_and_as_recorded(study, source, page):
     gait = study.best.result.gait
-    cells = {values["title"]: text for values, text in page.titled_cells()}
     for name, weight in zip(gait.weight_names, gait.weights, strict=True):
-        source, onto = re.findall(r"\d", name)
-        title = f"oscillator {source} inhibits {onto}: {rounded(weight)}"
-        assert cells[title] == f"{weight:.2f}"
-    assert f"{gait.tau_a:.3f} s" in " ".join(page.texts["p"])
+        title = "oscillator {} inhibits {}: ".format(*re.findall(r"\d", name)) + rounded(weight)
+        assert re.search(rf'title="{title}"[^>]*>\s*{weight:.2f}\s*<', source), title
     # As recorded; simulated again, this gait moves elsewhere, which a note says.
     assert "walks 2.0 in" in page.texts["h1"][0]
     best, initial = "trial 1, evaluation 4", "trial 1, evaluation 0"
@@ -169,26 +146,10 @@ def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page)
 
 
 def test_metrics_of_the_best_gait_stand_beside_the_initial_ones(page):
-    columns = ["initially", "best"]
-    gaits = ["trial 1, evaluation 0", "trial 1, evaluation 4"]
-    assert ["", *map("".join, zip(columns, gaits, strict=True)), ""] in page.table
     assert page.row("fitness")[:2] == ["1.50", "4.00"]
     assert page.row("distance (in)")[:2] == ["0.750", "2.00"]
     assert page.row("cost of transport")[:2] == ["0.100", "0.900"]
     assert page.row("heading change (deg)") is None  # which no gait has
-    assert page.row("twist (in)")[:2] == ["0", "0"], "the objective names it"
-
-
-def test_objective_requirements_and_ground_are_those_of_the_scenario(tmp_path, page):
-    terms, incline = {"speed": "2 s/in", "twist": "-10 /in"}, Incline(slope=0.1)
-    changes = {"objective": terms, "require": {"lead": "0.5 in"}, "terrain": incline}
-    scenario = tiny_scenario().with_changes(changes)
-    shown = render(
-        simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
-    )
-    assert shown.row("objective") == ["speed: 2 s/in, twist: -10 /in"]
-    assert shown.row("required") == ["lead: 0.5 in"]
-    assert shown.row("ground") == [ground_text(scenario)]
 
 
 def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study):

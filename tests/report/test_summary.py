@@ -4,7 +4,6 @@ import dataclasses
 import math
 import re
 
-import numpy as np
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
@@ -12,7 +11,6 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.report.summary import ground_text, result_text, results
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain_kinds import HeightField, Rough
 from tetra_drake.scenario.units import INCH
 
 
@@ -57,42 +55,24 @@ def test_requirements_that_are_not_met_are_named(tiny, result):
     ("scenario", "changes", "words"),
     [
         ("thesis", {"engine": "!Mujoco"}, {"flat", "MuJoCo", "0.5"}),
-        ("thesis", {"terrain": Rough(amplitude=0.0254, wavelength=0.1)}, {"amplitude 1 in"}),
-        ("incline", {}, {"incline", "slope 5 deg", "static 0.5", "kinetic 0.5"}),
         ("steps", {"friction": Coulomb(lateral=2.0)}, {"height 0.25 in", "count 4", "lateral 2"}),
     ],
 )
 def test_the_ground_is_named_with_its_terrain_and_friction(scenario, changes, words):
     text = ground_text(load_scenario(scenario).with_changes(changes))
     assert all(word in text for word in words)
-    assert "\n" not in text
-
-
-def test_the_ground_of_a_height_file_is_named_without_its_folder(tmp_path):
-    np.save(tmp_path / "a.npy", np.zeros((3, 3)))
-    field = HeightField(file=str(tmp_path / "a.npy"), cell=0.0254)
-    text = ground_text(load_scenario("thesis").with_changes({"terrain": field}))
-    assert field.file in text and "1 in" in text
-    assert str(tmp_path) not in text
 
 
 def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
     # By trials, in inches: from 2 to 3, from 5 to 6, from 5.5 to 4; the fittest walks 6 in.
-    trials = [
-        [[(4.0, 0)], [(6.0, 0)]],
-        [[(10.0, 0)], [(12.0, 0), (None, 1)]],
-        [[(11.0, 0)], [(8.0, 0)]],
-    ]
+    trials = [[[(a, 0)], [(b, 0)]] for a, b in ((4.0, 6.0), (10.0, 12.0), (11.0, 8.0))]
+    trials[1][1].append((None, 1))
     walked = dict(results(load_run(write_run(tmp_path / "far", trials))))
     assert walked["distance"].startswith("6.00 in, trial 1, evaluation 1")
     assert walked["best initial gait"].startswith("5.50 in, trial 2, evaluation 0")
-    assert re.findall(r"[\d.]+ in", walked["best of each trial"]) == [
-        "5.50 in",
-        "4.25 in",
-        "5.75 in",
-    ]
+    of_trials = re.findall(r"([\d.]+) in", walked["best of each trial"])
+    assert of_trials == ["5.50", "4.25", "5.75"]
     assert walked["evaluations"].startswith("7 ") and "1" in walked["evaluations"]
-    assert walked["time per evaluation"] == "500 ms"
 
     turning = tiny_scenario().with_changes({"objective": {"heading_change": "1 /rad"}})
     angles = {fitness: {"heading_change": math.radians(fitness)} for fitness in (4.0, 6.0)}

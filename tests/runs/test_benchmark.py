@@ -1,51 +1,25 @@
 """The benchmark: its tables on short simulations of few gaits."""
 
 import benchmark
-import pytest
 
-from tetra_drake.scenario.load import load_scenario
-
-QUICK = """
-base: thesis
-name: quick
-robot: {tetrahedra: 3}
-cpg: {start_up: 0.05 s}
-simulation: {duration: 0.1 s, steady_from: 0.05 s}
-"""
+QUICK = {
+    "robot.tetrahedra": 3,
+    "cpg.start_up": "0.05 s",
+    "simulation.duration": "0.1 s",
+    "simulation.steady_from": "0.05 s",
+}
+FEW = {"GAITS": 2, "BATCHES": (1, 2), "GROUND_BATCH": 1, "CONTROLLED": (2,), "ROUNDS": 1}
 
 
-@pytest.fixture
-def small(monkeypatch):
-    """One core and one gait at a time, measured once; no MuJoCo."""
-    monkeypatch.setattr(benchmark, "available_cores", lambda: 1)
-    monkeypatch.setattr(benchmark, "installed", lambda: False)
-    few = {"GAITS": 2, "BATCHES": (1, 2), "GROUND_BATCH": 1, "CONTROLLED": (2,), "ROUNDS": 1}
-    for name, value in few.items():
+def test_every_engine_and_ground_is_measured(scenario, monkeypatch, capsys):
+    only = {"available_cores": lambda: 1, "installed": lambda: False}  # no MuJoCo
+    for name, value in (FEW | only).items():
         monkeypatch.setattr(benchmark, name, value)
-
-
-def cells(line):
-    return [cell.strip() for cell in line.strip("|").split("|")]
-
-
-def test_every_engine_and_ground_is_measured(small, tmp_path, capsys):
-    (tmp_path / "quick.yaml").write_text(QUICK)
-    benchmark.main([], load_scenario(tmp_path / "quick.yaml"))
-    tables = [table.splitlines() for table in capsys.readouterr().out.strip().split("\n\n")]
-    engines, batches, grounds, controlled = (
-        [cells(line) for line in table[2:]] for table in tables
-    )
-    assert [row[0] for row in engines] == ["`!Drake {}`", "`!Compiled {}`"]
-    for row in engines:
-        speed, median, worst, evaluations = row[1:]
-        assert float(speed) > 0.0 and int(evaluations.replace(",", "")) > 0
-        assert 0.0 <= float(median) <= float(worst) < 0.05
-    ((cores, *speeds),) = batches
-    assert cores == "1" and len(speeds) == 2
-    assert [float(row[1].replace(",", "")) > 0.0 for row in controlled] == [True] * 6
-    assert len(grounds) == 4 and all(float(row[-1]) > 0.0 for row in grounds)
-
-
-def test_an_unknown_table_is_refused(scenario, refused):
-    with refused("TABLE", "", "sizes"):
-        benchmark.main(["sizes"], scenario)
+    benchmark.main([], scenario.with_changes(QUICK))
+    tables = [table.splitlines()[2:] for table in capsys.readouterr().out.strip().split("\n\n")]
+    cells = [[line.strip("| ").split("|") for line in table] for table in tables]
+    engines, batches, grounds, controlled = cells
+    assert [row[0].strip() for row in engines] == ["`!Drake {}`", "`!Compiled {}`"]
+    assert all(0.0 <= float(row[2]) <= float(row[3]) < 0.05 for row in engines)
+    assert (len(batches), len(batches[0]), len(grounds), len(controlled)) == (1, 3, 4, 6)
+    assert all(float(row[1].replace(",", "")) > 0.0 for table in cells for row in table)

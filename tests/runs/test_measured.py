@@ -14,6 +14,7 @@ def test_the_simplex_is_as_high_as_measured_up_to_a_load_of_1_kn():
         np.testing.assert_allclose(moderate[kind], moderate[f"{kind} measured"], rtol=0.05)
 
 
+@pytest.mark.slow
 def test_the_measured_heights_of_the_simplex_tell_its_free_lengths():
     found = measured.fitted_free_lengths("top", "vertical").parameters
     assert ((found["low"] < found["start"]) & (found["start"] < found["high"])).all()

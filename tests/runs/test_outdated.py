@@ -3,6 +3,7 @@
 import outdated
 import pytest
 import record
+from helpers.brief import BRIEF
 from thinning import thin
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -10,19 +11,9 @@ from tetra_drake.experiment import evolve
 from tetra_drake.optimizers import cma_es
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 
-TINY = record.Experiment(
-    "two tetrahedra",
-    "thesis",
-    {
-        "engine": "!Compiled",
-        "robot.tetrahedra": 2,
-        "optimizer": CmaEs(sample=8),
-        "simulation.duration": "1.6 s",
-        "simulation.steady_from": "0.1 s",
-        "evolution.trials": 2,
-        "evolution.evaluations": 24,
-    },
-)
+FEW = {"robot.tetrahedra": 2, "optimizer": CmaEs(sample=8), "simulation.duration": "1.6 s"}
+FEW |= {"evolution.trials": 2, "evolution.evaluations": 24}
+TINY = record.Experiment("two tetrahedra", "thesis", BRIEF | FEW)
 
 
 def other(**changes):
@@ -42,14 +33,6 @@ def recorded(experiment, directory):
 def tiny(tmp_path_factory):
     """A recorded and thinned run of TINY."""
     return recorded(TINY, tmp_path_factory.mktemp("runs") / "tiny")
-
-
-def test_a_run_is_up_to_date_where_it_is_repeated(tiny):
-    assert outdated.why_outdated("tiny", TINY, tiny) == ""
-
-
-def test_what_is_not_recorded_is_outdated(tmp_path):
-    assert outdated.why_outdated("tiny", TINY, tmp_path) == "not recorded"
 
 
 def test_the_keys_that_differ_are_named(tiny):
@@ -77,7 +60,9 @@ def test_a_gait_that_goes_elsewhere_is_seen_and_last_digits_are_not(tiny, tmp_pa
         assert found.startswith("evaluation 0 goes ") if seen else found == ""
 
 
-def test_a_search_is_told_the_recorded_fitnesses(tiny, monkeypatch):
+def test_a_run_is_up_to_date_where_its_search_repeats_it_told_the_recorded_fitnesses(
+    tiny, monkeypatch
+):
     """So that its own do not lead it elsewhere, where they round in another way."""
     monkeypatch.setattr(GaitEvaluation, "_fitness", lambda self, result: 1.0)
     assert outdated.why_outdated("tiny", TINY, tiny) == ""

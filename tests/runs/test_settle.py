@@ -5,11 +5,6 @@ import pytest
 import settle
 
 
-def test_trials_that_are_all_alike_leave_no_doubt():
-    one, other = np.full(10, 20.0), np.full(10, 23.0)
-    assert settle.difference_of_means(one, other) == pytest.approx((3.0, 3.0, 3.0))
-
-
 def test_the_interval_is_that_of_students_t():
     """Normal samples of 10 each: s sqrt(2 / 10) t, t = 2.10 with 18 degrees of freedom; a bootstrap
     of ten is narrower by sqrt(9 / 10) and takes 1.96 for t."""

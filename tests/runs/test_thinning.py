@@ -1,7 +1,5 @@
 """A thinned run: the gaits that matter are whole, every evaluation is there."""
 
-import math
-
 import numpy as np
 import pandas
 import pytest
@@ -9,12 +7,10 @@ from helpers.analytic import in_threads
 from helpers.synthetic_run import tiny_scenario, write_run
 from thinning import last_population, thin
 
-from tetra_drake.analysis.comparison import compare
 from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.source import load_source
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.terrain_kinds import HeightField
@@ -42,8 +38,7 @@ def metrics_of(trial, i, fitness):
     """More metrics than a synthetic run has."""
     special = {ALONE: (0.1, 0.45), EDGE: (1.00001 / 3.0, 0.59), BEYOND: (0.5, 0.59)}
     index, lifted = special.get(i if trial == 0 else -1, (0.9, 0.5))
-    numbers = {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
-    return numbers | {"lateral_drift": -1e-17, "clearance": 1.0}
+    return {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
 
 
 @pytest.fixture(scope="module")
@@ -73,14 +68,11 @@ def runs(tmp_path_factory):
 def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
     run, thinned = runs
     assert len(thinned.evaluations) == len(run.evaluations)
-    assert (
-        len(thinned.with_parameters) < 0.8 * len(run.with_parameters) == 0.8 * len(run.evaluations)
-    )
+    assert len(thinned.with_parameters) < 0.8 * len(run.with_parameters)
     fitness = run.evaluations.groupby("trial")["fitness"]
     rises = run.evaluations[run.evaluations["fitness"] == fitness.cummax()]
     last = pandas.concat([last_population(run, 0), last_population(run, 1)])
     again = run.evaluations.query("trial == 0 and index == @AGAIN")
-    assert AGAIN not in rises["index"].values and AGAIN not in last["index"].values
     for matter in (run.initial(), rises, run.best(BEST_GAITS), last, again, elites(run)):
         rows = run.evaluations.loc[matter.index].drop(columns="wall_time_s")
         kept = thinned.evaluations.loc[matter.index].drop(columns="wall_time_s")
@@ -94,26 +86,17 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     loss = (before["fitness"] - after["fitness"]).dropna()
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
     assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == after["twist"].dropna().tolist()
-    assert thinned.with_parameters["clearance"].notna().any() and after["clearance"].isna().all()
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])
-    trial, index = after.iloc[0][["trial", "index"]]
-    with pytest.raises(Exception, match="genome"):
-        thinned.gait(trial, index)
 
 
 def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     run, thinned = runs
     assert thinned.fittest().equals(run.fittest())
-    assert thinned.best(99)["tau_a_s"].notna().all()
     assert run_text(thinned).replace(str(thinned.directory), str(run.directory)) == run_text(run)
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
     assert on_map[0] == on_map[1]
     assert [0, ALONE] in on_map[0] and [0, BEYOND] in on_map[0] and [0, EDGE] not in on_map[0]
-    assert load_source(thinned.directory).gaits == load_source(run.directory).gaits
-    ours, theirs = (compare([r.directory], reach=0.01).trials for r in (thinned, run))
-    assert ours.drop(columns="run").equals(theirs.drop(columns="run"))
     assert thinned.reevaluations["distance"].equals(run.reevaluations["distance"])
-    assert math.isnan(thinned.reevaluations["tau_a_s"].item())
 
 
 def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused, monkeypatch):

@@ -12,21 +12,28 @@ from helpers.anchored import HUNG, scenario_of
 from helpers.made_up_walk import LOAD, make_row, make_walk
 from helpers.meshcat_page import commands, read_page
 
+from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.report.structure_page import save_structure_page
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.terrain_kinds import Incline
-from tetra_drake.scenario.units import INCH, INCHES, POUND_FORCE
+from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.visualization.browser import do, wait_until_loaded
 from tetra_drake.visualization.replay import (
     RESOLUTION,
     frame_samples,
     ground_forces,
     pack_page,
-    round_force,
     save_replay,
 )
 from tetra_drake.visualization.scene import COLOURS, THICKEST, THINNEST, cable_paths, drawn_radii
+from tetra_drake.visualization.video import make_video
+
+from .conftest import opened
 
 ROUNDING = 0.51 * RESOLUTION
 
@@ -40,9 +47,8 @@ def recorded(scenario):
 
 @pytest.fixture(scope="module")
 def scenario():
-    return load_scenario().with_changes(
-        {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
-    )
+    times = {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
+    return load_scenario().with_changes(times)
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +63,15 @@ def frames(trajectory):
 
 
 @pytest.fixture(scope="module")
-def page(scenario, trajectory, tmp_path_factory):
+def file(scenario, trajectory, tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "new" / "replay.html"
     save_replay(path, robot=Robot.of(scenario), trajectory=trajectory, title=TITLE)
-    return read_page(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(file):
+    return read_page(file)
 
 
 @pytest.fixture(scope="module")
@@ -83,14 +94,52 @@ def film_of(page):
     return film
 
 
-@pytest.mark.parametrize(
-    ("samples", "period", "frames"), [(1501, 0.01, 376), (11, 0.1, 11), (1, 1, 1)]
-)
-def test_frames_are_evenly_spread_over_the_samples(samples, period, frames):
-    chosen = frame_samples(period * np.arange(samples))
-    assert (chosen[0], chosen[-1], len(chosen)) == (0, samples - 1, frames)
-    steps = np.diff(chosen)
-    assert frames == 1 or 1 <= steps.min() <= steps.max() <= steps.min() + 1
+def test_frames_are_evenly_spread_over_the_samples():
+    for samples, period, frames in ((1501, 0.01, 376), (11, 0.1, 11), (1, 1, 1)):
+        chosen = frame_samples(period * np.arange(samples))
+        assert (chosen[0], chosen[-1], len(chosen)) == (0, samples - 1, frames)
+        assert frames == 1 or np.ptp(np.diff(chosen)) <= 1
+
+
+def test_in_a_browser_bodies_are_where_they_were_and_cables_between_them(browser, file, frames):
+    with opened(browser, file.as_uri()) as page:
+        wait_until_loaded(page)
+        for frame in (4, -1):
+            do(page, "show", float(frames["time"].values[frame]))
+            places, length = page.evaluate(
+                """bodies => [
+                    bodies.map(body => viewer.scene_tree.find(["robot", body])
+                        .object.position.toArray()),
+                    viewer.scene_tree.find(["cables", "actuated", "T1-T2 outer bottom_left"])
+                        .object.scale.z]""",
+                frames["body"].values.tolist(),
+            )
+            # Times are rounded to 0.01 ms, and nothing moves at 1 m/s.
+            np.testing.assert_allclose(places, frames["p_WB"].values[frame], rtol=0, atol=1e-5)
+            feet = frames["p_WN"].sel(node=["T1 bottom_left", "T2 bottom_left"]).values[frame]
+            assert length == pytest.approx(np.linalg.norm(feet[1] - feet[0]), abs=1e-4)
+
+
+@pytest.mark.slow
+def test_bodies_with_slashes_in_their_names_are_where_they_rest(browser, tmp_path):
+    """Such as those of NTRT's substructures."""
+    tree = read_structure("prism").model_dump() | {"actuated": {}}
+    text = json.dumps(tree).replace('"n', '"leg/n').replace('"leg/nod', '"nod')
+    given = StructureFile.model_validate(json.loads(text))
+    robot = Robot.of(load_scenario("prism").with_sections(robot=given))
+    save_structure_page(study_equilibrium(robot), tmp_path / "prism.html")
+    with opened(browser, (tmp_path / "prism.html").as_uri()) as loaded:
+        wait_until_loaded(loaded)
+        assert not loaded.is_visible("#bar")  # nothing moves
+        for name, place in zip(robot.structure.bodies, robot.structure.p_WB, strict=True):
+            path = ["robot", *name.split("/")]
+            found = loaded.evaluate(f"viewer.scene_tree.find({path}).object.position.toArray()")
+            assert found == pytest.approx(place.tolist(), abs=1e-4)
+
+
+def test_what_cannot_be_a_video_is_refused(file, tmp_path, refused):
+    with refused(tmp_path / "talk.avi", "", ".mp4 or .gif"):
+        make_video(file, tmp_path / "talk.avi")
 
 
 def test_nodes_sit_on_their_bodies(structure, film):
@@ -106,7 +155,6 @@ def test_cables_join_their_nodes_and_swell_with_tension(structure, frames, film)
     ends = structure.cables[["node_a", "node_b"]].tolist()
     assert [tuple(cable["nodes"]) for cable in film["cables"]] == ends
     tension, strut = frames["tension"].values, drawn_radii(structure)[0].min()
-    assert THINNEST * strut <= film["radii"].min() + ROUNDING
     free = (film["radii"] > 1.1 * THINNEST * strut) & (film["radii"] < 1.2 * THICKEST * strut)
     ratios = (film["radii"] / tension)[free]
     full = THICKEST * strut / np.percentile(tension, 99)
@@ -123,13 +171,6 @@ def test_arrows_are_the_forces_of_the_ground(scenario, frames, film):
     np.testing.assert_array_equal(film["touches"] > 0.0, frames["in_contact"].values > 0)
 
 
-@pytest.mark.parametrize(
-    ("pounds", "rounded"), [(0.0301, 0.05), (0.05, 0.05), (0.9, 1.0), (17.0, 20.0)]
-)
-def test_an_inch_of_an_arrow_is_a_round_force(pounds, rounded):
-    assert round_force(pounds * POUND_FORCE, INCHES) == pytest.approx(rounded * POUND_FORCE)
-
-
 def test_forces_on_a_slope_are_turned_with_it():
     slope = 0.2
     inclined = make_row(changes={"terrain": Incline(slope=slope)})
@@ -141,10 +182,9 @@ def test_forces_on_a_slope_are_turned_with_it():
 
 def test_progress_is_the_distance_or_the_turn(scenario, trajectory, tmp_path, film):
     walked = trajectory["p_WN"].values[:, 0, 0]
+    inches = (walked[-1] - walked[0]) / INCH
     assert (film["progress"]["what"], film["progress"]["unit"]) == ("walked", " in")
-    assert film["progress"]["values"][-1] == pytest.approx(
-        (walked[-1] - walked[0]) / INCH, abs=0.06
-    )
+    assert film["progress"]["values"][-1] == pytest.approx(inches, abs=0.06)
     turning = scenario.with_sections(objective={"heading_change": 1.0})
     quarter = trajectory.copy(deep=True)
     quarter["q_WB"].values[:] = [1.0, 0.0, 0.0, 0.0]
@@ -160,20 +200,17 @@ def test_rear_feet_or_the_centre_leave_a_path(structure, frames, film, tmp_path)
     robot = prism.make_prism()
     motion = prism.slide_prism(robot, duration=0.2)
     save_replay(tmp_path / "prism.html", robot=robot, trajectory=motion, title="a prism")
-    page = read_page(tmp_path / "prism.html")
-    sliding = film_of(page)
-    assert "path of the centre" in page and not sliding["named"]  # bodies named after two nodes
+    sliding = film_of(read_page(tmp_path / "prism.html"))
+    assert not sliding["named"]  # bodies named after two nodes
     ends = [[0.0, 0.0, 0.08], [0.2 * prism.SPEED, 0.0, 0.08]]
     np.testing.assert_allclose(sliding["traces"][[0, -1]], ends, rtol=0, atol=ROUNDING)
 
 
 def test_the_title_is_text_and_not_markup(page, trajectory):
     packed = pack_page(page, title=TITLE)
-    expected = (("title", page, TITLE), ("title", packed, TITLE), ("h1", page, DEED))
-    for tag, source, text in (*expected, ("p", page.partition("<h1>")[2], NAME)):
+    for tag, source, text in (("title", page, TITLE), ("title", packed, TITLE), ("h1", page, DEED)):
         title = re.search(rf"<{tag}>(.*?)</{tag}>", source)[1]
-        assert html.unescape(title) == text
-        assert "<" not in title
+        assert html.unescape(title) == text and "<" not in title
     assert "bad()</script>" not in page + packed
 
 
@@ -186,21 +223,13 @@ def test_pages_share_one_version_of_a_viewer(scenario, trajectory, page, tmp_pat
     shared = read_page(path)
     assert script in page and script not in shared
     assert re.findall(r'src="(.*?)"', shared) == ["../../shared/viewer%20%231.js"]
-    assert len(shared) == pytest.approx(len(page) - len(script), abs=500)
     assert path.stat().st_size < 100_000
-
-    written = viewer.stat().st_mtime_ns
-    save(tmp_path / "shared" / "replay.html", viewer=viewer)
-    assert viewer.stat().st_mtime_ns == written, "it was there"
-    assert 'src="viewer%20%231.js"' in read_page(tmp_path / "shared" / "replay.html")
 
     other = tmp_path / "other.js"
     other.write_text(script[:-1])
-    for wrong in (other, tmp_path):
-        with refused(wrong, "", ""):
-            save(tmp_path / "other.html", viewer=wrong)
+    with refused(other, "", ""):
+        save(tmp_path / "other.html", viewer=other)
     assert other.read_text(encoding="utf-8") == script[:-1]
-    assert not (tmp_path / "other.html").exists()
 
 
 def test_a_page_without_ground_shows_anchors_and_no_floor(tmp_path):
@@ -209,18 +238,8 @@ def test_a_page_without_ground_shows_anchors_and_no_floor(tmp_path):
     save_replay(tmp_path / "page.html", robot=robot, trajectory=frames, title="a robot: hangs")
     page = read_page(tmp_path / "page.html")
     film = film_of(page)
-    assert film["contacts"] == []
     colours = {node["path"][-1]: (node["body"], node["colour"]) for node in film["nodes"]}
     assert colours["node top"] == (-1, COLOURS["anchor"])
     assert colours["node a"] == (0, COLOURS["node"])
-    (top,) = [node["place"] for node in film["nodes"] if node["body"] == -1]
-    assert top == [0.0, 0.0, 1.0]
-    assert commands(page, "/robot/world/node top")
-    assert not commands(page, "/floor/")
-    assert "anchored node" in page
-    assert "on the ground</li>" not in page
-
-
-def test_a_page_with_ground_and_no_anchors_has_no_word_of_them(page):
-    assert commands(page, "/floor/")
-    assert "anchored node" not in page
+    assert commands(page, "/robot/world/node top") and not commands(page, "/floor/")
+    assert "anchored node" in page and "on the ground</li>" not in page

@@ -47,7 +47,6 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
         above = p_WV[:, 2] - ground_heights(p_WV[:, :2], ground) + radius
         walls = p_WV[:, 2] < p_WV[:, 2].min() + 1e-6 if path == "/floor/relief" else False
         assert np.abs(above[~walls] if path == "/floor/relief" else above - 3e-4).max() < 1.1e-4
-    for p_WV in vertices.values():
         assert (p_WV[:, :2].min(axis=0) < points.min(axis=(0, 1))[:2] - 6.0 * INCH).all()
         assert (p_WV[:, :2].max(axis=0) > points.max(axis=(0, 1))[:2] + 6.0 * INCH).all()
 
@@ -63,18 +62,6 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
     middle = (floor[1:, :-1] + floor[:-1, :-1]) / 2
     error = ground_heights(middle[..., :2], ground) - middle[..., 2]
     assert np.abs(error).max() < 0.01 * INCH
-    if isinstance(terrain, Incline):
-        assert floor.shape[:2] == (67, 19)  # nothing between whole inches
-
-
-@pytest.mark.parametrize("inches", [60, 1200])
-def test_a_large_flat_floor_has_lines_every_six_inches(inches, robot):
-    corners = np.array([[-6, -600], [inches, 600]])
-    floor = scene.floor_points(robot.ground, corners, INCHES)
-    spacing = 1 if inches == 60 else 6
-    assert np.diff(floor[:, 0, 0]) == pytest.approx(spacing * INCH)
-    assert floor[0, 0].tolist() == pytest.approx([-6 * INCH, -600 * INCH, 0.0])
-    assert floor[-1, -1].tolist() == pytest.approx([inches * INCH, 600 * INCH, 0.0])
 
 
 def test_bodies_of_any_structure_have_their_struts_and_nodes():
@@ -96,8 +83,6 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
         (path,) = (path for path in shapes if path.endswith(f"/node {name}"))
         assert shapes[path]["radius"] == radius
         np.testing.assert_allclose(moved[path][:3, 3], p_BN, rtol=0, atol=1e-12)
-    cables = {path.split("/")[2] for path in shapes if path.startswith("/cables/")}
-    assert cables == {"actuated", "passive"}
 
 
 def test_a_sample_places_bodies_and_cables_and_colours_feet():
@@ -107,15 +92,13 @@ def test_a_sample_places_bodies_and_cables_and_colours_feet():
     scene.place_robot(meshcat, robot.structure, walk, per_newton=1e-4)
     page = meshcat.StaticHtml()
     moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands(page, "set_transform")}
-    np.testing.assert_array_equal(moved["/robot/T3"][:3, 3], walk.p_WB.values[0, 2])
     for path, cable in zip(scene.cable_paths(robot.structure), robot.structure.cables, strict=True):
         start, end = walk.p_WN.values[0, [cable["node_a"], cable["node_b"]]]
         matrix = moved[path]
         np.testing.assert_allclose(matrix[:3, 3] - matrix[:3, 2] / 2, start, rtol=0, atol=1e-12)
         np.testing.assert_allclose(matrix[:3, 3] + matrix[:3, 2] / 2, end, rtol=0, atol=1e-12)
-    colours = {
-        c["path"]: c["value"] for c in commands(page, "set_property") if c["property"] == "color"
-    }
+    told = [c for c in commands(page, "set_property") if c["property"] == "color"]
+    colours = {c["path"]: c["value"] for c in told}
     lifted, stands = (colours[f"/robot/{body}/node {body} bottom_left"] for body in ("T1", "T2"))
     assert lifted != stands
     assert stands[:3] == pytest.approx(hex2color(scene.COLOURS["stance"]))
