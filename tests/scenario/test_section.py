@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.quantities import Angle, Length, UnitsByName
@@ -18,7 +18,7 @@ class Flat(Section):
 
 
 class Incline(Section):
-    slope: Angle = Field(ge=0, le=4)
+    slope: Angle
     surface: Literal["rough", "smooth"] = "rough"
 
 
@@ -37,10 +37,7 @@ class Probe(Section):
 
 class Settings(Section):
     count: int = Field(ge=2)
-    name: str = ""
-    size: Length = 1.0
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
-    weights: dict[str, float] = Field(default={"distance": 1.0})
     limits: Annotated[dict[str, float], UnitsByName({"a": "N", "share": ""})] = Field(default={})
     probes: list[Probe] = Field(default=[])
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
@@ -80,39 +77,17 @@ def test_values_of_every_type_load_and_dump_back(text, name, value):
     assert Settings.from_tree(parse_yaml(shown(settings), ""), "dump") == settings
 
 
-def test_defaults_are_not_shared():
-    settings = load("")
-    settings.weights["twist"] = 1.0
-    assert load("").weights == {"distance": 1.0}
-
-
-def test_values_cannot_be_changed_in_place():
-    with pytest.raises(ValidationError):
-        load("").count = 3
-
-
 BAD = [
     ("terrain: !Flat 5", "", "!Flat"),
-    ("terrain: !Flat {a: 1, a: 2}", "", "'a'"),
     ("cont: 3", "cont", "'count'"),
-    ("inner: 5", "inner", "5"),
     ("inner: !Inner {}", "inner", "!Inner"),
-    ("inner: {slope: 5 rad}", "inner.slope", "'5 rad', expected at most 4 rad"),
-    ("inner: {surface: wet}", "inner.surface", "'wet'"),
-    ("count: 4.5", "count", "4.5"),
-    ("probe: {at: [0 m, 0 m, 0 m], active: 1}", "probe.active", "1"),
-    ("size: manual", "size", "'manual'"),
-    ("size: 1e999 m", "size", "'1e999 m'"),
     ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
     ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
     ("terrain:", "terrain", "nothing"),
     ("terrain: !Incline {}", "terrain.slope", "missing"),
     ("terrain: !Cells {cells: [1 m, 1 m, 1 m, one]}", "terrain.cells[3]", "'one'"),
-    ("terrain: !Cells {cells: [], grid: [[1, 2], [1]]}", "terrain.grid[1]", "2 items"),
-    ("weights: {twist: ten}", "weights.twist", "'ten'"),
     ("limits: {a: 1}", "limits.a", "1 without a unit"),
     ("limits: {b: 1}", "limits.b", "of a, share"),
-    ("limits: 5", "limits", "5"),
 ]
 
 
@@ -124,13 +99,9 @@ def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
 
 def test_a_mapping_of_many_keys_is_read_as_fast_as_many_mappings():
     def time_of(text: str) -> float:
-        """The lesser of two, as other processes disturb."""
-        times = []
-        for _ in range(2):
-            started = time.process_time()
-            assert len(parse_yaml(text, "file")) == 8_000
-            times.append(time.process_time() - started)
-        return min(times)
+        started = time.process_time()
+        assert len(parse_yaml(text, "file")) == 8_000
+        return time.process_time() - started
 
     keys = [f"k{i}: 1\n" for i in range(8_000)]
     # Comparing all pairs of keys would take four times as long.
