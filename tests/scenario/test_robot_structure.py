@@ -7,9 +7,9 @@ import pytest
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Member, StructureFile
-from tetra_drake.scenario.section import Tree, written
+from tetra_drake.scenario.section import Tree
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
+from tetra_drake.scenario.yaml_text import parse_yaml
 
 IN = 0.0254
 
