@@ -158,19 +158,6 @@ def test_a_heavy_structure_rests_on_its_own_struts():
     assert pushes.any() and np.ptp(heights) < 0.1
 
 
-def test_struts_that_cross_at_first_come_apart():
-    # The upper triangle is turned until all three bars, of the same lengths, meet on the axis.
-    tree = read_structure("prism").model_dump()
-    length = np.linalg.norm(np.subtract(tree["nodes"]["n4"], tree["nodes"]["n0"]))
-    height = math.sqrt(length**2 - 0.2**2)
-    for node, below in (("n4", "n0"), ("n5", "n1"), ("n3", "n2")):
-        x, y, _ = tree["nodes"][below]
-        tree["nodes"][node] = [-x, -y, height]
-    crossed, apart = places(on_ground(tree)), places(Robot.of(load_scenario("prism")))
-    for node, place in apart.items():
-        assert crossed[node][2] == pytest.approx(place[2], abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("tree", "force"),
     [

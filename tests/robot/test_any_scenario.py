@@ -11,19 +11,9 @@ from tetra_drake.scenario.load import dump_scenario, load_scenario
 ANY = {
     "cpg.signals": ["live", "listing"],
     "cpg.feedback": [[], ["length"], ["load", "pitch"]],
-    "cpg.reach": [None, 0, 1],
-    "friction": ["!ResetIntegrator", "!Coulomb", "!Coulomb {static: 0.9, lateral: 3}"],
-    "terrain": [
-        "!Flat",
-        "!Incline {slope: 20 deg}",
-        "!Rough {amplitude: 1 mm, wavelength: 5 cm}",
-        "!Obstacles {height: 5 mm, radius: 2 cm, spacing: 6 cm}",
-    ],
-    "actuation": [
-        "!Force",
-        "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}",
-        "!TensionMotor {max_force: 10 N, max_speed: 1 m/s, time_constant: 20 ms}",
-    ],
+    "friction": ["!ResetIntegrator", "!Coulomb {static: 0.9, lateral: 3}"],
+    "terrain": ["!Incline {slope: 20 deg}", "!Rough {amplitude: 1 mm, wavelength: 5 cm}"],
+    "actuation": ["!Force", "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}"],
     "engine": ["!Drake", "!Compiled"],
 }
 ROW = {

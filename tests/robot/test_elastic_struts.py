@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
-import pydantic
 import pytest
 from helpers.anchored import scenario_of
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.robot_structure import StructureFile
 
 G, MASS, LOAD = 9.80665, 2.0, 500.0
 SOFT, HARD = 1e5, 1e6
@@ -36,13 +34,3 @@ def test_a_rod_gives_way_and_vibrates_as_springs_in_series(stiffness, springs):
     assert -1.0 - study.nodes.z["end"] == pytest.approx((LOAD + MASS * G) / series, rel=1e-6)
     expected = math.sqrt(series / MASS) / (2.0 * math.pi)
     assert np.abs(study.frequencies / expected - 1.0).min() < 1e-5
-
-
-def test_a_strut_of_a_body_of_several_struts_is_rigid():
-    make = {"diameter": 0.01, "density": 1e3, "node_diameter": 0.0, "axial_stiffness": 1e5}
-    tree = {
-        "nodes": {"a": [0.0, 0.0, 0.0], "b": [0.0, 0.0, 1.0], "c": [1.0, 0.0, 1.0]},
-        "struts": {"bent": make | {"pairs": [["a", "b"], ["b", "c"]]}},
-    }
-    with pytest.raises(pydantic.ValidationError, match=r"struts\.bent\.axial_stiffness.*bent a b"):
-        StructureFile.model_validate(tree)

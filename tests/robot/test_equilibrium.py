@@ -42,25 +42,12 @@ def test_rests_where_the_independent_simulation_does(robot, data):
     np.testing.assert_allclose(normal, expected["normals"], atol=atol)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {
-            "robot.tetrahedra": 3,
-            "robot.offsets": [[0, 0, 0], ["2 mm", "1 mm", "1 mm"], [0, 0, "3 mm"]],
-        },
-        # Base triangles so near that the robot tips forward, onto the lead's tip.
-        {
-            "robot.tetrahedra": 2,
-            "robot.spacing": "0.055 m",
-            "robot.cables.inner_stiffness": "26.0 N/m",
-        },
-    ],
-)
-def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
+def test_a_walk_that_is_not_driven_ends_there(scenario):
     # Feet creep under stiction: an error of 3 mm at the start falls to 2e-7 of a length in 20 s.
     still = {"cpg.start_up": "100.0 s", "simulation.duration": "20.0 s", "engine": "!Compiled"}
-    scenario = scenario.with_changes(still | changes)
+    # Base triangles so near that the robot tips forward, onto the lead's tip.
+    still |= {"robot.tetrahedra": 2, "robot.spacing": "0.055 m"}
+    scenario = scenario.with_changes(still | {"robot.cables.inner_stiffness": "26.0 N/m"})
     walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory
     np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).equilibrium.lengths, rtol=1e-6)
 

@@ -113,6 +113,7 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
         ("unit: kg", "unit", ["'kg'"]),
         ("actuated: {left: [side b e]}", "actuated.left[0]", ["'side b e'", "mean 'side b d'"]),
         ("actuated: {right: [side c d, side b d]}", "actuated.right[1]", ["'left'"]),
+        ("struts: {leg: {axial_stiffness: 1 N/m}}", "struts.leg.axial_stiffness", ["a c", "rigid"]),
         ("anchors: {q: xyz}", "anchors.q", ["'q'"]),
         ("anchors: {a: xw}", "anchors.a", ["'xw'", "x, y and z"]),
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xz}}", "nodes.h", ["no strut", "xyz"]),
