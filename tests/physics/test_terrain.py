@@ -109,13 +109,8 @@ def test_a_robot_that_starts_in_the_ground_or_off_the_grid_is_refused(ground, re
             ground(terrain)
 
 
-@pytest.mark.parametrize(
-    "terrain",
-    [Incline(slope=0.1), Steps(height=INCH, depth=6.0 * INCH, count=3)],
-    ids=["incline", "steps"],
-)
-def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground(terrain):
-    robot = Robot.of(load_scenario("six_bar").with_changes({"terrain": terrain}))
+def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground():
+    robot = Robot.of(load_scenario("six_bar").with_changes({"terrain": Incline(slope=0.1)}))
     start = node_positions(robot.structure, robot.structure.initial_state)
     gaps = ground_frames(start[robot.structure.contacts], robot.ground)[:, GAP]
     depth = robot.weight / 3.0 / robot.scenario.ground.stiffness  # three feet bear it

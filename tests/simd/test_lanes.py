@@ -125,13 +125,6 @@ def test_a_kernel_is_compiled_once_for_lengths_not_in_the_type(any_size, compila
     assert len(last.signatures) == compilations
 
 
-def test_a_lane_table_is_zeros_that_begin_where_a_register_may_load_them(width):
-    for table in [lane_table((2, 3, 5), width) for _ in range(9)]:  # in different places
-        assert table.address == table.array.ctypes.data
-        assert table.address % 64 == 0  # bytes: eight doubles
-        assert table.array.flags.c_contiguous and not table.array.any()
-
-
 @jit
 def swap(x):
     x[0], x[1] = x[1], x[0]
