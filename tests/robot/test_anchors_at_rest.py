@@ -40,38 +40,6 @@ def test_a_held_bar_swings_at_the_frequency_of_a_physical_pendulum():
     assert study.nodes.anchor_z["a"] == pytest.approx(mass * G, rel=1e-6)
 
 
-@pytest.mark.parametrize("push", [0.0, 0.7])
-def test_two_cables_in_a_v_carry_a_load(push):
-    # The node where they meet is to rest at the origin: tensions by balance, free lengths by them.
-    load = 3.0
-    tree = {
-        "nodes": {
-            "left": [-0.3, 0.0, 0.4],
-            "right": [0.5, 0.0, 0.6],
-            "a": [0.01, 0.0, -0.02],
-            "b": [0.01, 0.0, -0.22],
-        },
-        "struts": {"bar": BAR},
-        "anchors": {"left": "xyz", "right": "xyz"},
-        "loads": {"a": [push, 0.0, -load]},
-    }
-    held = tree["anchors"] | {"a": "xyz"}
-    weight = Robot.of(scenario_of(tree | {"anchors": held})).weight
-    along = np.array([[-0.6, 0.8], [0.5 / math.hypot(0.5, 0.6), 0.6 / math.hypot(0.5, 0.6)]]).T
-    tensions = np.linalg.solve(along, [-push, load + weight])
-    free = np.array([0.5, math.hypot(0.5, 0.6)]) - tensions / K
-    law = {"stiffness": K, "damping": 0.5}
-    tree["cables"] = {
-        side: law | {"pairs": [[side, "a"]], "free_length": length}
-        for side, length in zip(("left", "right"), free.tolist(), strict=True)
-    }
-    study = study_equilibrium(Robot.of(scenario_of(tree)))
-    np.testing.assert_allclose(study.nodes.loc["a", ["x", "y", "z"]].astype(float), 0.0, atol=1e-11)
-    assert study.cables["tension"].to_list() == pytest.approx(tensions.tolist(), rel=1e-9)
-    forces = study.nodes[["anchor_x", "anchor_y", "anchor_z"]].sum()
-    np.testing.assert_allclose(forces, [-push, 0.0, load + weight], atol=1e-10)
-
-
 def test_reactions_balance_loads_and_weight():
     robot = Robot.of(supported_prism())
     study = study_equilibrium(robot)

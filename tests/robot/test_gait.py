@@ -181,11 +181,3 @@ def test_random_gaits_are_uniform_within_the_bounds(scenario):
     assert np.abs(weights.mean(axis=0) - 2.2).max() < 5 * 0.0155
     assert np.abs(weights.std(axis=0) - 0.693).max() < 0.05
     np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * taus)
-
-
-def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_path, scenario):
-    numbered = dict(zip(NAMES, range(1, 25), strict=True))
-    gait = load_gait(write(tmp_path, gait_file(weights=numbered, name="any")), scenario)
-    *_, first, _, _, last = [line.split() for line in str(gait).splitlines()]
-    assert first == ["1", "-", "1.00/4.00", "2.00/5.00", "3.00/6.00"]
-    assert last == ["4", "19.00/22.00", "20.00/23.00", "21.00/24.00", "-"]

@@ -47,12 +47,9 @@ ROUGH = {"terrain": "!Rough {amplitude: 0.1 in, wavelength: 2 in}"}
 @pytest.mark.parametrize(
     "spreads",
     [
-        {DAMPING: 0.2},
         {OTHER: 0.1, DAMPING: 0.2, RANGE: 0.1},
-        {RANGE: 0.1, DAMPING: 0.2, OTHER: 0.1},
         {f"{OTHER}, {RANGE}": 0.1, DAMPING: 0.2},
     ],
-    ids=["alone", "second", "second of others", "after joined keys"],
 )
 def test_what_else_is_disturbed_changes_no_number_of_a_draw(scenario, spreads):
     both = {"draws": 2, "start": 0.1}

@@ -129,8 +129,6 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
             ["two fixed nodes"],
         ),
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, masses: {h: 1 g}}", "masses.h", ["fixed"]),
-        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, loads: {h: [0, 0, 0]}}", "loads.h", ["fixed"]),
-        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, contacts: [h]}", "contacts[0]", ["fixed"]),
     ],
 )
 def test_problems_name_key_and_facts(changes: str, key: str, facts: list[str], refused) -> None:

@@ -34,15 +34,6 @@ def grid_of(terrain: Terrain) -> Grid:
     return terrain.grid(ahead=AHEAD, source="file")
 
 
-def points(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """x of the rows and y of the columns."""
-    x, y = (
-        corner + cell * np.arange(size)
-        for corner, cell, size in zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
-    )
-    return x, y
-
-
 def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """The biquadratic B-spline whose control points are the heights."""
     axes = zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
@@ -54,11 +45,9 @@ def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def test_a_grid_covers_the_way_and_more(terrain):
     # Half a cell within its outermost heights, the surface has all the heights it is made of.
     grid = grid_of(terrain)
-    x, y = points(grid)
-    half = 0.5 * np.array(grid.cell)
-    assert x[0] + half[0] <= -24 * IN and x[-1] - half[0] >= 120 * IN
-    assert y[0] + half[1] <= -30 * IN and y[-1] - half[1] >= 30 * IN
-    assert min(grid.heights.shape) >= 3
+    first = np.add(grid.corner, np.multiply(0.5, grid.cell))
+    last = first + np.multiply(np.array(grid.heights.shape) - 2, grid.cell)
+    assert (first <= [-24 * IN, -30 * IN]).all() and (last >= [120 * IN, 30 * IN]).all()
 
 
 @pytest.mark.parametrize("slope", [0.09, -0.5])
@@ -151,12 +140,10 @@ def test_a_height_file_has_rows_along_x(tmp_path, suffix):
     [
         (np.array([[0.0] * 3, [0.0, np.nan, 0.0], [0.0] * 3]), "nan in row 2, column 2"),
         (np.array([[0.0] * 3, [0.0, 0.0, -1e7], [0.0] * 3]), "-10000000.0 in row 2, column 3"),
-        (HEIGHTS[:2], "2 x 4"),
         (HEIGHTS[None], "1 x 3 x 4"),
         (np.zeros((2000, 2001), dtype=np.int8), "2000 x 2001"),
         (np.array([[{}] * 3] * 3), "heights.npy"),
     ],
-    ids=lambda value: None if isinstance(value, np.ndarray) else value,
 )
 def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
     np.save(tmp_path / "heights.npy", heights, allow_pickle=True)
@@ -219,12 +206,6 @@ def test_a_saved_field_does_not_need_the_file_it_was_read_from(tmp_path, damage,
     loaded = load_scenario(moved / SCENARIO)
     assert loaded == scenario
     assert np.array_equal(grid_of(loaded.terrain).heights, HEIGHTS)
-    save_scenario(tmp_path / "again", loaded)
-    files = [
-        {file.name: file.read_bytes() for file in folder.iterdir()}
-        for folder in (moved, tmp_path / "again")
-    ]
-    assert files[0] == files[1]
 
     (copy,) = (file for file in moved.iterdir() if file.name != SCENARIO)
     copy.unlink() if damage == "gone" else write_heights(copy, 2.0 * HEIGHTS)

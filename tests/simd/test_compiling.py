@@ -87,51 +87,6 @@ def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(package, tmp_pa
     assert values_and_hits() == ["2.0 0"] * 3
 
 
-TWICE = """
-from tetra_drake.simd.compiling import compiled
-
-@compiled
-def twice(x):
-    return x + x
-"""
-
-AT_ONCE = """
-import os, sys, time
-from pathlib import Path
-from twice import twice
-
-replace = os.replace
-
-def wait(*paths):  # until another process, too, is about to write
-    os.replace = replace
-    Path(sys.argv[1]).touch()
-    while not Path(sys.argv[2]).exists():
-        time.sleep(0.01)
-    replace(*paths)
-
-os.replace = wait
-print(twice(eval(sys.argv[3])))
-"""
-
-
-@pytest.mark.slow
-def test_processes_that_save_at_once_do_not_spoil_the_cache(package, tmp_path):
-    (package / "twice.py").write_text(TWICE)
-    environment = os.environ | {"PYTHONPATH": str(package), "NUMBA_CACHE_DIR": str(tmp_path)}
-    here, there = str(tmp_path / "here"), str(tmp_path / "there")
-
-    def start(*arguments: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-c", *arguments]
-        return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
-
-    both = start(AT_ONCE, here, there, "21"), start(AT_ONCE, there, here, "0.25")
-    assert [process.communicate(timeout=60)[0] for process in both] == ["42\n", "0.5\n"]
-    later = (
-        "from twice import twice; print(twice(21), twice(0.25), *twice.stats.cache_hits.values())"
-    )
-    assert start(later).communicate(timeout=60)[0].split() == ["42", "0.5", "1", "1"]
-
-
 def twice(x):
     return x + x
 
@@ -141,6 +96,20 @@ def folder(tmp_path, monkeypatch):
     """Where numba keeps machine code."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     return tmp_path
+
+
+def test_processes_that_save_at_once_do_not_spoil_the_cache(folder, monkeypatch):
+    replace, other = os.replace, compiled(twice)
+
+    def after_another(*paths):
+        monkeypatch.setattr(os, "replace", replace)
+        other(0.25)
+        replace(*paths)
+
+    monkeypatch.setattr(os, "replace", after_another)
+    assert compiled(twice)(21) == 42
+    later = compiled(twice)
+    assert (later(21), later(0.25), *later.stats.cache_hits.values()) == (42, 0.5, 1, 1)
 
 
 def truncate(file: Path, other: Path) -> None:

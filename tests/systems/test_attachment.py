@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat, SceneGraph
+from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
@@ -228,20 +228,15 @@ def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
     for height in (0.5, 1.0, 1.5):
         place = RigidTransform([0.0, 0.0, height])
         plant.SetFreeBodyPose(plant.GetMyMutableContextFromRoot(root), ball, place)
-        ends = np.sort(shown_cylinders(scene_graph, scene_graph.GetMyContextFromRoot(root)), axis=0)
-        assert (ends.min(), ends.max()) == pytest.approx((0.0, height))
-        assert (ends[1:, 0] <= ends[:-1, 1] + 1e-12).all()  # no gap
-
-
-def shown_cylinders(scene_graph: SceneGraph, context: object) -> np.ndarray:
-    """Lower and upper ends (cylinders, 2) of all upright cylinders in m."""
-    query = scene_graph.get_query_output_port().Eval(context)
-    inspector, ends = query.inspector(), []
-    for geometry in inspector.GetAllGeometryIds():
-        half = inspector.GetShape(geometry).length() / 2
-        height = query.GetPoseInWorld(geometry).translation()[2]
-        ends.append([height - half, height + half])
-    return np.array(ends)
+        context = scene_graph.GetMyContextFromRoot(root)
+        query = scene_graph.get_query_output_port().Eval(context)
+        inspector = query.inspector()
+        pieces = inspector.GetAllGeometryIds()
+        middles = np.sort([query.GetPoseInWorld(piece).translation()[2] for piece in pieces])
+        (length,) = {inspector.GetShape(piece).length() for piece in pieces}
+        assert middles[0] - length / 2 == pytest.approx(0.0)
+        assert middles[-1] + length / 2 == pytest.approx(height)
+        assert np.diff(middles).max() <= length + 1e-12, "no gap"
 
 
 def test_a_robot_is_shown_in_meshcat_with_struts_nodes_and_cables():
