@@ -14,7 +14,6 @@ from tetra_drake.results.measures import (
     intervals,
     last_step,
     relative_distances,
-    share_of_time,
 )
 
 TIMES = np.linspace(0.0, 15.0, 1501)
@@ -50,12 +49,6 @@ def test_the_distance_is_that_of_the_first_marker_or_of_the_centre(walk):
 )
 def test_intervals(active, expected):
     assert intervals(np.array([0.0, 1.0, 2.0, 4.0, 8.0]), np.array(active, dtype=bool)) == expected
-
-
-def test_the_share_of_time_is_that_of_the_intervals(walk):
-    late = walk.sel(time=slice(8.0, None)).time
-    assert share_of_time(late < 0.0) == 0.0
-    assert share_of_time(late >= late.mean()) == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize("times", [TIMES, UNEVEN], ids=["even", "uneven"])

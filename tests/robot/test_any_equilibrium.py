@@ -73,26 +73,24 @@ def test_bodies_stay_where_they_are_if_their_cable_is_slack(gravity, height):
 
 
 def test_a_chain_of_bars_hangs_straight_from_wherever_it_is_let_go():
-    # A mechanism that only gravity holds: three bars and three cables, all bent at first.
+    # A mechanism that only gravity holds: two bars and two cables, all bent at first.
     nodes = {
         "top": [0.0, 0.0, 2.0],
         "a": [0.3, 0.1, 2.0],
         "b": [0.5, 0.1, 2.1],
         "c": [0.6, 0.3, 2.1],
         "d": [0.8, 0.3, 2.0],
-        "e": [0.8, 0.2, 1.8],
-        "f": [0.9, 0.0, 1.9],
     }
-    struts = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"], ["e", "f"]]}}
-    line = {"pairs": [["top", "a"], ["b", "c"], ["d", "e"]], "free_length": 0.2}
+    struts = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}}
+    line = {"pairs": [["top", "a"], ["b", "c"]], "free_length": 0.2}
     tree = {"nodes": nodes, "struts": struts, "cables": {"line": LOOSE | line}}
     robot = Robot.of(scenario_of(tree | {"anchors": {"top": "xyz"}}))
     mass = robot.structure.mass
-    below = np.array([mass.sum(), mass[1:].sum(), mass[2]]) * G  # N, borne by each cable
+    below = np.array([mass.sum(), mass[1]]) * G  # N, borne by each cable
     assert tensions(robot) == pytest.approx(below, rel=1e-9)
     bars = [np.linalg.norm(np.subtract(nodes[j], nodes[i])) for i, j in struts["bar"]["pairs"]]
     end = 2.0 - sum(bars) - (0.2 + below / 100.0).sum()
-    assert places(robot)["f"] == pytest.approx([0.0, 0.0, end], abs=1e-9)
+    assert places(robot)["d"] == pytest.approx([0.0, 0.0, end], abs=1e-9)
 
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e6, 1e9])

@@ -19,7 +19,6 @@ ANY = {
 ROW = {
     "robot.tetrahedra": [2, 3, 9],
     "robot.contacts": ["all", "thesis"],
-    "robot.spacing": ["balanced", "1 in", "5 in"],
     "robot.cables.slack": [True, False],
     "robot.actuation": [[], [["outer top"]], [["outer bottom_left"], ["outer bottom_right"]]],
 }

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from tetra_drake.robot.robot import make_structure
-from tetra_drake.scenario.changes import Part, merged
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.scenario.refusals import TAG
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -81,29 +79,18 @@ def test_a_mapping_changes_what_it_names_as_in_a_file(load_text, scenario):
     )
 
 
+def test_a_mapping_of_free_keys_and_a_kind_of_another_tag_are_replaced_as_a_whole(scenario):
+    changed = scenario.with_changes({"objective": {"speed": "3 s/m"}, "friction": "!Coulomb {}"})
+    assert (changed.objective, changed.friction) == ({"speed": 3.0}, Coulomb())
+    added = scenario.with_changes({"objective.speed": "3 s/m"}).objective
+    assert added == scenario.objective | {"speed": 3.0}, "a key with a dot is added"
+
+
 def test_a_dataclass_replaces_its_section_as_a_whole(scenario):
     other = QualityDiversity(measures={"distance": [0.0, 1.0], "lifted": [0.0, 1.0]}, draws=3)
     mapped = scenario.with_changes({"optimizer": other})
     twist = QualityDiversity(measures={"twist": [0.0, 0.1], "lifted": [0.0, 1.0]})
     assert mapped.with_changes({"optimizer": twist}).optimizer == twist
-
-
-BASE = {"objective": {"speed": 1, "twist": 2}, "friction": {TAG: "A", "x": 1, "y": 2}, "list": [1]}
-
-
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({"friction": {"x": 3}}, {"friction": {TAG: "A", "x": 3, "y": 2}}),
-        ({"friction": {TAG: "B", "x": 3}}, {"friction": {TAG: "B", "x": 3}}),
-        ({"friction": None}, {"friction": None}),
-        ({"objective": {"speed": 3}}, {"objective": {"speed": 3}}),
-        ({"objective": Part(speed=3)}, {"objective": {"speed": 3, "twist": 2}}),
-        ({"list": [2, 3]}, {"list": [2, 3]}),
-    ],
-)
-def test_the_rules_of_merging(changes, expected):
-    assert merged(BASE, changes) == BASE | expected
 
 
 def test_a_robot_from_python_keeps_its_spacing(scenario):

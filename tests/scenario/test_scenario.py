@@ -68,6 +68,7 @@ def test_the_thesis_objective_is_equation_10(scenario):
 
 LEFT = ["outer bottom_left"]
 LOAD = {"cpg.feedback": ["load"]}
+MAP = "!QualityDiversity {measures: {lifted: [0, 1], tension: [4 N, 0 N]}}"
 BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"robot.payload": ["35 g"]}, "robot.payload", "1 items"),
     ({"engine": "compiled"}, "engine", "!Compiled"),
@@ -82,6 +83,7 @@ BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
     ({"gait_bounds.tau_a_min": "0.6 s"}, "gait_bounds.tau_a_min", "0.6"),
     ({"robot.strut_length": "1e-15 m"}, "robot.strut_length", "1e-06 m to 10000 m"),
+    ({"optimizer": MAP}, "optimizer.measures.tension", "4"),
     # What no memory holds
     ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
     ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
@@ -197,11 +199,6 @@ BAD = [
     ("robot: {spacing: &own [*own]}", "", "recursive"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
     ("terrain: !Steps {height: 1 in, depth: 0.1 um, count: 2}", "terrain.depth", "4000000"),
-    (
-        "optimizer: !QualityDiversity {measures: {lifted: [0, 1], tension: [1 lbf, 0 lbf]}}",
-        "optimizer.measures.tension",
-        "4.4",
-    ),
 ]
 BAD_FILES = [
     ("name: mine", "robot", "missing"),
@@ -302,10 +299,3 @@ def test_nothing_is_shown_of_a_file_that_is_something_else(tmp_path, content, te
         load_scenario(write(tmp_path, text))
     assert "secret" not in str(caught.value)
     assert str(tmp_path / "any") in str(caught.value)
-
-
-@pytest.mark.parametrize("name", shipped_scenarios())
-def test_a_printed_scenario_fits_a_screen(name):
-    lines = str(load_scenario(name)).splitlines()
-    assert len(lines) <= 16 and max(map(len, lines)) <= 100
-    assert lines[0].startswith(f"scenario {name}: ")

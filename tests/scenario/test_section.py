@@ -22,12 +22,8 @@ class Incline(Section):
     surface: Literal["rough", "smooth"] = "rough"
 
 
-Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-
-
 class Cells(Section):
     cells: list[Annotated[Length, Field(gt=0)]]
-    grid: list[Pair] = Field(default=[])
 
 
 class Probe(Section):
@@ -39,7 +35,6 @@ class Settings(Section):
     count: int = Field(ge=2)
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
     limits: Annotated[dict[str, float], UnitsByName({"a": "N", "share": ""})] = Field(default={})
-    probes: list[Probe] = Field(default=[])
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
     inner: Incline
@@ -50,17 +45,9 @@ def load(text: str) -> Settings:
     return Settings.from_tree(merged(base, parse_yaml(f"{{{text} }}", "file")), "file")
 
 
-def shown(settings: Settings) -> str:
-    return dump_yaml(written(settings.model_dump()))
-
-
 GOOD: list[tuple[str, str, Any]] = [
     ("terrain: !Incline {slope: 180 deg}", "terrain", Incline(slope=np.pi, surface="rough")),
-    (
-        "terrain: !Cells {cells: [1 m, 50 cm], grid: [[1, 2], [3e-1, 4]]}",
-        "terrain",
-        Cells(cells=[1.0, 0.5], grid=[[1.0, 2.0], [0.3, 4.0]]),
-    ),
+    ("terrain: !Cells {cells: [1 m, 50 cm]}", "terrain", Cells(cells=[1.0, 0.5])),
     ("limits: {a: 1 kN, share: 0.5}", "limits", {"a": 1000.0, "share": 0.5}),
     ("ramps: [!Flat , !Incline {slope: 1 rad}]", "ramps", [Flat(), Incline(slope=1.0)]),
     ("ramps: [{slope: 1 rad}]", "ramps", [Incline(slope=1.0)]),  # without a tag, the first kind
@@ -74,13 +61,13 @@ GOOD: list[tuple[str, str, Any]] = [
 def test_values_of_every_type_load_and_dump_back(text, name, value):
     settings = load(text)
     assert repr(getattr(settings, name)) == repr(value)  # so that 1 is not 1.0
-    assert Settings.from_tree(parse_yaml(shown(settings), ""), "dump") == settings
+    dumped = dump_yaml(written(settings.model_dump()))
+    assert Settings.from_tree(parse_yaml(dumped, ""), "dump") == settings
 
 
 BAD = [
     ("terrain: !Flat 5", "", "!Flat"),
     ("cont: 3", "cont", "'count'"),
-    ("inner: !Inner {}", "inner", "!Inner"),
     ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
     ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
     ("terrain:", "terrain", "nothing"),
