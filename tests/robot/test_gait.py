@@ -76,7 +76,6 @@ BAD: list[tuple[object, str, str]] = [
     (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
     ('{"schema": 2, "schema": 2, "weights": {}, "tau_a_s": 0.3}', "", "twice"),
     ('{"tau_a_s": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits
-    (json.dumps(gait_file())[:100], "", "JSON"),
     ("[" * 100_000, "", "JSON"),
 ]
 

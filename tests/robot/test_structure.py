@@ -32,11 +32,6 @@ def start(structure: Structure) -> np.ndarray:
     return node_positions(structure, structure.initial_state).reshape(-1, 4, 3)
 
 
-def tumbling(structure: Structure) -> np.ndarray:
-    """A state with bodies turned any way."""
-    return disturbed(structure, 0, pose=1.0, speed=1.0)
-
-
 def test_struts_of_six_inches_join_all_nodes_base_vertical_and_tip_forward(structure):
     edges = [np.linalg.norm(structure.p_BN[i] - structure.p_BN[j]) for i, j in STRUTS]
     assert edges == pytest.approx([6 * IN] * 6, rel=1e-14)
@@ -124,7 +119,7 @@ def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(name):
         for body, node, p_BNi in nodes
     ]
     plant.Finalize()
-    context, state = plant.CreateDefaultContext(), tumbling(structure)
+    context, state = plant.CreateDefaultContext(), disturbed(structure, 0, pose=1.0, speed=1.0)
     plant.SetPositionsAndVelocities(context, state)
     p_WN = [frame.CalcPoseInWorld(context).translation() for frame in frames]
     v_WN = [frame.CalcSpatialVelocityInWorld(context).translational() for frame in frames]
@@ -135,7 +130,7 @@ def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(name):
 
 def test_a_quaternion_that_drifted_off_unit_length_still_is_a_rotation(structure):
     # The integrator does not keep quaternions at length 1.
-    state = tumbling(structure)
+    state = disturbed(structure, 0, pose=1.0, speed=1.0)
     p_WN = node_positions(structure, state)
     state[:35].reshape(5, 7)[:, :4] *= 1.01
     assert node_positions(structure, state) == pytest.approx(p_WN, abs=1e-12)

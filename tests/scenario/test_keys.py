@@ -35,5 +35,4 @@ def test_each_key_and_each_metric_is_explained(rows):
 def test_a_row_says_unit_limits_and_default(rows):
     assert rows["friction.damping"][:2] == ["N*s/m, > 0", "0.4 lbf*s/in"]
     assert rows["terrain.slope"][0] == "rad, ≥ -60 deg, ≤ 60 deg"
-    assert rows["robot.offsets"][:2] == ["list of (list of m, 3 items)", "none"]
     assert rows["engine.scheme"][:2] == ["`radau3` or `runge_kutta3`", "`radau3`"]

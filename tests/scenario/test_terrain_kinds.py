@@ -83,9 +83,8 @@ def test_rough_heights_are_uniform_and_never_above_the_floor():
 
 
 def test_a_seed_is_one_ground_on_every_machine():
-    first, again, other = (
-        grid_of(Rough(amplitude=0.5, wavelength=0.5, seed=seed)).heights for seed in (0, 0, 1)
-    )
+    grounds = (Rough(amplitude=0.5, wavelength=0.5, seed=seed) for seed in (0, 0, 1))
+    first, again, other = (grid_of(ground).heights for ground in grounds)
     # numpy's default_rng(0).random(3)
     drawn = np.array([0.6369616873214543, 0.2697867137638703, 0.04097352393619469])
     np.testing.assert_allclose(first[0, :3], drawn - 1.0, rtol=1e-14)

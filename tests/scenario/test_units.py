@@ -1,13 +1,17 @@
 """Text with units becomes SI numbers; anything else is refused."""
 
+from pathlib import Path
+
 import pytest
 
 from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.units import (
     INCH,
     POUND_FORCE,
     SYSTEMS,
+    Units,
     plainest,
     quantity_to_si,
     shown_in,
@@ -56,6 +60,15 @@ def test_people_read_numbers_of_the_same_size(system, unit, read):
     assert units.shown(2.5 * size, unit) == f"2.5 {read}"
 
 
+def units_of(scenario: Scenario, folder: Path) -> Units:
+    """The same as those of its record, which is in SI, and of a disturbed one."""
+    (folder / "record.yaml").write_text(dump_scenario(scenario))
+    recorded = load_scenario(folder / "record.yaml")
+    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
+    assert scenario.units == recorded.units == disturbed.units
+    return scenario.units
+
+
 @pytest.mark.parametrize(
     ("base", "changes", "expected"),
     [
@@ -66,11 +79,7 @@ def test_people_read_numbers_of_the_same_size(system, unit, read):
 )
 def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, tmp_path):
     scenario = load_scenario(base).with_changes(changes)
-    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))  # in SI
-    recorded = load_scenario(tmp_path / "record.yaml")
-    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
-    for shown in (scenario, recorded, disturbed):
-        assert shown.units == SYSTEMS[expected]
+    assert units_of(scenario, tmp_path) == SYSTEMS[expected]
     with shown_in("SI"):
         assert scenario.units == SYSTEMS["SI"]
     assert scenario.units == SYSTEMS[expected]
@@ -88,10 +97,7 @@ def test_a_structure_is_shown_in_the_unit_in_which_it_is_given(nodes, expected, 
     (tmp_path / "own.yaml").write_text(f"{nodes}\nstruts: {{rod: {strut}}}")
     robot = read_structure(tmp_path / "own.yaml")
     scenario = load_scenario("prism").with_sections(robot=robot)
-    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))
-    recorded = load_scenario(tmp_path / "record.yaml")
-    for shown in (scenario, recorded, scenario.with_changes({"robot.gravity": "9 m/s^2"})):
-        assert shown.units == SYSTEMS[expected]
+    assert units_of(scenario, tmp_path) == SYSTEMS[expected]
 
 
 @pytest.mark.parametrize(

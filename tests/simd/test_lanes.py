@@ -112,19 +112,6 @@ def test_inverse_square_root_is_within_two_units_in_the_last_place(width):
         assert max(errors) < 2.0
 
 
-@pytest.mark.parametrize(("any_size", "compilations"), [(False, 2), (True, 1)])
-def test_a_kernel_is_compiled_once_for_lengths_not_in_the_type(any_size, compilations):
-    @jit
-    def last(plane):
-        return plane[plane.shape[0] - 1, plane.shape[1] - 1]
-
-    for shape in [(2, 3), (5, 3), (2, 4)]:  # the first length is never in the type
-        table = lane_table(shape, 1, any_size=any_size)
-        table.array[-1, -1] = math.prod(shape)
-        assert last(table) == math.prod(shape)
-    assert len(last.signatures) == compilations
-
-
 @jit
 def swap(x):
     x[0], x[1] = x[1], x[0]
