@@ -96,7 +96,6 @@ def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
     [
         ("thesis", "0.05 N", "0.0048"),
         ("thesis", "2 lbf", ""),
-        ("winch", "5 N", "0.0058"),
         ("winch", "900 N", "-25 mm"),
         ("motors", "90 N", "22.5 N"),
     ],

@@ -108,17 +108,16 @@ def test_a_sphere_at_the_end_of_a_rod(tmp_path: Path) -> None:
     assert Structure.of(blueprint).mass == pytest.approx([rod + ball])
 
 
+QUARTER = "rotation: {axis: [0, 1, 0], angle: 90}"
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("entry", "front", "lowest"),
     [
         ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1], 0),
         ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1], -2),
-        (
-            "scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}",
-            [4, 4, -3],
-            -2,
-        ),
+        (f"scale: 3, translation: [1, 0, 0], {QUARTER}", [4, 4, -3], -2),
         ("offset: [5, 5, 5]", [1, 2, 1], 0),
     ],
 )
@@ -197,7 +196,7 @@ def test_a_structure_that_multiplies_is_refused_before_it_is_whole(part, tmp_pat
 def test_a_substructure_may_have_no_nodes(tmp_path: Path) -> None:
     """Such as one that holds builders only."""
     write(tmp_path, "builders: {rod: {class: tgRodInfo, parameters: {radius: 2}}}", "kinds.yaml")
-    entry = "{path: kinds.yaml, rotation: {axis: [0, 1, 0], angle: 90}, translation: [1, 0, 0]}"
+    entry = f"{{path: kinds.yaml, {QUARTER}, translation: [1, 0, 0]}}"
     given = read(write(tmp_path, f"{VERTEBRA}\nsubstructures: {{kinds: {entry}}}"))
     assert given.struts["rod"].diameter == pytest.approx(0.4)
 
