@@ -182,8 +182,8 @@ def changes(resting: Unactuated, state: np.ndarray, size: float) -> Iterator[lis
 
 @pytest.mark.parametrize(
     "scenario",
-    [load_scenario("thesis"), load_scenario("mast"), supported_prism(), floating_prism()],
-    ids=["thesis", "mast", "supported prism", "floating prism"],
+    [load_scenario("mast"), supported_prism(), floating_prism(), scenario_of(HUNG)],
+    ids=["mast", "supported prism", "floating prism", "hung"],
 )
 def test_stiffness_is_how_forces_change(scenario):
     robot = Robot.of(scenario)

@@ -51,19 +51,18 @@ def hinged_rod(builder: DiagramBuilder) -> tuple[MultibodyPlant, Frame]:
     return plant, tip
 
 
-def rod_with_tendons(
-    **constants: object,
-) -> tuple[DiagramBuilder, MultibodyPlant, Frame, list[Cable]]:
+Arm = tuple[DiagramBuilder, MultibodyPlant, Frame, list[Cable]]
+
+
+def rod_with_tendons(**constants: object) -> Arm:
     """The hinged rod, its free end, and two tendons to it from the world, by a law with other
     constants."""
     builder = DiagramBuilder()
     plant, tip = hinged_rod(builder)
-    cables = [
-        Cable(
-            name, AddFrame(plant, name, plant.world_frame(), place), tip, LAW._replace(**constants)
-        )
-        for name, place in {"left": LEFT, "right": RIGHT}.items()
-    ]
+    cables, law = [], LAW._replace(**constants)
+    for name, place in {"left": LEFT, "right": RIGHT}.items():
+        anchor = AddFrame(plant, name, plant.world_frame(), place)
+        cables.append(Cable(name, anchor, tip, law))
     plant.Finalize()
     return builder, plant, tip, cables
 
