@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.quantities import Angle, Length, UnitsByName
@@ -63,6 +63,11 @@ def test_values_of_every_type_load_and_dump_back(text, name, value):
     assert repr(getattr(settings, name)) == repr(value)  # so that 1 is not 1.0
     dumped = dump_yaml(written(settings.model_dump()))
     assert Settings.from_tree(parse_yaml(dumped, ""), "dump") == settings
+
+
+def test_values_cannot_be_changed_in_place():
+    with pytest.raises(ValidationError):
+        load("").count = 3
 
 
 BAD = [
