@@ -101,6 +101,20 @@ def test_forces_that_are_not_finite_end_the_search_at_once(scenario, robot, wher
         equilibrium_of(scenario, robot.structure, start)
 
 
+def test_a_step_whose_end_has_no_forces_is_too_long(robot, monkeypatch):
+    """Such as one on which the ends of a cable meet."""
+    expected, displaced, steps = robot.equilibrium.lengths, equilibrium.displaced, []
+
+    def first_meeting(resting, state, step):
+        steps.append(np.abs(step).max())
+        return displaced(resting, state, step if len(steps) > 1 else math.nan * step)
+
+    monkeypatch.setattr(equilibrium, "displaced", first_meeting)
+    again = Robot.of(robot.scenario).equilibrium
+    assert steps[1] <= 0.5 * steps[0]
+    assert np.array_equal(again.lengths, expected)
+
+
 def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
     monkeypatch.setattr(equilibrium, "LONG", -1.0)
     rest = robot.equilibrium

@@ -18,12 +18,6 @@ def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
     assert scenario.with_changes({}) == scenario
 
 
-@pytest.mark.parametrize("changes", [None, 3, "cpg.gain", [("cpg.gain", "3 N")], {3: "3 N"}])
-def test_what_are_no_changes_is_refused(scenario, changes, refused):
-    with refused("scenario thesis", "changes", repr(changes)):
-        scenario.with_changes(changes)
-
-
 STIFF = "cables: {outer_stiffness: 0.4 lbf/in}"
 
 

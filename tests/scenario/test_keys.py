@@ -30,9 +30,3 @@ def test_each_key_and_each_metric_is_explained(rows):
             assert key in rows, key
     assert METRICS.keys() <= rows.keys()
     assert [key for key, cells in rows.items() if not cells[-1]] == []
-
-
-def test_a_row_says_unit_limits_and_default(rows):
-    assert rows["friction.damping"][:2] == ["N*s/m, > 0", "0.4 lbf*s/in"]
-    assert rows["terrain.slope"][0] == "rad, ≥ -60 deg, ≤ 60 deg"
-    assert rows["engine.scheme"][:2] == ["`radau3` or `runge_kutta3`", "`radau3`"]

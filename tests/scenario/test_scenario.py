@@ -69,7 +69,8 @@ def test_the_thesis_objective_is_equation_10(scenario):
 LEFT = ["outer bottom_left"]
 LOAD = {"cpg.feedback": ["load"]}
 MAP = "!QualityDiversity {measures: {lifted: [0, 1], tension: [4 N, 0 N]}}"
-BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
+BAD_CHANGES: list[tuple[object, str, str]] = [
+    ([("cpg.gain", "3 N")], "changes", "[('cpg.gain', '3 N')]"),
     ({"robot.payload": ["35 g"]}, "robot.payload", "1 items"),
     ({"engine": "compiled"}, "engine", "!Compiled"),
     ({f"engine.{TAG}": {"a": 1}}, "engine", "!Compiled"),
