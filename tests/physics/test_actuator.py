@@ -24,14 +24,6 @@ def pull(drive: float, length: float, *, rate: float = 0.0, signal: float = 0.0)
     return motor_force(drive, length, rate, signal, CABLE, MOTOR)
 
 
-def test_a_winch_slows_down_before_the_least_length():
-    # 5 mm before it, at 5 mm / 50 ms; at it, it stops; below it, it pays out.
-    rates = [wind(drive, drive, signal=1e3).rate for drive in (0.055, 0.05, 0.04)]
-    assert rates == pytest.approx([-0.1, 0.0, 0.2])
-    assert wind(0.05, 0.05, signal=1e3).limited == 1.0
-    assert wind(0.05, 0.05, signal=15.0).limited == 0.0, "commanded just there"
-
-
 def random_pulls(count: int = 2000) -> list[tuple[float, float, float, float]]:
     """Drive (m), length (m), rate (m/s) and signal (N)."""
     generator = np.random.default_rng(0)

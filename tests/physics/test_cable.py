@@ -6,26 +6,10 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.cable import TENSION, CableLaw, cable_tension
+from tetra_drake.physics.cable import CableLaw, cable_tension
 from tetra_drake.physics.forces import Forces, compute_cable_forces
-from tetra_drake.physics.model import Model
-from tetra_drake.robot.structure import AddBodies, Structure
+from tetra_drake.robot.structure import AddBodies
 from tetra_drake.simd.packed import Packed
-
-
-@pytest.fixture
-def state(structure: Structure) -> np.ndarray:
-    """Near the start, every body turned, shifted and moving."""
-    return disturbed(structure, 1, pose=0.01, speed=1.0)
-
-
-def forces_of_cables(
-    model: Model, state: np.ndarray, *signals: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """The generalized force and the tensions."""
-    forces, force = Forces.of(model), np.empty(30)
-    compute_cable_forces(Packed((model, forces)), state, np.array(signals), force)
-    return force, forces.cable_forces[:, TENSION]
 
 
 def test_tension_is_equation_6():
@@ -33,7 +17,10 @@ def test_tension_is_equation_6():
     assert cable_tension(0.3, -0.25, 1.5, CableLaw(35.0, 8.0, 0.1)) == pytest.approx(6.5, rel=1e-15)
 
 
-def test_passive_cables_are_drakes_linear_spring_dampers(robot, structure, state):
+def test_passive_cables_are_drakes_linear_spring_dampers(robot, structure):
+    # Near the start, every body turned, shifted and moving.
+    state = disturbed(structure, 1, pose=0.01, speed=1.0)
+
     def acceleration(*, springs: bool, force: np.ndarray) -> np.ndarray:
         plant = MultibodyPlant(time_step=0.0)
         bodies = AddBodies(plant, structure)
@@ -49,7 +36,8 @@ def test_passive_cables_are_drakes_linear_spring_dampers(robot, structure, state
         plant.get_applied_generalized_force_input_port().FixValue(context, force)
         return plant.EvalTimeDerivatives(context).get_generalized_velocity().CopyToVector()
 
-    ours, _ = forces_of_cables(robot.model, state, 0.0, 0.0, 0.0, 0.0)
+    ours = np.empty(30)
+    compute_cable_forces(Packed((robot.model, Forces.of(robot.model))), state, np.zeros(4), ours)
     expected = acceleration(springs=True, force=np.zeros(30))
     found = acceleration(springs=False, force=ours)
     np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-9)

@@ -47,9 +47,6 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
         (0.01, P0, STICK, 1.0),
         (-0.01, P0, STICK, STICK),  # beyond the range, but moving inward
         (-0.01, -P0, STICK, -1.0),
-        (0.01, -P0, STICK, STICK),
-        (0.01, 5.0, 1.0, 1.0),
-        (0.0, 5.0, 1.0, STICK),
         (-0.01, 5.0, 1.0, STICK),
         (-0.01, -5.0, -1.0, -1.0),
         (0.01, -5.0, -1.0, STICK),
@@ -65,17 +62,8 @@ C, K, STATIC, KINETIC, NORMAL = 70.0, 1000.0, 0.6, 0.5, 0.2
 ALONG_X = (1.0, 0.0)
 
 
-def law(*, forward: float = 1.0, backward: float = 1.0, lateral: float = 1.0) -> CoulombConstants:
-    """With directional factors."""
-    return CoulombConstants(
-        static=STATIC,
-        kinetic=KINETIC,
-        stiffness=K,
-        damping=C,
-        per_forward=1.0 / forward,
-        per_backward=1.0 / backward,
-        per_lateral=1.0 / lateral,
-    )
+SAME = {"per_forward": 1.0, "per_backward": 1.0, "per_lateral": 1.0}  # in all directions
+LAW = CoulombConstants(static=STATIC, kinetic=KINETIC, stiffness=K, damping=C, **SAME)
 
 
 def slide(v=(0.0, 0.0), x=(0.0, 0.0), mode=(0.0, 0.0), heading=ALONG_X) -> Slide:
@@ -88,14 +76,14 @@ def slide(v=(0.0, 0.0), x=(0.0, 0.0), mode=(0.0, 0.0), heading=ALONG_X) -> Slide
 @pytest.mark.parametrize("angle", [0.0, 1.0, 2.5])
 def test_the_force_is_limited_by_the_load_and_opposes_the_motion(mode, coefficient, angle):
     v = 0.05 * math.cos(angle), 0.05 * math.sin(angle)
-    force = coulomb_force(slide(v=v, mode=mode), law())
+    force = coulomb_force(slide(v=v, mode=mode), LAW)
     expected = [-coefficient * NORMAL * each / 0.05 for each in v]
     assert force == pytest.approx(expected, rel=1e-12)
 
 
 def test_slow_slip_is_viscous_and_forgets_the_bristle():
     # c v = 0.07 N < 0.5 * 0.2 N
-    force = coulomb_force(slide(v=(1e-3, 0.0), x=(1.0, 1.0), mode=ALONG_X), law())
+    force = coulomb_force(slide(v=(1e-3, 0.0), x=(1.0, 1.0), mode=ALONG_X), LAW)
     assert force == pytest.approx((-0.07, 0.0), rel=1e-12)
 
 
@@ -104,7 +92,6 @@ def test_slow_slip_is_viscous_and_forgets_the_bristle():
     [
         ((1e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (0.0, 0.0)),  # 0.107 N < 0.6 * 0.2 N
         ((3e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (1.0, 0.0)),  # 0.121 N
-        ((0.0, 3e-4), (0.0, 1e-4), (0.0, 0.0), (0.0, 1.0)),
         ((-1e-4, 0.0), (2e-4, 0.0), (0.0, 0.0), (0.0, 0.0)),  # 0.193 N, but moving back
         ((1.5e-3, 0.0), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0)),  # 0.105 N > 0.5 * 0.2 N: slips on
         ((0.0, 1.5e-3), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0)),  # whichever way
@@ -114,7 +101,7 @@ def test_slow_slip_is_viscous_and_forgets_the_bristle():
 )
 def test_breaks_free_beyond_the_static_limit_and_sticks_below_the_kinetic_one(v, x, before, after):
     with np.errstate(invalid="ignore"):  # a pull of 0 has no direction, and none is chosen
-        mode = next_coulomb_mode(slide(v=v, x=x, mode=before), law())
+        mode = next_coulomb_mode(slide(v=v, x=x, mode=before), LAW)
     assert mode == pytest.approx(after, abs=1e-15)
 
 
@@ -125,12 +112,12 @@ def test_the_damping_is_the_derivative_of_the_force(mode, v):
 
     def force(dv: np.ndarray, dx: np.ndarray) -> np.ndarray:
         moved = slide(v=tuple(np.array(v) + dv), x=tuple(np.array(x) + dx), mode=mode)
-        return np.array(coulomb_force(moved, law()))
+        return np.array(coulomb_force(moved, LAW))
 
     zero, expected = np.zeros(2), np.zeros((2, 2))
     for i, step in enumerate(h * np.eye(2)):
         by_velocity = (force(step, zero) - force(-step, zero)) / (2 * h)
         by_deflection = (force(zero, step) - force(zero, -step)) / (2 * h)
         expected[:, i] = -(time * by_velocity + time**2 * by_deflection)
-    a, b, c = coulomb_damping(slide(v=v, x=x, mode=mode), time, law())
+    a, b, c = coulomb_damping(slide(v=v, x=x, mode=mode), time, LAW)
     np.testing.assert_allclose([[a, b], [b, c]], expected, atol=1e-6 * time * C)

@@ -58,9 +58,3 @@ def test_integrators_have_their_order(at_the_end, steps, order):
     exact = at_the_end(4096)
     coarse, fine = (np.abs(at_the_end(n) - exact).max() for n in (steps, 2 * steps))
     assert coarse / fine == pytest.approx(2.0**order, rel=0.15)
-
-
-def test_a_matrix_that_is_no_pairs_of_neurons_is_refused():
-    for shape in ((3, 3), (2, 4), (4,)):
-        with pytest.raises(ValueError, match="inhibition"):
-            Network.of(np.ones(shape), tau_a=0.3, tau_b=0.6, self_inhibition_weight=2.5)

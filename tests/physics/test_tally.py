@@ -14,8 +14,6 @@ from tetra_drake.simd.allocation import allocate
 CABLES = SimpleNamespace(signal=[0, PASSIVE])
 """The first is driven."""
 
-NO_DRIVES = np.zeros((0, DRIVE_COLUMNS))
-
 CARRIERS = np.array([0, 0, 1])
 """Two contacts of the first body and one of the second."""
 
@@ -24,68 +22,54 @@ NODES = np.zeros((3, NODE_COLUMNS))
 NODES[:, P_WN] = [-1.0, 1.0, 9.0]
 
 
-def tallied(
-    times,
-    *,
-    lengths,
-    signals,
-    tensions=None,
-    loads=None,
-    begins=0.0,
-    kind=DIRECT,
-    drives=None,
-    nodes=None,
-) -> Tally:
-    """The tally of the motion of both cables' length (k,), their tension and the contacts' loads
-    (k, 3) at times (k,); `drives` (k, drives, DRIVE_COLUMNS) are those of actuators of a kind. The
-    last of the `nodes` (k, nodes, NODE_COLUMNS) is fixed."""
+ALWAYS = {"lengths": 1.0, "signals": 1.0, "tensions": 1.0, "loads": 0.0}
+ALWAYS |= {"drives": np.zeros((0, DRIVE_COLUMNS)), "nodes": NODES}
+
+
+def tallied(times, *, begins=0.0, kind=DIRECT, **series) -> Tally:
+    """The tally of what is so at times (k,), ALWAYS where no series is given: both cables' length
+    (k,), the signal (k,), the tensions (k, 2), the contacts' loads (k, 3), the nodes (k, nodes,
+    NODE_COLUMNS), of which the last is fixed, and the drives (k, drives, DRIVE_COLUMNS) of
+    actuators of a kind."""
     tally = allocate(Tally, {"signals": 1, "cables": 2, "bodies": 2})
     tally.begins[0] = begins
     cable_forces, ground_forces = np.zeros((2, CABLE_FORCE_COLUMNS)), np.zeros((3, 3))
+    forces = SimpleNamespace(cable_forces=cable_forces, ground_forces=ground_forces)
     ground, actuator = SimpleNamespace(carriers=CARRIERS), SimpleNamespace(kind=kind)
-    first_node = np.array([0, (NODES if nodes is None else nodes[0]).shape[0] - 1])
-    robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator, first_node=first_node)
+    robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator)
     for k, time in enumerate(times):
-        cable_forces[:, LENGTH] = lengths[k]
-        cable_forces[:, TENSION] = 1.0 if tensions is None else tensions[k]
-        ground_forces[:, 2] = 0.0 if loads is None else loads[k]
+        now = ALWAYS | {name: values[k] for name, values in series.items()}
+        cable_forces[:, LENGTH], cable_forces[:, TENSION] = now["lengths"], now["tensions"]
+        ground_forces[:, 2] = now["loads"]
+        forces.nodes, forces.drives = now["nodes"], now["drives"]
+        robot.first_node = np.array([0, len(forces.nodes) - 1])
         # The rate of signals is 0 / 0 where no time has passed, which counts for nothing.
         with np.errstate(divide="ignore", invalid="ignore"):
-            signal = np.array([signals[k]])
-            driven = NO_DRIVES if drives is None else drives[k]
-            forces = SimpleNamespace(
-                nodes=NODES if nodes is None else nodes[k],
-                drives=driven,
-                cable_forces=cable_forces,
-                ground_forces=ground_forces,
-            )
-            observe(tally, robot, time, signal, forces)
+            observe(tally, robot, time, np.array([now["signals"]]), forces)
     return tally
 
 
 def test_sums_begin_with_the_first_step_that_is_whole_and_least_values_at_once():
     times, lengths = np.arange(6.0), np.array([5.0, 4.0, 3.0, 2.0, 1.0, 0.0])
-    signals, tensions = np.ones(6), np.array([3.0, -1.0, 2.0, 1.0, 1.0, 1.0])
-    tally = tallied(times, lengths=lengths, signals=signals, tensions=tensions, begins=1.5)
+    tensions = [3.0, -1.0, 2.0, 1.0, 1.0, 1.0]
+    tally = tallied(times, lengths=lengths, tensions=tensions, begins=1.5)
     assert tally.effort.work[0] == 3.0, "the steps from 2 s on work"
     assert tally.tension.of_all[0] == -1.0
-    assert tallied(times, lengths=lengths, signals=signals, begins=2.0).effort.work[0] == 3.0
+    assert tallied(times, lengths=lengths, begins=2.0).effort.work[0] == 3.0
     # What is seen twice counts once: a step that was rejected.
     twice = np.repeat(np.arange(6), 2)
-    tally = tallied(times[twice], lengths=lengths[twice], signals=signals[twice])
-    assert tally.effort.work[0] == 5.0
+    assert tallied(times[twice], lengths=lengths[twice]).effort.work[0] == 5.0
 
 
 def test_a_body_is_lifted_while_none_of_its_contacts_bears():
     loads = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 1, 1], [0, 0, 0.5], [0, 0, 0]])
     times = np.array([0.0, 1.0, 3.0, 6.0, 10.0, 15.0])  # a step is as its end
-    tally = tallied(times, lengths=np.ones(6), signals=np.ones(6), loads=loads)
+    tally = tallied(times, loads=loads)
     assert tally.lifted.time.tolist() == [3.0 - 1.0 + 10.0 - 6.0 + 5.0, 1.0 + 2.0 + 5.0]
 
 
 EFFORT = {
     "times": np.array([0.0, 1.0, 3.0, 4.0]),
-    "signals": np.zeros(4),
     "tensions": np.array([[9.0, 50.0], [2.0, 50.0], [3.0, 50.0], [4.0, 50.0]]),
 }
 """Three steps; the tension of the cable that is not driven is 50 N."""
@@ -93,50 +77,50 @@ EFFORT = {
 WOUND = np.array([1.0, 0.9, 0.5, 0.7])
 """0.1 m in 1 s, 0.4 m in 2 s, then 0.2 m paid out."""
 
-# Peaks: 9 N, 0.2 m/s, 3 N * 0.2 m/s. Sums: 1 * 2 + 2 * 3 + 1 * 4 N s, 0.1 + 0.4 + 0.2 m,
-# 2 N * 0.1 m + 3 N * 0.4 m, without what is paid out.
-PEAKS_AND_SUMS = {"peaks": [9.0, 0.2, 0.6], "sums": [12.0, 0.7, 1.4]}
+# 9 N, 0.2 m/s, 3 N * 0.2 m/s
+PEAKS = pytest.approx([9.0, 0.2, 0.6])
+# 1 * 2 + 2 * 3 + 1 * 4 N s, 0.1 + 0.4 + 0.2 m, 2 N * 0.1 m + 3 N * 0.4 m, without what is paid out
+SUMS = pytest.approx([12.0, 0.7, 1.4])
 
 
-def effort_of(tally: Tally) -> dict[str, list[float]]:
+def peaks(tally: Tally) -> list[float]:
+    """Of force, speed and power."""
     effort = tally.effort
-    peaks = [effort.peak_force[0], effort.peak_speed[0], effort.peak_power[0]]
-    return {"peaks": peaks, "sums": [effort.impulse[0], effort.wound[0], effort.pulled[0]]}
+    return [effort.peak_force[0], effort.peak_speed[0], effort.peak_power[0]]
+
+
+def sums(tally: Tally) -> list[float]:
+    """Of force by time, of lengths wound, and of the work on them."""
+    return [tally.effort.impulse[0], tally.effort.wound[0], tally.effort.pulled[0]]
 
 
 @pytest.mark.parametrize("kind", [DIRECT, TENSION_MOTOR])
 def test_actuators_without_a_winch_wind_what_their_cables_shorten(kind):
     drives = np.zeros((4, int(kind != DIRECT), DRIVE_COLUMNS))
     tally = tallied(lengths=WOUND, kind=kind, drives=drives, **EFFORT)
-    found = effort_of(tally)
-    assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
-    assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
-    assert tally.effort.limited[0] == 0.0
+    assert (peaks(tally), sums(tally), tally.effort.limited[0]) == (PEAKS, SUMS, 0.0)
 
 
 def test_winches_wind_their_free_length_and_are_limited_for_a_time():
     drives = np.zeros((4, 1, DRIVE_COLUMNS))
     drives[:, 0, DRIVE], drives[:, 0, LIMITED] = WOUND, [1.0, 0.0, 1.0, 1.0]
     tally = tallied(lengths=np.linspace(1.0, 9.0, 4), kind=WINCH, drives=drives, **EFFORT)
-    found = effort_of(tally)
-    assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
-    assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
-    assert tally.effort.limited[0] == pytest.approx(2.0 + 1.0)
+    assert (peaks(tally), sums(tally), tally.effort.limited[0]) == (PEAKS, SUMS, 2.0 + 1.0)
     assert tally.effort.work[0] == pytest.approx(1.4), "of the tension"
 
 
 def test_only_peaks_count_before_the_steady_stretch():
     tally = tallied(lengths=WOUND, begins=3.0, **EFFORT)
     # The last step, in which 0.2 m are paid out at 4 N.
-    assert effort_of(tally)["sums"] == [4.0, pytest.approx(0.2), 0.0]
-    assert effort_of(tally)["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
+    assert sums(tally) == pytest.approx([4.0, 0.2, 0.0])
+    assert peaks(tally) == PEAKS
 
 
 def test_a_peak_of_speed_counts_in_either_direction():
     tally = tallied(lengths=WOUND[::-1], **EFFORT)
-    assert effort_of(tally)["peaks"] == pytest.approx([9.0, 0.2, 0.4])
+    assert peaks(tally) == pytest.approx([9.0, 0.2, 0.4])
     paid_out = tallied(lengths=np.array([0.0, 0.1, 0.2, 0.9]), **EFFORT)
-    assert effort_of(paid_out)["peaks"] == pytest.approx([9.0, 0.7, 0.0])
+    assert peaks(paid_out) == pytest.approx([9.0, 0.7, 0.0])
 
 
 TIMES = np.linspace(0.0, 2.0, 401)
@@ -159,8 +143,7 @@ def rolled(position, *, begins=0.0) -> float:
     for k, time in enumerate(TIMES):
         rates = (position(time + step) - position(time - step)) / (2.0 * step)
         nodes[k, :-1, P_WN : P_WN + 3], nodes[k, :-1, V_WN : V_WN + 3] = position(time), rates
-    still = {"lengths": np.ones(TIMES.size), "signals": np.ones(TIMES.size)}
-    return tallied(TIMES, nodes=nodes, begins=begins, **still).rolled.angle[0]
+    return tallied(TIMES, nodes=nodes, begins=begins).rolled.angle[0]
 
 
 def test_a_rigid_body_that_rolls_on_has_rolled_by_its_angle():

@@ -89,13 +89,6 @@ def test_a_frame_is_orthonormal_and_its_first_tangent_is_worlds_x_in_the_plane(g
         assert frame[GAP] == pytest.approx(-1e-3 * n[2], rel=1e-9)
 
 
-def test_a_node_above_the_highest_point_has_the_frame_of_level_ground_there(ground):
-    made = ground(ROUGH)
-    (frame,) = ground_frames(np.array([[0.3, 0.1, 0.02]]), made)
-    assert frame[GAP] == pytest.approx(0.02 - SurfaceGrid(*made.grid).top)
-    assert tuple(frame[N_X:]) == (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0)
-
-
 def test_a_robot_that_starts_in_the_ground_or_off_the_grid_is_refused(ground, refused, tmp_path):
     # Steps of 1 in at 0, 6 and 12 in: T4 stands at 3 * 2.94 in = 8.82 in, on the second one.
     for terrain, found in (
@@ -109,13 +102,8 @@ def test_a_robot_that_starts_in_the_ground_or_off_the_grid_is_refused(ground, re
             ground(terrain)
 
 
-@pytest.mark.parametrize(
-    "terrain",
-    [Incline(slope=0.1), Steps(height=INCH, depth=6.0 * INCH, count=3)],
-    ids=["incline", "steps"],
-)
-def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground(terrain):
-    robot = Robot.of(load_scenario("six_bar").with_changes({"terrain": terrain}))
+def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground():
+    robot = Robot.of(load_scenario("six_bar").with_changes({"terrain": Incline(slope=0.1)}))
     start = node_positions(robot.structure, robot.structure.initial_state)
     gaps = ground_frames(start[robot.structure.contacts], robot.ground)[:, GAP]
     depth = robot.weight / 3.0 / robot.scenario.ground.stiffness  # three feet bear it

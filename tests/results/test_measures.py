@@ -14,7 +14,6 @@ from tetra_drake.results.measures import (
     intervals,
     last_step,
     relative_distances,
-    share_of_time,
 )
 
 TIMES = np.linspace(0.0, 15.0, 1501)
@@ -40,27 +39,16 @@ def test_the_distance_is_that_of_the_first_marker_or_of_the_centre(walk):
     np.testing.assert_allclose(apart, [0.0, -0.0316987, 0.0116025], atol=1e-6)
 
 
-def test_without_oscillators_there_is_no_step(walk):
-    assert last_step(walk.isel(oscillator=[])) is None
-
-
 @pytest.mark.parametrize(
     ("active", "expected"),
     [
         ([0, 0, 1, 1, 0], [(1.0, 4.0)]),  # begins one sample before it shows
         ([1, 1, 0, 0, 1], [(0.0, 1.0), (4.0, 8.0)]),
         ([1, 1, 1, 1, 1], [(0.0, 8.0)]),
-        ([0, 0, 0, 0, 0], []),
     ],
 )
 def test_intervals(active, expected):
     assert intervals(np.array([0.0, 1.0, 2.0, 4.0, 8.0]), np.array(active, dtype=bool)) == expected
-
-
-def test_the_share_of_time_is_that_of_the_intervals(walk):
-    late = walk.sel(time=slice(8.0, None)).time
-    assert share_of_time(late < 0.0) == 0.0
-    assert share_of_time(late >= late.mean()) == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize("times", [TIMES, UNEVEN], ids=["even", "uneven"])
@@ -84,6 +72,7 @@ def test_the_last_step_is_one_period_and_ends_late(walk):
     for signal in (0.0 * walk.signal, 1.0 + 1e-9 * walk.signal):
         assert last_step(walk.assign(signal=signal)) is None
     assert last_step(make_walk(duration=1.5)) is None  # holds no two periods
+    assert last_step(walk.isel(oscillator=[])) is None
 
 
 def test_a_wave_travels_by_its_delay_from_place_to_place():

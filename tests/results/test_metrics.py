@@ -31,6 +31,7 @@ CIRCLE = CentrePath(
 """To the left, with a radius of 1 m, but turning to the right."""
 
 
+ROUGH = Rough(amplitude=0.01, wavelength=1.0)
 STEADY = {"totals": make_totals(), "signals": np.zeros((49, 4))}
 
 
@@ -63,7 +64,6 @@ def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
     # At the start the tip is four spacings and the height of a tetrahedron, 6 sqrt(2/3) in, ahead.
     ahead = (4 * 2.94 + 6.0 * (2.0 / 3.0) ** 0.5) * INCH
     assert metrics.lead == pytest.approx(ahead + 0.6 - 0.5)
-    assert metrics.distance_in == pytest.approx(0.5 / INCH)
 
 
 def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
@@ -91,23 +91,15 @@ def walked(robot: Robot, way: float, **given: Any) -> Metrics:
 
 def test_totals_become_metrics(robot: Robot) -> None:
     metrics = walked(robot, 0.24)
-    assert metrics.speed == pytest.approx(0.24 / 12.0)
-    assert metrics.actuator_work == 0.3
-    assert metrics.cost_of_transport == pytest.approx(0.3 / (robot.weight * 0.24))
-    # Four signals: the mean square is 48 N²/s in 12 s and four signals, 1 N²/s².
-    assert metrics.signal_rate == pytest.approx(1.0)
+    # Four signals: the mean square is 48 N²/s in 12 s and four signals, 1 N²/s². Eight driven
+    # cables in 12 s: the integrals are over 96 s of actuators.
+    expected = {"speed": 0.02, "actuator_work": 0.3, "signal_rate": 1.0, "lifted": 2.0 / 12.0}
+    expected |= {"clearance": 0.01, "tension": 1.0, "rolled": 7.0, "travelling_index": 0.0}
+    expected |= {"peak_actuator_force": 4.0, "mean_actuator_force": 1.0}
+    expected |= {"peak_actuator_speed": 0.2, "mean_actuator_speed": 0.05}
+    expected |= {"peak_actuator_power": 0.5, "mean_actuator_power": 0.25}
+    assert {name: getattr(metrics, name) for name in expected} == pytest.approx(expected)
     assert metrics.lifted_shares == pytest.approx(np.arange(5) / 12.0)
-    assert metrics.lifted == pytest.approx(2.0 / 12.0)
-    assert (metrics.clearance, metrics.tension) == (0.01, 1.0)
-    assert metrics.rolled == 7.0
-    assert metrics.travelling_index == 0.0
-    # Eight driven cables in 12 s: the integrals are over 96 s of actuators.
-    assert metrics.peak_actuator_force == 4.0
-    assert metrics.mean_actuator_force == pytest.approx(1.0)
-    assert metrics.peak_actuator_speed == 0.2
-    assert metrics.mean_actuator_speed == pytest.approx(0.05)
-    assert metrics.peak_actuator_power == 0.5
-    assert metrics.mean_actuator_power == pytest.approx(0.25)
     assert math.isnan(metrics.actuator_limited), "forces have no limits"
     phases = 0.5 * np.pi * (np.arange(48)[:, None] / 4.0 - np.arange(4.0))
     travelling = walked(robot, 0.24, signals=np.sin(phases))
@@ -122,7 +114,6 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -
     weightless = walked(floating, 0.24)
     assert weightless.cost_of_transport == math.inf
     assert weightless.to_json()["cost_of_transport"] is None
-    assert weightless.to_json()["actuator_work"] == 0.3
 
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:
@@ -137,32 +128,21 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
 
 
 @pytest.mark.parametrize(
-    ("objective", "text"),
+    ("changes", "text"),
     [
-        ({"speed": 1.0, "heading_change": 9.0}, "walks 2.0 inches in 15 s"),
-        ({"heading_change": 1.0}, "turns 180 degrees in 15 s"),
-        ({"rolled": 1.0, "lateral_drift": -4.0}, "rolled 5.73 deg, walks 2.0 inches in 15 s"),
-        ({"cost_of_transport": -1, "twist": -1}, "cost of transport 4, walks 2.0 inches in 15 s"),
+        ({"objective": {"speed": 1.0, "heading_change": 9.0}}, "walks 2.0 inches in 15 s"),
+        ({"objective": {"heading_change": 1.0}}, "turns 180 degrees in 15 s"),
+        ({"objective": {"rolled": 1.0}}, "rolled 5.73 deg, walks 2.0 inches in 15 s"),
+        ({"terrain": Incline(slope=0.25)}, "walks 2.0 inches up 14.3 degrees in 15 s"),
+        ({"terrain": ROUGH}, "walks 2.0 inches on rough ground in 15 s"),
     ],
 )
-def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
-    metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "twist": 0.5 * INCH}
-    metrics |= {"heading_change": math.pi, "cost_of_transport": 4.0, "speed": 0.1}
-    metrics |= {"rolled": 0.1, "lateral_drift": 1.0}
-    assert headline(scenario.with_sections(objective=objective), metrics) == text
-
-
-@pytest.mark.parametrize(
-    ("terrain", "text"),
-    [
-        (Incline(slope=math.radians(10.0)), "walks 2.0 inches backward up 10 degrees in 15 s"),
-        (Incline(slope=math.radians(-5.0)), "walks 2.0 inches backward down 5 degrees in 15 s"),
-        (Rough(amplitude=0.01, wavelength=1), "walks 2.0 inches backward on rough ground in 15 s"),
-    ],
-)
-def test_the_headline_says_where_the_robot_walks(scenario, terrain, text):
-    metrics = dict.fromkeys(METRICS, 0.0) | {"distance": -2.0 * INCH}
-    assert headline(scenario.with_changes({"terrain": terrain}), metrics) == text
+def test_the_headline_is_what_the_objective_looks_for_and_where_it_walks(scenario, changes, text):
+    metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "rolled": 0.1}
+    metrics["heading_change"] = math.pi
+    assert headline(scenario.with_sections(**changes), metrics) == text
+    backward = headline(scenario, metrics | {"distance": -2.0 * INCH})
+    assert backward == "walks 2.0 inches backward in 15 s"
 
 
 @pytest.mark.parametrize(
@@ -170,9 +150,7 @@ def test_the_headline_says_where_the_robot_walks(scenario, terrain, text):
     [
         ({"lead": 0.0126}, "lead is 0.4961 in, less than 0.5 in"),
         ({"lead": 0.0127}, None),  # 0.5 in
-        ({"lead": math.inf}, None),
         ({"lead": math.nan}, "lead is nan in, less than 0.5 in"),
-        ({"twist": 0.0127}, None),
         ({"twist": 0.0128}, "twist is 0.5039 in, more than 0.5 in"),
     ],
 )

@@ -15,20 +15,16 @@ from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 
 
-@pytest.fixture(scope="module", params=["drake", "compiled"])
+@pytest.fixture(scope="module", params=["!Drake", "!Compiled"])
 def trajectory(request: pytest.FixtureRequest, data: Path) -> xarray.Dataset:
     times = {"simulation.duration": "2.0 s", "simulation.steady_from": "1.5 s"}
-    scenario = load_scenario("thesis").with_changes(
-        {"engine": f"!{request.param.capitalize()}", **times}
-    )
+    scenario = load_scenario("thesis").with_changes(times | {"engine": request.param})
     gait = load_gait(data / "gait_g.json", scenario)
-    result = simulate(scenario=scenario, gait=gait, record=True)
-    return result.trajectory
+    return simulate(scenario=scenario, gait=gait, record=True).trajectory
 
 
 def test_every_variable_has_a_unit_and_named_dimensions(trajectory: xarray.Dataset) -> None:
     assert trajectory.p_WN.dims == ("time", "node", "axis")
-    assert trajectory.p_WB.dims == ("time", "body", "axis")
     assert trajectory.tension.dims == ("time", "cable")
     assert trajectory.friction_mode.dims == ("time", "contact", "horizontal")
     assert all(v.attrs["units"] for v in trajectory.data_vars.values())
@@ -64,10 +60,9 @@ def test_body_poses_carry_the_nodes(trajectory: xarray.Dataset, structure: Struc
 
 
 def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Dataset) -> None:
-    driven = trajectory.cable[trajectory.cable_signal == "T2-T3"].values.tolist()
+    driven = trajectory.tension.sel(cable_signal="T2-T3").cable.values.tolist()
     assert driven == ["T2-T3 outer bottom_left", "T2-T3 outer bottom_right"]
     assert (trajectory.cable_signal == "").sum() == 16
-    assert trajectory.tension.sel(cable_signal="T2-T3").cable.values.tolist() == driven
     assert trajectory.sel(cable_bodies="T2-T3").sizes["cable"] == 6
     inner = trajectory.sel(cable="T1-T2 inner top")
     assert (inner.cable_bodies.item(), inner.cable_group.item()) == ("T1-T2", "inner")
@@ -105,8 +100,6 @@ def test_bodies_nodes_and_cables_of_any_structure_have_names() -> None:
     [
         ("cable_bodies", "T1-T3", "unknown 'T1-T3'; did you mean 'T1-T2'?"),
         ("node_body", ["T1", "T9", "T10"], "unknown 'T9', 'T10'; expected one of T1, T2"),
-        ("cable_group", ["inner", "middle"], "unknown 'middle'; expected one of outer, inner"),
-        ("oscillator_side", 2, "unknown '2'; expected one of"),
     ],
 )
 def test_labels_that_a_selection_misses_are_told(coordinate, given, told, refused) -> None:

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from helpers.anchored import BAR, HUNG, LOADS, SWINGING, scenario_of, supported_prism
+from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
-from tetra_drake.report.structure_page import save_structure_page, structure_text
+from tetra_drake.report.structure_page import structure_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.robot_structure import StructureFile
 
@@ -40,78 +40,38 @@ def test_a_held_bar_swings_at_the_frequency_of_a_physical_pendulum():
     assert study.nodes.anchor_z["a"] == pytest.approx(mass * G, rel=1e-6)
 
 
-@pytest.mark.parametrize("push", [0.0, 0.7])
-def test_two_cables_in_a_v_carry_a_load(push):
-    # The node where they meet is to rest at the origin: tensions by balance, free lengths by them.
-    load = 3.0
-    tree = {
-        "nodes": {
-            "left": [-0.3, 0.0, 0.4],
-            "right": [0.5, 0.0, 0.6],
-            "a": [0.01, 0.0, -0.02],
-            "b": [0.01, 0.0, -0.22],
-        },
-        "struts": {"bar": BAR},
-        "anchors": {"left": "xyz", "right": "xyz"},
-        "loads": {"a": [push, 0.0, -load]},
-    }
-    held = tree["anchors"] | {"a": "xyz"}
-    weight = Robot.of(scenario_of(tree | {"anchors": held})).weight
-    along = np.array([[-0.6, 0.8], [0.5 / math.hypot(0.5, 0.6), 0.6 / math.hypot(0.5, 0.6)]]).T
-    tensions = np.linalg.solve(along, [-push, load + weight])
-    free = np.array([0.5, math.hypot(0.5, 0.6)]) - tensions / K
-    law = {"stiffness": K, "damping": 0.5}
-    tree["cables"] = {
-        side: law | {"pairs": [[side, "a"]], "free_length": length}
-        for side, length in zip(("left", "right"), free.tolist(), strict=True)
-    }
-    study = study_equilibrium(Robot.of(scenario_of(tree)))
-    np.testing.assert_allclose(study.nodes.loc["a", ["x", "y", "z"]].astype(float), 0.0, atol=1e-11)
-    assert study.cables["tension"].to_list() == pytest.approx(tensions.tolist(), rel=1e-9)
-    forces = study.nodes[["anchor_x", "anchor_y", "anchor_z"]].sum()
-    np.testing.assert_allclose(forces, [-push, 0.0, load + weight], atol=1e-10)
-
-
 def test_reactions_balance_loads_and_weight():
     robot = Robot.of(supported_prism())
     study = study_equilibrium(robot)
     forces = study.nodes[["anchor_x", "anchor_y", "anchor_z"]].to_numpy()
     p_WN, loads = study.nodes[["x", "y", "z"]].to_numpy(), robot.structure.node_load
     down = np.array([0.0, 0.0, -G])
-    assert loads.sum(axis=0) == pytest.approx(np.sum(list(LOADS.values()), axis=0))
     weights = robot.structure.mass[:, np.newaxis] * down
     total = forces.sum(axis=0) + loads.sum(axis=0) + weights.sum(axis=0)
     np.testing.assert_allclose(total, 0.0, atol=1e-9)
     torque = np.cross(p_WN, forces + loads).sum(axis=0)
     p_WB = robot.equilibrium.state[:21].reshape(3, 7)[:, 4:]
     np.testing.assert_allclose(torque + np.cross(p_WB, weights).sum(axis=0), 0.0, atol=1e-9)
-    held = {"n0": [1, 1, 1], "n1": [0, 1, 1], "n2": [0, 0, 1]}
-    for node, axes in held.items():
-        row = list(study.nodes.index).index(node)
-        assert (forces[row][np.array(axes) == 0] == 0.0).all()
+    assert study.nodes.anchor_x["n1"] == study.nodes.anchor_x["n2"] == 0.0, "n1 is held along yz"
+    assert study.nodes.anchor_y["n2"] == 0.0, "n2 is held along z"
     # Supports that hold a rigid body add no self-stress state and leave the prism's mechanism.
     assert (len(study.statics.self_stresses), study.statics.mechanisms) == (1, 1)
 
 
-def test_a_structure_that_hangs_does_not_move_to_the_ground():
+def test_what_is_anchored_neither_moves_to_the_ground_nor_turns_with_an_incline(refused):
     scenario = scenario_of(HUNG).with_changes({"terrain": "!Flat"})
     assert study_equilibrium(Robot.of(scenario)).nodes.z["top"] == 1.0
-
-
-def test_anchors_do_not_turn_with_an_incline(refused):
     with refused("anchored", "terrain", "anchors"):
         Robot.of(scenario_of(HUNG).with_changes({"terrain": "!Incline {slope: 3 deg}"}))
 
 
-def test_text_and_page_tell_of_anchors(tmp_path):
+def test_the_text_tells_of_anchors():
     study = study_equilibrium(Robot.of(scenario_of(HUNG)))
     text = structure_text(study)
     weight = study.robot.weight  # in N, the unit of the structure
     (row,) = [line for line in text.splitlines() if line.startswith("top")]
     assert [float(cell) for cell in row.split()[1:]] == pytest.approx([0, 0, weight], rel=1e-2)
     assert "ground, undamped" not in text
-    save_structure_page(study, tmp_path / "page.html")
-    assert (tmp_path / "page.html").stat().st_size > 100_000
 
 
 def test_bodies_may_be_joined_by_the_world_alone():

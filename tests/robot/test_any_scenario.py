@@ -11,32 +11,19 @@ from tetra_drake.scenario.load import dump_scenario, load_scenario
 ANY = {
     "cpg.signals": ["live", "listing"],
     "cpg.feedback": [[], ["length"], ["load", "pitch"]],
-    "cpg.reach": [None, 0, 1],
-    "friction": ["!ResetIntegrator", "!Coulomb", "!Coulomb {static: 0.9, lateral: 3}"],
-    "terrain": [
-        "!Flat",
-        "!Incline {slope: 20 deg}",
-        "!Steps {height: 1 cm, depth: 10 cm, count: 3}",
-        "!Rough {amplitude: 1 mm, wavelength: 5 cm}",
-        "!Obstacles {height: 5 mm, radius: 2 cm, spacing: 6 cm}",
-    ],
-    "actuation": [
-        "!Force",
-        "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}",
-        "!TensionMotor {max_force: 10 N, max_speed: 1 m/s, time_constant: 20 ms}",
-    ],
+    "friction": ["!ResetIntegrator", "!Coulomb {static: 0.9, lateral: 3}"],
+    "terrain": ["!Incline {slope: 20 deg}", "!Rough {amplitude: 1 mm, wavelength: 5 cm}"],
+    "actuation": ["!Force", "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}"],
     "engine": ["!Drake", "!Compiled"],
 }
 ROW = {
     "robot.tetrahedra": [2, 3, 9],
     "robot.contacts": ["all", "thesis"],
-    "robot.spacing": ["balanced", "1 in", "5 in"],
     "robot.cables.slack": [True, False],
     "robot.actuation": [[], [["outer top"]], [["outer bottom_left"], ["outer bottom_right"]]],
 }
 STRUCTURE = {"robot.contacts": ["all"], "robot.actuated": [{}]}
-SCENARIOS = {"thesis": ROW, "turning": ROW, "winch": ROW, "feedback": ROW}
-SCENARIOS |= dict.fromkeys(("prism", "six_bar", "rover", "mast", "pair"), STRUCTURE)
+SCENARIOS = {"turning": ROW, "feedback": ROW, "prism": STRUCTURE, "mast": STRUCTURE}
 """Shipped scenarios, with values of what is no number."""
 
 

@@ -42,46 +42,21 @@ def test_rests_where_the_independent_simulation_does(robot, data):
     np.testing.assert_allclose(normal, expected["normals"], atol=atol)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {
-            "robot.tetrahedra": 3,
-            "robot.offsets": [[0, 0, 0], ["2 mm", "1 mm", "1 mm"], [0, 0, "3 mm"]],
-        },
-        # Base triangles so near that the robot tips forward, onto the lead's tip.
-        {
-            "robot.tetrahedra": 2,
-            "robot.spacing": "0.055 m",
-            "robot.cables.inner_stiffness": "26.0 N/m",
-        },
-    ],
-)
-def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
+def test_a_walk_that_is_not_driven_ends_there(scenario):
     # Feet creep under stiction: an error of 3 mm at the start falls to 2e-7 of a length in 20 s.
     still = {"cpg.start_up": "100.0 s", "simulation.duration": "20.0 s", "engine": "!Compiled"}
-    scenario = scenario.with_changes(still | changes)
+    # Base triangles so near that the robot tips forward, onto the lead's tip.
+    still |= {"robot.tetrahedra": 2, "robot.spacing": "0.055 m"}
+    scenario = scenario.with_changes(still | {"robot.cables.inner_stiffness": "26.0 N/m"})
     walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory
     np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).equilibrium.lengths, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("changes", "slack"),
-    [
-        ({"robot.strut_length": "0.25 m", "robot.gravity": "1.6 m/s^2"}, 0),
-        # Cables of 0.12 m: the tetrahedra lean forward, and only those from tips to tops hold them.
-        (
-            {
-                "robot.spacing": "0.08 m",
-                "robot.cables.free_length": "0.12 m",
-                "robot.contacts": "all",
-            },
-            20,
-        ),
-    ],
-)
-def test_no_force_is_left_on_any_body(scenario, changes, slack):
-    robot = Robot.of(scenario.with_changes(changes | {"robot.cables.slack": True}))
+def test_no_force_is_left_on_any_body(scenario):
+    # Cables of 0.12 m: the tetrahedra lean forward, and only those from tips to tops hold them.
+    leaning = {"robot.spacing": "0.08 m", "robot.cables.free_length": "0.12 m"}
+    leaning |= {"robot.contacts": "all", "robot.cables.slack": True}
+    robot = Robot.of(scenario.with_changes(leaning))
     structure, state, p_WN = robot.structure, robot.equilibrium.state, resting_nodes(robot)
     bodies, cables = len(structure.bodies), structure.cables
     force = np.zeros_like(p_WN)
@@ -90,7 +65,7 @@ def test_no_force_is_left_on_any_body(scenario, changes, slack):
     length = np.linalg.norm(along, axis=1)
     np.testing.assert_allclose(robot.equilibrium.lengths, length, rtol=0, atol=0.51e-9)
     tension = np.maximum(0.0, cables["stiffness"] * (length - cables["free_length"]))
-    assert (tension == 0.0).sum() == slack
+    assert (tension == 0.0).sum() == 20
     pull = along * (tension / length)[:, np.newaxis]
     np.add.at(force, cables["node_a"], pull)
     np.add.at(force, cables["node_b"], -pull)
@@ -151,7 +126,6 @@ def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
 @pytest.mark.parametrize(
     ("limits", "steps"),
     [
-        ({"MOST_STEPS": 3}, 3),
         ({"MOST_WORK": 2.5 * 30**3, "LEAST_STEPS": 1}, 2),  # 5 bodies
         ({"MOST_WORK": 0.0, "LEAST_STEPS": 1}, 1),
     ],

@@ -48,12 +48,9 @@ def test_a_gait_file_gives_weights_and_time_constants(tmp_path, scenario):
     gait = load_gait(write(tmp_path, gait_file(weights=shuffled)), scenario)
     assert gait == Gait(name="mine", weights=tuple(WEIGHTS.values()), tau_a=0.3, tau_b=0.6)
     assert gait.weight_names == tuple(NAMES)
-    assert load_gait(write(tmp_path, gait_file(tau_b_s=0.45)), scenario).tau_b == 0.45
-
-
-def test_weights_may_be_a_list_in_the_order_of_the_listing(tmp_path, scenario):
-    file = write(tmp_path, gait_file(schema=1, weights=list(WEIGHTS.values())))
-    assert load_gait(file, scenario).weights == tuple(WEIGHTS.values())
+    # Of a first schema: a list in the order of the listing.
+    file = write(tmp_path, gait_file(schema=1, weights=list(WEIGHTS.values()), tau_b_s=0.45))
+    assert load_gait(file, scenario) == dataclasses.replace(gait, tau_b=0.45)
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 4])
@@ -67,39 +64,18 @@ def test_a_gait_has_the_weights_of_its_robot(tmp_path, scenario, tetrahedra, ref
         load_gait(tmp_path / "mine.json", scenario.with_changes({"robot.tetrahedra": 5}))
 
 
-def without(name: str) -> dict[str, float]:
-    return {other: weight for other, weight in WEIGHTS.items() if other != name}
-
-
 BAD: list[tuple[object, str, str]] = [
     (gait_file(weights=WEIGHTS | {"1->2 flexor": math.nan}), "weights.1->2 flexor", "nan"),
-    (gait_file(weights=WEIGHTS | {"1->2 flexor": -0.1}), "weights.1->2 flexor", "-0.1"),
-    (gait_file(weights=WEIGHTS | {"1->2 flexor": None}), "weights.1->2 flexor", "nothing"),
-    (
-        gait_file(weights=without("2->1 extensor")),
-        "weights",
-        "lacks 1 names, such as '2->1 extensor'",
-    ),
-    (
-        gait_file(weights=WEIGHTS | {"5->1 flexor": 1.0}),
-        "weights",
-        "1 unknown names, such as '5->1 flexor'",
-    ),
+    (gait_file(weights=WEIGHTS | {"5->1 flexor": 1.0}), "weights", "'5->1 flexor'"),
     (gait_file(weights=[1.0] * 23), "weights", "23"),
     (gait_file(weights=[1.0] * 23 + [-0.1]), "weights[23]", "-0.1"),
     (gait_file(tau_a_s=0), "tau_a_s", "0"),
-    (gait_file(tau_b_s="0.3"), "tau_b_s", "0.3"),
-    (gait_file(tau_b_s=math.inf), "tau_b_s", "inf"),
-    (gait_file(name=5), "name", "5"),
     (gait_file(schema=3), "schema", "3"),
     (gait_file(gains={"lenght": 0.1}), "gains.lenght", "'length'"),
     (gait_file(gains={"load": 0.5}), "gains.load", "0.5"),  # the thesis has no feedback
     (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
-    ({"schema": 2, "weights": WEIGHTS}, "tau_a_s", ""),
-    (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
     ('{"schema": 2, "schema": 2, "weights": {}, "tau_a_s": 0.3}', "", "twice"),
     ('{"tau_a_s": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits
-    (json.dumps(gait_file())[:100], "", "JSON"),
     ("[" * 100_000, "", "JSON"),
 ]
 
@@ -157,11 +133,7 @@ def test_mirrored_weights_are_one_parameter_for_left_and_right():
     weights = space.gait(vector, name="any").weights
     by_name = dict(zip(free.names, weights, strict=False))
     # Oscillators 1, 3, 5, 7 are on the left, 2, 4, 6, 8 on the right of the same junctions.
-    for name, image in (
-        ("2->1 extensor", "1->2 extensor"),
-        ("5->4 flexor", "6->3 flexor"),
-        ("7->5 extensor", "8->6 extensor"),
-    ):
+    for name, image in (("2->1 extensor", "1->2 extensor"), ("5->4 flexor", "6->3 flexor")):
         assert by_name[f"weight {name}"] == by_name[f"weight {image}"]
     assert sorted(weights) == sorted([*vector[:32], *vector[:32]])
 
@@ -208,21 +180,3 @@ def test_random_gaits_are_uniform_within_the_bounds(scenario):
     assert np.abs(weights.mean(axis=0) - 2.2).max() < 5 * 0.0155
     assert np.abs(weights.std(axis=0) - 0.693).max() < 0.05
     np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * taus)
-
-
-def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_path, scenario):
-    numbered = dict(zip(NAMES, range(1, 25), strict=True))
-    gait = load_gait(write(tmp_path, gait_file(weights=numbered, name="any")), scenario)
-    head, _, *table = [line.split() for line in str(gait).splitlines()]
-    assert head[0] == "any:" and f"{gait.tau_a:.4g}" in head
-    assert table[:2] == [
-        ["onto", "1", "2", "3", "4"],
-        ["1", "-", "1.00/4.00", "2.00/5.00", "3.00/6.00"],
-    ]
-    assert table[4] == ["4", "19.00/22.00", "20.00/23.00", "21.00/24.00", "-"]
-
-
-def test_a_printed_gait_of_many_oscillators_is_short(scenario):
-    long = scenario.with_changes({"robot.tetrahedra": 12})
-    lines = str(seeded_gait(long)).splitlines()
-    assert len(lines) == 2 and lines[1].startswith("220 weights from 1.0")

@@ -38,32 +38,23 @@ def test_the_converged_network_stays_within_the_listings_own_error(scenario, lis
     assert error.max() < 2e-2
 
 
-def test_the_csv_holds_what_the_cables_are_fed(robot, gait, tmp_path):
-    save_signals(tmp_path / "lbf.csv", robot, gait)
-    lines = (tmp_path / "lbf.csv").read_text().splitlines()
-    head = [line for line in lines if line.startswith("#")]
-    assert head[2] == "# signal_1: T1-T2 outer bottom_left + T1-T2 outer bottom_right"
-    assert lines[len(head)].split(",") == ["time_s", *(f"signal_{i}" for i in (1, 2, 3, 4))]
-    table = np.loadtxt(lines[len(head) + 1 :], delimiter=",")
-    assert table[0, 0] == 0.0 and table[-1, 0] == 15.0 and len(table) == 30_001
-    started = table[:, 0] >= 1.25
-    fed = signal_samples(robot, gait)[: len(table)] / 4.4482216152605
-    assert not table[~started, 1:].any()
-    np.testing.assert_allclose(table[started, 1:], fed[started], atol=1e-10)
-
-
-def test_the_csv_has_the_unit_and_the_rate_that_are_asked_for(robot, gait, tmp_path):
-    save_signals(tmp_path / "lbf.csv", robot, gait)
-    with shown_in("SI"):
-        save_signals(tmp_path / "N.csv", robot, gait, rate=30.0)
-    lbf, newton = (
-        np.loadtxt(tmp_path / name, delimiter=",", skiprows=7) for name in ("lbf.csv", "N.csv")
-    )
-    assert "force in N " in (tmp_path / "N.csv").read_text().splitlines()[1]
-    np.testing.assert_allclose(newton[:, 0], np.arange(451) / 30.0, rtol=1e-11)
-    fed = np.column_stack([np.interp(newton[:, 0], lbf[:, 0], column) for column in lbf.T[1:]])
-    np.testing.assert_allclose(newton[:, 1:], 4.4482216152605 * fed, atol=1e-9)
-    assert fed.any()
+@pytest.mark.parametrize(
+    ("system", "unit", "rate", "count"),
+    [("in", 4.4482216152605, None, 30_001), ("SI", 1.0, 30.0, 451)],
+)
+def test_the_csv_holds_what_the_cables_are_fed(robot, gait, tmp_path, system, unit, rate, count):
+    with shown_in(system):
+        save_signals(tmp_path / "signals.csv", robot, gait, rate=rate)
+    _, forces, first, *lines = (tmp_path / "signals.csv").read_text().splitlines()
+    assert f"force in {'N' if unit == 1.0 else 'lbf'} " in forces
+    assert first == "# signal_1: T1-T2 outer bottom_left + T1-T2 outer bottom_right"
+    assert lines[3].split(",") == ["time_s", *(f"signal_{i}" for i in (1, 2, 3, 4))]
+    times, *signals = np.loadtxt(lines[4:], delimiter=",").T
+    np.testing.assert_allclose(times, np.linspace(0.0, 15.0, count), rtol=1e-11)
+    steps = 5e-4 * np.arange(30_001)
+    fed = signal_samples(robot, gait)[:30_001] * (steps >= 1.25)[:, np.newaxis] / unit
+    expected = [np.interp(times, steps, column) for column in fed.T]
+    np.testing.assert_allclose(signals, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, 2001.0, float("nan"), float("inf")])

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from helpers.structures import recorded_structure, unit_inertias
 
-from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
-from tetra_drake.robot import equilibrium
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import node_positions
@@ -81,24 +79,3 @@ def test_nodes_placed_in_the_ground_are_refused(refused):
     sunk = scenario.with_changes({"robot.nodes.n1": ["-5 cm", "8.66 cm", "-1 mm"]})
     with refused("prism", "robot.nodes.n1", "0.1 cm below"):
         make_structure(sunk)
-
-
-def test_a_structure_without_rest_is_refused_with_the_body_that_is_left(monkeypatch):
-    monkeypatch.setattr(equilibrium, "MOST_STEPS", 1)
-    with pytest.raises(InputError) as caught:
-        make_structure(load_scenario("six_bar"))
-    assert caught.value.key == "robot"
-    assert any(f"'n{2 * i} n{2 * i + 1}'" in str(caught.value) for i in range(6))
-
-
-def test_a_structure_in_another_order_rests_alike():
-    # Bodies, nodes and cables are numbered by the file; what is simulated is not.
-    scenario = load_scenario("six_bar")
-    backward = scenario.robot.struts["bar"].pairs[::-1]
-    turned = scenario.with_changes({"robot.struts.bar.pairs": backward})
-    one, other = make_structure(scenario), make_structure(turned)
-    assert other.node_names != one.node_names
-    place = [other.node_names.index(name) for name in one.node_names]
-    there = node_positions(other, other.initial_state)[place]
-    here = node_positions(one, one.initial_state)
-    np.testing.assert_allclose(distances(there), distances(here), atol=1e-9)

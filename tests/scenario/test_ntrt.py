@@ -70,20 +70,11 @@ def test_a_prism_in_decimetres(tmp_path: Path) -> None:
     assert (side.stiffness, side.damping, side.tension) == pytest.approx((800.0, 5.0, 120.0))
     default = given.cables["horizontal/string"]
     assert (default.stiffness, default.damping, default.tension) == (1000.0, 10.0, 0.0)
-    assert [cable.name for cable in given.all_cables if cable.key.endswith("pairs[0]")] == [
-        "horizontal/string low1 low2",
-        "vertical/string low1 high1",
-    ]
+    names = {cable.name for cable in given.all_cables}
+    assert names > {"horizontal/string low1 low2", "vertical/string low1 high1"}
     assert len(given.bodies) == 3
     statics = find_statics(**joined_nodes(given))
     assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
-
-
-@pytest.mark.parametrize("text", ["stiffness: 800", "pretension: 0"])
-def test_a_builder_has_no_pretension_unless_it_says_so(tmp_path: Path, text: str) -> None:
-    rest = ", damping: 5, pretension: 1200, radius: 2, history: true"
-    file = write(tmp_path, PRISM.replace("stiffness: 800", text).replace(rest, ""))
-    assert read(file).cables["vertical/string"].tension == 0.0
 
 
 def test_a_spine_by_substructures(tmp_path: Path) -> None:
@@ -100,15 +91,6 @@ def test_a_spine_by_substructures(tmp_path: Path) -> None:
     assert names[:5:4] == ["string v1/front v2/front", "string v2/front v3/front"]
 
 
-@pytest.mark.parametrize("rise", [-3.0, 0.0, 26.0])
-def test_the_lowest_node_is_set_on_the_ground(tmp_path: Path, rise: float) -> None:
-    given = read(
-        write(tmp_path, PRISM.replace(", 0, ", f", {rise}, ").replace(", 2, ", f", {rise + 2}, "))
-    )
-    heights = [place[2] for place in given.nodes.values()]
-    assert heights == pytest.approx([0.0] * 3 + [0.2] * 3)
-
-
 BALL = """
 nodes: {low: [0, 1, 0], high: [0, 11, 0], ball: [0, 11, 0]}
 pair_groups: {rod: [[low, high]]}
@@ -118,45 +100,24 @@ builders:
 """
 
 
-@pytest.mark.parametrize(
-    ("text", "node"),
-    [
-        (BALL, "high"),  # its node is where a rod ends
-        (BALL.replace("high: [0, 11, 0], ", "").replace("high", "ball"), "ball"),
-    ],
-)
-def test_a_sphere_at_the_end_of_a_rod(tmp_path: Path, text: str, node: str) -> None:
-    given = read(write(tmp_path, text))
-    assert given.nodes.keys() == {"low", node}
-    blueprint = given.blueprint()
-    place = blueprint.node_names.index(node)
-    assert blueprint.node_radius[place] == pytest.approx(0.2)
-    assert blueprint.node_radius.sum() == pytest.approx(0.2)
+def test_a_sphere_at_the_end_of_a_rod(tmp_path: Path) -> None:
+    blueprint = read(write(tmp_path, BALL)).blueprint()
+    radii = dict(zip(blueprint.node_names, blueprint.node_radius.tolist(), strict=True))
+    assert radii == pytest.approx({"low": 0.0, "high": 0.2}), "its node is where a rod ends"
     rod, ball = 0.5 * math.pi * 0.25**2 * 10.0, 0.7 * 4.0 / 3.0 * math.pi * 2.0**3  # kg
     assert Structure.of(blueprint).mass == pytest.approx([rod + ball])
 
 
-def test_a_sphere_by_the_default_builder(tmp_path: Path) -> None:
-    text = BALL[: BALL.index("builders")].replace("ball", "sphere")
-    blueprint = read(write(tmp_path, text)).blueprint()
-    assert blueprint.node_radius.tolist() == pytest.approx([0.0, 0.05])
-    assert blueprint.node_density[1] == pytest.approx(1000.0)
+QUARTER = "rotation: {axis: [0, 1, 0], angle: 90}"
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("entry", "front", "lowest"),
     [
-        ("translation: [1, 2, 3]", [2, 4, 4], 2),
-        ("rotation: {axis: [0, 2, 0], angle: 90}", [1, 2, -1], 0),
         ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1], 0),
         ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1], -2),
-        ("scale: 3", [3, 4, 3], -2),
-        (
-            "scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}",
-            [4, 4, -3],
-            -2,
-        ),
+        (f"scale: 3, translation: [1, 0, 0], {QUARTER}", [4, 4, -3], -2),
         ("offset: [5, 5, 5]", [1, 2, 1], 0),
     ],
 )
@@ -188,7 +149,8 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
         "string b/front a/v3/back",
         "string a/v3/right b/right",
     ]
-    assert given.cables["string"].stiffness == 7.0
+    string = given.cables["string"]
+    assert (string.stiffness, string.tension) == (7.0, 0.0), "no pretension unless it says so"
     builder = "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 9}}}"
     given = read(write(tmp_path, f"{text}\n        {builder}"))
     assert given.cables["string"].stiffness == 9.0
@@ -201,21 +163,11 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
         ("nodes: {}\nnods: {}", "nods", "'nodes'"),
         (PRISM.replace("[low1, high2]", "[low1, hihg2]"), "pair_groups.prism_rod[0]", "'high2'"),
         (PRISM.replace("tgRodInfo", "tgBoxInfo"), "builders.prism_rod.class", "'tgBoxInfo'"),
-        (PRISM.replace("density", "dens"), "builders.prism_rod.parameters.dens", "'density'"),
-        (PRISM.replace("low1: [1,", "low1: [1e200,"), "nodes.low1[0]", "1e+15"),
-        (
-            PRISM.replace("pretension: 1", "pretension: -1"),
-            "builders.vertical.parameters.pretension",
-            "at least 0",
-        ),
-        (SPINE.replace("1.5]", "1e308]"), "substructures.v1/v2/v3.offset[2]", "1e+308"),
         (SPINE.replace("1.5]", "9e14]"), "substructures", "'v3'"),
         (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), "builders", "'prism_rod'"),
         (PRISM + "  string: {class: tgBasicActuatorInfo}", "builders", "vertical and string"),
-        (SPINE.replace("v3/node_node", "node_edge"), "bond_groups.string.v1/v2/node_edge", "edges"),
         (SPINE.replace("v3/node_node", "edge_node"), "bond_groups.string.v1/v2/edge_node", "'A/B"),
         (SPINE.replace("v3/node", "v4/node"), "bond_groups.string.v1/v2/v4/node_node", "v2, v3"),
-        (SPINE.replace("[back,", "[bakc,"), "bond_groups.string.v1/v2/v3/node_node[2]", "'bakc'"),
         ("substructures: {v: {scale: 2}}", "substructures", "0 paths of 'v'"),
         (SPINE.replace("/v2/v3: {", "/v1: {"), "substructures", "2 paths of 'v1'"),
         ("substructures: {v: {path: my.yaml}}", "substructures", "itself"),
@@ -228,33 +180,23 @@ def test_problems_name_file_key_and_facts(text, key, fact, tmp_path, refused) ->
         read(file)
 
 
-ROD = "pair_groups.rod[0]"
-
-
-@pytest.mark.parametrize(
-    ("part", "key"),
-    [
-        (VERTEBRA, "nodes"),
-        ("pair_groups: {}", "substructures"),
-        (f"nodes: {{a: [0, 0, 0], b: [1, 0, 0]}}\npair_groups: {{rod: [{'[a, b], ' * 100}]}}", ROD),
-    ],
-)
-def test_a_structure_that_multiplies_is_refused_before_it_is_whole(part, key, tmp_path) -> None:
+@pytest.mark.parametrize("part", [VERTEBRA, "pair_groups: {}"])
+def test_a_structure_that_multiplies_is_refused_before_it_is_whole(part, tmp_path) -> None:
     """Ten of ten of ten ... parts: the whole would not fit in memory."""
     write(tmp_path, part, "level0.yaml")
-    for level in range(1, 9):
-        names = "/".join("abcdefghij")
-        text = f"substructures: {{{names}: {{path: level{level - 1}.yaml, offset: [1, 0, 0]}}}}"
-        write(tmp_path, text, f"level{level}.yaml")
+    for level in range(8):
+        path = f"{{path: level{level}.yaml, offset: [1, 0, 0]}}"
+        text = f"substructures: {{a/b/c/d/e/f/g/h/i/j: {path}}}"
+        write(tmp_path, text, f"level{level + 1}.yaml")
     with pytest.raises(InputError) as caught:
         read(tmp_path / "level8.yaml")
-    assert caught.value.key == key
+    assert caught.value.key == ("nodes" if part == VERTEBRA else "substructures")
 
 
 def test_a_substructure_may_have_no_nodes(tmp_path: Path) -> None:
     """Such as one that holds builders only."""
     write(tmp_path, "builders: {rod: {class: tgRodInfo, parameters: {radius: 2}}}", "kinds.yaml")
-    entry = "{path: kinds.yaml, rotation: {axis: [0, 1, 0], angle: 90}, translation: [1, 0, 0]}"
+    entry = f"{{path: kinds.yaml, {QUARTER}, translation: [1, 0, 0]}}"
     given = read(write(tmp_path, f"{VERTEBRA}\nsubstructures: {{kinds: {entry}}}"))
     assert given.struts["rod"].diameter == pytest.approx(0.4)
 
@@ -270,18 +212,10 @@ def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path, refused) -> 
 
 def test_the_structure_names_settings_that_the_scenario_replaces(tmp_path, caplog):
     file = write(tmp_path, PRISM)
-    unused = ["friction", "restitution", "history"]
-    assert read(file).ignored == unused
-    [record] = caplog.records
-    assert str(file) in record.getMessage()
-    assert ", ".join(unused) in record.getMessage()
-    caplog.clear()
-    # The scenario keeps the names, as its own file shows.
+    # The scenario keeps the names.
     save_scenario(tmp_path, robot_of_file(str(file), unit="dm").scenario)
     saved = load_scenario(tmp_path / "scenario.yaml")
-    assert dict(saved.differences(load_scenario()))["robot.ignored"] == f"[{', '.join(unused)}]"
-    caplog.clear()
-    used = PRISM.replace(", friction: 0.9, restitution: 0", "").replace(", history: true", "")
-    without = write(tmp_path, used)
-    assert read(without).ignored is None
-    assert not caplog.records
+    assert saved.robot.ignored == ["friction", "restitution", "history"]
+    [record] = caplog.records
+    assert str(file) in record.getMessage()
+    assert "friction, restitution, history" in record.getMessage()

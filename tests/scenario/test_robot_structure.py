@@ -7,9 +7,9 @@ import pytest
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Member, StructureFile
-from tetra_drake.scenario.section import Tree, written
+from tetra_drake.scenario.section import Tree
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
+from tetra_drake.scenario.yaml_text import parse_yaml
 
 IN = 0.0254
 
@@ -25,11 +25,7 @@ nodes:
   e: [2, 2, 15]
   f: [9, 2, 5]
 struts:
-  arm:
-    pairs: [[b, a], [d, e]]
-    diameter: 8 mm
-    density: 1.2 g/cm^3
-    node_diameter: 16 mm
+  arm: {pairs: [[b, a], [d, e]], diameter: 8 mm, density: 1.2 g/cm^3, node_diameter: 16 mm}
   leg: {pairs: [[a, c]], diameter: 4 mm, density: 2 g/cm^3, node_diameter: 0 m}
   bar: {pairs: [[f, g]], diameter: 4 mm, density: 2 g/cm^3, node_diameter: 1 cm}
 cables:
@@ -90,19 +86,13 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
     assert np.count_nonzero(blueprint.node_load) == 1
 
 
-def test_a_written_structure_is_read_as_it_was(tmp_path: Path) -> None:
-    (tmp_path / "my.yaml").write_text(dump_yaml(written(structure().model_dump())))
-    again = read_structure(tmp_path / "my.yaml")
-    assert again == structure()
-    assert again.bodies == structure().bodies
+TWO_FIXED = "nodes: {h: [1, 1, 1], i: [1, 1, 2]}\nanchors: {h: xyz, i: xyz}\n"
 
 
 @pytest.mark.parametrize(
     ("changes", "key", "facts"),
     [
         ("cables: {side: {pairs: [[b, dd]]}}", "cables.side.pairs[0]", ["'dd'", "mean 'd'"]),
-        ("struts: {bar: {pairs: [[f, h]]}}", "struts.bar.pairs[0]", ["'h'"]),
-        ("struts: {bar: {pairs: [[f, f]]}}", "struts.bar.pairs[0]", ["length 0"]),
         ("struts: {bar: {pairs: [[f, g], [g, f]]}}", "struts.bar.pairs[1]", ["bar.pairs[0]"]),
         ("cables: {long: {pairs: [[e, f], [d, b]]}}", "cables.long.pairs[1]", ["side.pairs[0]"]),
         ("cables: {side: {pairs: [[b, d], [b, c]]}}", "cables.side.pairs[1]", ["'b a c'"]),
@@ -111,53 +101,24 @@ def test_a_written_structure_is_read_as_it_was(tmp_path: Path) -> None:
         ("cables: {long: {free_length: 1 m}}", "cables.long.free_length", ["both"]),
         ("cables: {side: {free_length: null}}", "cables.side.free_length", ["neither"]),
         ("cables: {a b: {pairs: []}}", "cables.a b", ["blanks"]),
-        ("nodes: {h: [1, 1, 1]}", "nodes.h", ["no strut"]),
-        ("nodes: {f: [2, 2, 15]}", "cables.long.pairs[0]", ["length 0"]),
         ("nodes: {d: [9, 2, 5]}", "nodes.f", ["'d'", "0.0001 m"]),
         ("nodes: {e: [2, 2, 5]}", "struts.arm.pairs[1]", ["length 0"]),
         ("nodes: {7: [2, 2, 1]}", "nodes.7", ["n7"]),
-        ("{nodes: {h.i: [2, 2, 1]}}", "nodes.h.i", ["'h.i'", "dots"]),
-        ("offsets: [[1 cm, 0, 0]]", "offsets", ["1 items", "3"]),
-        ("nodes: {g: [9, 2, 1e200 m]}", "nodes.g[2]", ["1e+15"]),
         ("nodes: {g: [9, 2, -20 km]}", "nodes.g", ["-20000.0", "10000 m"]),
         ("nodes: {g: [9, 2, 9 km], f: [9, 2, -9 km]}", "struts.bar.pairs[0]", ["10000 m"]),
         ("struts: {bar: {diameter: 0.04 um}}", "struts.bar.pairs[0]", ["1e-05"]),
         ("struts: {bar: {density: 1e-12 g/m^3}}", "struts.bar.pairs[0]", ["1e-12 kg"]),
         ("contacts: []", "contacts", ["one node"]),
-        ("{nodes: {h i: [2, 2, 1]}}", "nodes.h i", ["'h i'", "blanks"]),
         ("unit: kg", "unit", ["'kg'"]),
-        ("masses: {q: 1 g}", "masses.q", ["'q'"]),
-        ("contacts: [a, q]", "contacts[1]", ["'q'"]),
         ("actuated: {left: [side b e]}", "actuated.left[0]", ["'side b e'", "mean 'side b d'"]),
         ("actuated: {right: [side c d, side b d]}", "actuated.right[1]", ["'left'"]),
-        ("actuated: {right: [side c d, side d c]}", "actuated.right[1]", ["'right'"]),
-        ("actuated: {to left: [side c d]}", "actuated.to left", ["blanks"]),
-        ("{nodes: {'h[1]': [2, 2, 1]}}", "nodes.h[1]", ["brackets"]),
+        ("struts: {leg: {axial_stiffness: 1 N/m}}", "struts.leg.axial_stiffness", ["a c", "rigid"]),
         ("anchors: {q: xyz}", "anchors.q", ["'q'"]),
         ("anchors: {a: xw}", "anchors.a", ["'xw'", "x, y and z"]),
-        ("anchors: {a: xx}", "anchors.a", ["'xx'"]),
-        ("anchors: {a: ''}", "anchors.a", ["''"]),
-        ("anchors: {a: 7}", "anchors.a", ["7"]),
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xz}}", "nodes.h", ["no strut", "xyz"]),
-        (
-            "anchors: {a: xyz, b: yz, c: z, d: xyz, e: yx, f: xyz, g: xy}",
-            "anchors",
-            ["every body", "can move"],
-        ),
-        (
-            "{nodes: {h: [1, 1, 1], i: [1, 1, 2]}, anchors: {h: xyz, i: xyz}, "
-            "cables: {long: {pairs: [[e, f], [h, i]]}}}",
-            "cables.long.pairs[1]",
-            ["two fixed nodes"],
-        ),
+        ("anchors: {a: xyz, b: yz, c: z, d: xyz, e: yx, f: xyz, g: xy}", "anchors", ["every body"]),
+        (f"{TWO_FIXED}cables: {{long: {{pairs: [[h, i]]}}}}", "cables.long.pairs[0]", ["fixed"]),
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, masses: {h: 1 g}}", "masses.h", ["fixed"]),
-        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, loads: {h: [0, 0, 0]}}", "loads.h", ["fixed"]),
-        ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, contacts: [h]}", "contacts[0]", ["fixed"]),
-        ("loads: {q: [0, 0, 1 N]}", "loads.q", ["'q'"]),
-        ("loads: {a: [0, 0, 600]}", "loads.a[2]", ["600", "without a unit"]),
-        ("loads: {a: [0, 0, 1 m]}", "loads.a[2]", ["'1 m'"]),
-        ("loads: {a: [0, 1 N]}", "loads.a", ["at least 3"]),
-        ("anchor_stiffness: 0 N/m", "anchor_stiffness", ["0"]),
     ],
 )
 def test_problems_name_key_and_facts(changes: str, key: str, facts: list[str], refused) -> None:

@@ -18,16 +18,12 @@ class Flat(Section):
 
 
 class Incline(Section):
-    slope: Angle = Field(ge=0, le=4)
+    slope: Angle
     surface: Literal["rough", "smooth"] = "rough"
-
-
-Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class Cells(Section):
     cells: list[Annotated[Length, Field(gt=0)]]
-    grid: list[Pair] = Field(default=[])
 
 
 class Probe(Section):
@@ -37,12 +33,8 @@ class Probe(Section):
 
 class Settings(Section):
     count: int = Field(ge=2)
-    name: str = ""
-    size: Length = 1.0
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
-    weights: dict[str, float] = Field(default={"distance": 1.0})
     limits: Annotated[dict[str, float], UnitsByName({"a": "N", "share": ""})] = Field(default={})
-    probes: list[Probe] = Field(default=[])
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
     inner: Incline
@@ -53,37 +45,23 @@ def load(text: str) -> Settings:
     return Settings.from_tree(merged(base, parse_yaml(f"{{{text} }}", "file")), "file")
 
 
-def shown(settings: Settings) -> str:
-    return dump_yaml(written(settings.model_dump()))
-
-
 GOOD: list[tuple[str, str, Any]] = [
     ("terrain: !Incline {slope: 180 deg}", "terrain", Incline(slope=np.pi, surface="rough")),
-    (
-        "terrain: !Cells {cells: [1 m, 50 cm], grid: [[1, 2], [3e-1, 4]]}",
-        "terrain",
-        Cells(cells=[1.0, 0.5], grid=[[1.0, 2.0], [0.3, 4.0]]),
-    ),
+    ("terrain: !Cells {cells: [1 m, 50 cm]}", "terrain", Cells(cells=[1.0, 0.5])),
     ("limits: {a: 1 kN, share: 0.5}", "limits", {"a": 1000.0, "share": 0.5}),
     ("ramps: [!Flat , !Incline {slope: 1 rad}]", "ramps", [Flat(), Incline(slope=1.0)]),
     ("ramps: [{slope: 1 rad}]", "ramps", [Incline(slope=1.0)]),  # without a tag, the first kind
     ("probe: {at: [0 m, 0 m, 0 m], active: false}", "probe", Probe(at=[0.0] * 3, active=False)),
     ("probe:", "probe", None),
-    ("", "terrain", Flat()),
 ]
 
 
-@pytest.mark.parametrize(("text", "name", "value"), GOOD, ids=[row[0] or "-" for row in GOOD])
+@pytest.mark.parametrize(("text", "name", "value"), GOOD, ids=[row[0] for row in GOOD])
 def test_values_of_every_type_load_and_dump_back(text, name, value):
     settings = load(text)
     assert repr(getattr(settings, name)) == repr(value)  # so that 1 is not 1.0
-    assert Settings.from_tree(parse_yaml(shown(settings), ""), "dump") == settings
-
-
-def test_defaults_are_not_shared():
-    settings = load("")
-    settings.weights["twist"] = 1.0
-    assert load("").weights == {"distance": 1.0}
+    dumped = dump_yaml(written(settings.model_dump()))
+    assert Settings.from_tree(parse_yaml(dumped, ""), "dump") == settings
 
 
 def test_values_cannot_be_changed_in_place():
@@ -93,26 +71,14 @@ def test_values_cannot_be_changed_in_place():
 
 BAD = [
     ("terrain: !Flat 5", "", "!Flat"),
-    ("terrain: !Flat {a: 1, a: 2}", "", "'a'"),
     ("cont: 3", "cont", "'count'"),
-    ("inner: 5", "inner", "5"),
-    ("inner: !Inner {}", "inner", "!Inner"),
-    ("inner: {slope: 5 rad}", "inner.slope", "'5 rad', expected at most 4 rad"),
-    ("inner: {surface: wet}", "inner.surface", "'wet'"),
-    ("count: 4.5", "count", "4.5"),
-    ("probe: {at: [0 m, 0 m, 0 m], active: 1}", "probe.active", "1"),
-    ("size: manual", "size", "'manual'"),
-    ("size: 1e999 m", "size", "'1e999 m'"),
     ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
     ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
     ("terrain:", "terrain", "nothing"),
     ("terrain: !Incline {}", "terrain.slope", "missing"),
     ("terrain: !Cells {cells: [1 m, 1 m, 1 m, one]}", "terrain.cells[3]", "'one'"),
-    ("terrain: !Cells {cells: [], grid: [[1, 2], [1]]}", "terrain.grid[1]", "2 items"),
-    ("weights: {twist: ten}", "weights.twist", "'ten'"),
     ("limits: {a: 1}", "limits.a", "1 without a unit"),
     ("limits: {b: 1}", "limits.b", "of a, share"),
-    ("limits: 5", "limits", "5"),
 ]
 
 
@@ -124,13 +90,9 @@ def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
 
 def test_a_mapping_of_many_keys_is_read_as_fast_as_many_mappings():
     def time_of(text: str) -> float:
-        """The lesser of two, as other processes disturb."""
-        times = []
-        for _ in range(2):
-            started = time.process_time()
-            assert len(parse_yaml(text, "file")) == 8_000
-            times.append(time.process_time() - started)
-        return min(times)
+        started = time.process_time()
+        assert len(parse_yaml(text, "file")) == 8_000
+        return time.process_time() - started
 
     keys = [f"k{i}: 1\n" for i in range(8_000)]
     # Comparing all pairs of keys would take four times as long.

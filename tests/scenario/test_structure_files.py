@@ -6,21 +6,17 @@ from pathlib import Path
 import pytest
 from pytest import approx
 
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.shipped import STRUCTURES, shipped_structures
+from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure
 
 BAR = """
 unit: cm
 nodes: {a: [0, 0, 0], b: [10, 0, 0], c: [0, 10, 0], d: [10, 10, 0], e: [0, 0, 10], f: [0, 10, 10]}
 struts:
-  bar:
-    pairs: [[a, b], [c, d], [e, f]]
-    diameter: 8 mm
-    density: 1.2 g/cm^3
-    node_diameter: 0 m
+  bar: {pairs: [[a, b], [c, d], [e, f]], diameter: 8 mm, density: 1.2 g/cm^3, node_diameter: 0 m}
 cables:
   side: {pairs: [[a, c], [b, d]], stiffness: 2 N/cm, damping: 3 N*s/m, free_length: 20 mm}
   rise: {pairs: [[a, e], [c, f]], stiffness: 100 N/m, damping: 0 N*s/m, tension: 2 N}
@@ -55,10 +51,6 @@ def test_a_scenario_holds_what_its_file_holds(folder: Path) -> None:
     assert (scenario.robot.body_count, scenario.oscillators) == (3, 2)
     assert scenario.robot.size == approx(0.1)
     assert scenario.robot.slack
-    written = folder / "elsewhere.yaml"
-    for text in (dump_scenario(scenario), scenario.to_yaml()):
-        written.write_text(text)
-        assert load_scenario(written) == scenario
 
 
 @pytest.mark.parametrize("name", shipped_structures())
@@ -104,19 +96,13 @@ def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> Non
     assert changed.robot.cables["side"].stiffness == 250.0
     assert changed.with_changes({"robot.cables.side.stiffness": "200 N/m"}) == scenario
     assert changed.differences(scenario) == [("robot.cables.side.stiffness", "250 N/m")]
-    actuated = scenario.with_changes({"robot.actuated": {"all": ["side a c"]}})
-    assert list(actuated.robot.actuated) == ["all"]
     added = scenario.with_changes({"robot.actuated.rise": ["rise a e"]})
     assert list(added.robot.actuated) == ["left", "right", "rise"]
 
 
 def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
     scenario = load(folder, "!Structure {file: bar.yaml}")
-    numbers = scenario.numbers()
-    assert numbers["robot.cables.rise.tension"] == 2.0
-    assert numbers["robot.masses.b"] == approx(0.02)
-    assert numbers["robot.struts.bar.density"] == approx(1200.0)
-    assert scenario.robot.free_lengths == approx([0.02, 0.02, 0.08, 0.08])
+    assert scenario.numbers()["robot.struts.bar.density"] == approx(1200.0)
     changed = scenario.with_numbers({"robot.cables.rise.tension": 4.0, "robot.masses.b": 1.0})
     assert changed.robot.free_lengths == approx([0.02, 0.02, 0.06, 0.06])
     assert changed.robot.masses == {"b": 1.0}
@@ -129,26 +115,20 @@ def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
     assert isinstance(given, StructureFile)
     assert given.nodes["d"] == approx([0.1, 0.1, 0.0])
     assert given.cables_of_oscillator == {"one": (1,)}
-    again = read_structure(folder / "ntrt.yaml", unit="dm")
-    assert again.nodes == given.nodes
 
 
-def test_a_unit_is_that_of_bare_coordinates(refused) -> None:
+def test_a_unit_is_that_of_bare_coordinates() -> None:
     in_m, in_dm = read_structure("prism"), read_structure("prism", unit="dm")
     for node, place in in_m.nodes.items():
         assert in_dm.nodes[node] == approx([0.1 * x for x in place])
-    with refused(STRUCTURES / "prism.yaml", "unit", "'furlon'"):
-        read_structure("prism", unit="furlon")
 
 
 @pytest.mark.parametrize(
     ("robot", "key", "fact"),
     [
         ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
-        ("!Structure {file: 7}", "robot.file", "7"),
         ("!Tetrahedra {file: bar.yaml}", "robot.file", "unknown"),
         ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
-        ("!Structure {file: ntrt.yaml, unit: kg}", "robot.unit", "kg"),
         ("!Structure {file: bar.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
         ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.struts", "`base`"),
         ("!Structure {file: bar.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
@@ -175,18 +155,14 @@ def test_a_fault_of_a_structure_file_names_that(folder, old, new, key, fact, ref
         load(folder, "!Structure {file: bar.yaml, cables: {side: {stiffness: 1 N/m}}}")
 
 
-@pytest.mark.parametrize(
-    ("key", "similar"), [("cables.botom", "'bottom'"), ("struts.bars", "'bar'")]
-)
-def test_a_change_of_a_group_of_another_name_tells_a_similar_one(key, similar, refused) -> None:
-    prism = load_scenario("prism")
-    with refused("scenario prism", f"robot.{key}", similar):
-        prism.with_changes({f"robot.{key}.damping": "1 N*s/m"})
+def test_a_change_of_a_group_of_another_name_tells_a_similar_one(refused) -> None:
+    with refused("scenario prism", "robot.cables.botom", "'bottom'"):
+        load_scenario("prism").with_changes({"robot.cables.botom.damping": "1 N*s/m"})
 
 
-@pytest.mark.parametrize("name", ["prims", "nul\0", "a" * 300])
-def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name: str, refused) -> None:
-    with refused(name, "", "'prism'" if name == "prims" else "no such"):
+@pytest.mark.parametrize(("name", "fact"), [("prims", "'prism'"), ("nul\0", "no such")])
+def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name, fact, refused) -> None:
+    with refused(name, "", fact):
         read_structure(name)
     parts = tmp_path / "parts.yaml"
     parts.write_text(f"substructures: {{part: {{path: {json.dumps(name)}}}}}")
@@ -195,20 +171,17 @@ def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name: str, re
 
 
 @pytest.mark.parametrize(
-    ("more", "key"),
+    ("section", "value"),
     [
-        ("require: {lead: 0 m}", "require.lead"),
-        ("objective: {twist: 1 /m}", "objective.twist"),
-        (
-            "optimizer: !QualityDiversity {measures: {twist: [0 m, 1 m], lifted: [0, 1]}}",
-            "optimizer.measures.twist",
-        ),
+        ("require", {"twist": "0 m"}),
+        ("objective", {"twist": "1 /m"}),
+        ("optimizer", "!QualityDiversity {measures: {twist: [0 m, 1 m], lifted: [0, 1]}}"),
     ],
 )
-def test_metrics_of_a_row_are_refused(folder: Path, more: str, key: str, refused) -> None:
-    (folder / "mine.yaml").write_text(f"base: prism\nname: mine\n{more}\n")
-    with refused(folder / "mine.yaml", key, "!Structure"):
-        load_scenario(folder / "mine.yaml")
+def test_metrics_of_a_row_are_refused(section: str, value: object, refused) -> None:
+    key = "optimizer.measures" if section == "optimizer" else section
+    with refused("scenario prism", f"{key}.twist", "!Structure"):
+        load_scenario("prism").with_changes({section: value})
 
 
 def test_memory_limits_count_bodies(folder: Path, refused) -> None:

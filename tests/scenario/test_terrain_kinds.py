@@ -1,6 +1,5 @@
 """Terrains: the grids they become, the surfaces drawn from those, and what is refused."""
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -34,15 +33,6 @@ def grid_of(terrain: Terrain) -> Grid:
     return terrain.grid(ahead=AHEAD, source="file")
 
 
-def points(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """x of the rows and y of the columns."""
-    x, y = (
-        corner + cell * np.arange(size)
-        for corner, cell, size in zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
-    )
-    return x, y
-
-
 def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """The biquadratic B-spline whose control points are the heights."""
     axes = zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
@@ -54,11 +44,9 @@ def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def test_a_grid_covers_the_way_and_more(terrain):
     # Half a cell within its outermost heights, the surface has all the heights it is made of.
     grid = grid_of(terrain)
-    x, y = points(grid)
-    half = 0.5 * np.array(grid.cell)
-    assert x[0] + half[0] <= -24 * IN and x[-1] - half[0] >= 120 * IN
-    assert y[0] + half[1] <= -30 * IN and y[-1] - half[1] >= 30 * IN
-    assert min(grid.heights.shape) >= 3
+    first = np.add(grid.corner, np.multiply(0.5, grid.cell))
+    last = first + np.multiply(np.array(grid.heights.shape) - 2, grid.cell)
+    assert (first <= [-24 * IN, -30 * IN]).all() and (last >= [120 * IN, 30 * IN]).all()
 
 
 @pytest.mark.parametrize("slope", [0.09, -0.5])
@@ -94,9 +82,8 @@ def test_rough_heights_are_uniform_and_never_above_the_floor():
 
 
 def test_a_seed_is_one_ground_on_every_machine():
-    first, again, other = (
-        grid_of(Rough(amplitude=0.5, wavelength=0.5, seed=seed)).heights for seed in (0, 0, 1)
-    )
+    grounds = (Rough(amplitude=0.5, wavelength=0.5, seed=seed) for seed in (0, 0, 1))
+    first, again, other = (grid_of(ground).heights for ground in grounds)
     # numpy's default_rng(0).random(3)
     drawn = np.array([0.6369616873214543, 0.2697867137638703, 0.04097352393619469])
     np.testing.assert_allclose(first[0, :3], drawn - 1.0, rtol=1e-14)
@@ -151,12 +138,10 @@ def test_a_height_file_has_rows_along_x(tmp_path, suffix):
     [
         (np.array([[0.0] * 3, [0.0, np.nan, 0.0], [0.0] * 3]), "nan in row 2, column 2"),
         (np.array([[0.0] * 3, [0.0, 0.0, -1e7], [0.0] * 3]), "-10000000.0 in row 2, column 3"),
-        (HEIGHTS[:2], "2 x 4"),
         (HEIGHTS[None], "1 x 3 x 4"),
         (np.zeros((2000, 2001), dtype=np.int8), "2000 x 2001"),
         (np.array([[{}] * 3] * 3), "heights.npy"),
     ],
-    ids=lambda value: None if isinstance(value, np.ndarray) else value,
 )
 def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
     np.save(tmp_path / "heights.npy", heights, allow_pickle=True)
@@ -165,13 +150,10 @@ def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
         load_scenario(file)
 
 
-def with_open_header():
-    file = io.BytesIO()
-    np.save(file, HEIGHTS)
-    return file.getvalue().replace(b"}", b"{")
+OPEN_HEADER = b"\x93NUMPY\x01\x00\x06\x00{'a':{"
 
 
-@pytest.mark.parametrize("content", [b"", b"one two", b"1 2 3\n4 5\n", with_open_header()])
+@pytest.mark.parametrize("content", [b"", b"one two", b"1 2 3\n4 5\n", OPEN_HEADER])
 @pytest.mark.parametrize("name", ["heights.npy", "heights.txt"])
 @pytest.mark.filterwarnings("error")
 def test_what_is_no_height_file_is_refused(tmp_path, name, content, refused):
@@ -219,12 +201,6 @@ def test_a_saved_field_does_not_need_the_file_it_was_read_from(tmp_path, damage,
     loaded = load_scenario(moved / SCENARIO)
     assert loaded == scenario
     assert np.array_equal(grid_of(loaded.terrain).heights, HEIGHTS)
-    save_scenario(tmp_path / "again", loaded)
-    files = [
-        {file.name: file.read_bytes() for file in folder.iterdir()}
-        for folder in (moved, tmp_path / "again")
-    ]
-    assert files[0] == files[1]
 
     (copy,) = (file for file in moved.iterdir() if file.name != SCENARIO)
     copy.unlink() if damage == "gone" else write_heights(copy, 2.0 * HEIGHTS)

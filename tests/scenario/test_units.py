@@ -1,13 +1,17 @@
 """Text with units becomes SI numbers; anything else is refused."""
 
+from pathlib import Path
+
 import pytest
 
 from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.units import (
     INCH,
     POUND_FORCE,
     SYSTEMS,
+    Units,
     plainest,
     quantity_to_si,
     shown_in,
@@ -29,9 +33,7 @@ def test_displayed_units_have_their_exact_definitions():
         ("25 lbf/in", "N/m", 25 * LBF / IN),
         ("0.72 s/in", "s/m", 0.72 / IN),
         ("2.7 g/cm^3", "kg/m^3", 2.7e-3 / 1e-6),
-        ("-3 m", "m", -3.0),
-        ("1.5e-3 m", "m", 1.5e-3),
-        ("  7   m ", "m", 7.0),
+        (" -1.5e-3   m ", "m", -1.5e-3),
     ],
 )
 def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
@@ -43,14 +45,10 @@ def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
     [
         ("in", "m", "in"),
         ("in", "N", "lbf"),
-        ("in", "N*s/m", "lbf*s/in"),
         ("in", "N*s/m^2", "lbf*s/in^2"),
         ("in", "1/rad", "/deg"),
-        ("in", "J", "J"),
         ("cm", "m/s", "cm/s"),
         ("mm", "1/m", "/mm"),
-        ("cm", "N/m", "N/m"),
-        ("SI", "m", "m"),
         ("SI", "rad", "deg"),
     ],
 )
@@ -62,9 +60,13 @@ def test_people_read_numbers_of_the_same_size(system, unit, read):
     assert units.shown(2.5 * size, unit) == f"2.5 {read}"
 
 
-@pytest.mark.parametrize("units", SYSTEMS.values(), ids=SYSTEMS)
-def test_a_distance_in_a_sentence_tells_about_a_millimetre_in_all_units(units):
-    assert 0.5e-3 < units.length * 10.0**-units.decimals < 3e-3
+def units_of(scenario: Scenario, folder: Path) -> Units:
+    """The same as those of its record, which is in SI, and of a disturbed one."""
+    (folder / "record.yaml").write_text(dump_scenario(scenario))
+    recorded = load_scenario(folder / "record.yaml")
+    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
+    assert scenario.units == recorded.units == disturbed.units
+    return scenario.units
 
 
 @pytest.mark.parametrize(
@@ -72,48 +74,30 @@ def test_a_distance_in_a_sentence_tells_about_a_millimetre_in_all_units(units):
     [
         ("thesis", {}, "in"),
         ("thesis", {"robot.strut_length": "15 cm", "robot.strut_diameter": "3 mm"}, "cm"),
-        ("pair", {}, "in"),
         ("prism", {}, "cm"),  # a radius of 0.1 m, a height of 0.16 m
-        ("winch", {}, "cm"),
     ],
 )
 def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, tmp_path):
     scenario = load_scenario(base).with_changes(changes)
-    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))  # in SI
-    recorded = load_scenario(tmp_path / "record.yaml")
-    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
-    for shown in (scenario, recorded, disturbed):
-        assert shown.units == SYSTEMS[expected]
+    assert units_of(scenario, tmp_path) == SYSTEMS[expected]
     with shown_in("SI"):
         assert scenario.units == SYSTEMS["SI"]
     assert scenario.units == SYSTEMS[expected]
 
 
-def test_a_structure_given_in_mm_is_shown_in_mm(tmp_path):
+@pytest.mark.parametrize(
+    ("nodes", "expected"),
+    [
+        ("unit: mm\nnodes: {a: [0, 0, 0], b: [300, 0, 100]}", "mm"),
+        ("nodes: {a: [0 m, 0 m, 0 m], b: [3 m, 0 m, 1 m]}", "SI"),
+    ],
+)
+def test_a_structure_is_shown_in_the_unit_in_which_it_is_given(nodes, expected, tmp_path):
     strut = "{pairs: [[a, b]], diameter: 6 mm, density: 2.7 g/cm^3, node_diameter: 6 mm}"
-    (tmp_path / "small.yaml").write_text(
-        f"unit: mm\nnodes: {{a: [0, 0, 0], b: [300, 0, 100]}}\nstruts: {{rod: {strut}}}"
-    )
-    robot = f"robot: !Structure {{file: {tmp_path / 'small.yaml'}}}"
-    own = "base: prism\ngait_bounds: {turn: 0}\n" + robot
-    (tmp_path / "own.yaml").write_text(own)
-    scenario = load_scenario(tmp_path / "own.yaml")
-    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))
-    recorded = load_scenario(tmp_path / "record.yaml")
-    changed = scenario.with_changes({"robot.gravity": "9 m/s^2"})
-    for shown in (scenario, recorded, changed):
-        assert shown.units == SYSTEMS["mm"]
-    assert recorded == scenario
-
-
-def test_a_structure_given_in_metres_is_shown_in_metres(tmp_path):
-    text = """
-    nodes: {a: [0 m, 0 m, 0 m], b: [3 m, 0 m, 1 m]}
-    struts: {tube: {pairs: [[a, b]], diameter: 60 mm, density: 2.7 g/cm^3, node_diameter: 60 mm}}
-    """
-    (tmp_path / "big.yaml").write_text(text)
-    robot = read_structure(tmp_path / "big.yaml")
-    assert load_scenario("prism").with_sections(robot=robot).units == SYSTEMS["SI"]
+    (tmp_path / "own.yaml").write_text(f"{nodes}\nstruts: {{rod: {strut}}}")
+    robot = read_structure(tmp_path / "own.yaml")
+    scenario = load_scenario("prism").with_sections(robot=robot)
+    assert units_of(scenario, tmp_path) == SYSTEMS[expected]
 
 
 @pytest.mark.parametrize(
@@ -121,12 +105,8 @@ def test_a_structure_given_in_metres_is_shown_in_metres(tmp_path):
     [
         ("6 in", "m"),
         ("240 mm/s", "m/s"),
-        ("20 ms", "s"),
-        ("0.5 s", "s"),
         ("27 lbf*s/in^2", "N*s/m^2"),
-        ("1000 N/m", "N/m"),
         ("9.80665 m/s^2", "m/s^2"),
-        ("5 deg", "rad"),
         ("1 /rad", "1/rad"),
         ("0.125", ""),
         ("0", "m"),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat, SceneGraph
+from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
@@ -51,13 +51,20 @@ def hinged_rod(builder: DiagramBuilder) -> tuple[MultibodyPlant, Frame]:
     return plant, tip
 
 
-def tendons(plant: MultibodyPlant, tip: Frame, law: CableLaw = LAW) -> list[Cable]:
-    """Tendons from the world to the free end. The plant must not be finalized."""
-    anchors = {"left": LEFT, "right": RIGHT}
-    return [
-        Cable(name, AddFrame(plant, name, plant.world_frame(), place), tip, law)
-        for name, place in anchors.items()
-    ]
+Arm = tuple[DiagramBuilder, MultibodyPlant, Frame, list[Cable]]
+
+
+def rod_with_tendons(**constants: object) -> Arm:
+    """The hinged rod, its free end, and two tendons to it from the world, by a law with other
+    constants."""
+    builder = DiagramBuilder()
+    plant, tip = hinged_rod(builder)
+    cables, law = [], LAW._replace(**constants)
+    for name, place in {"left": LEFT, "right": RIGHT}.items():
+        anchor = AddFrame(plant, name, plant.world_frame(), place)
+        cables.append(Cable(name, anchor, tip, law))
+    plant.Finalize()
+    return builder, plant, tip, cables
 
 
 def simulated(diagram: Diagram, time: float) -> Simulator:
@@ -78,10 +85,7 @@ def state_at(diagram: Diagram, time: float) -> np.ndarray:
 def test_an_arm_comes_to_rest_where_two_tendons_balance_its_weight():
     # Tendons without free length: the energy is -u . (k L (a + b) - m g L / 2 z), up to a
     # constant, for the direction u of the rod and the anchors a and b.
-    builder = DiagramBuilder()
-    plant, tip = hinged_rod(builder)
-    cables = tendons(plant, tip)
-    plant.Finalize()
+    builder, plant, _, cables = rod_with_tendons()
     AddCables(builder, plant, cables=cables)
     angle, rate = state_at(builder.Build(), 4.0)
     pull = LAW.stiffness * (LEFT + RIGHT) - 0.5 * MASS * GRAVITY * np.array([0.0, 0.0, 1.0])
@@ -126,9 +130,7 @@ def test_tendons_of_an_arm_of_drakes_are_its_linear_spring_dampers():
 
 
 def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffness():
-    builder = DiagramBuilder()
-    plant, tip = hinged_rod(builder)
-    plant.Finalize()
+    builder, plant, tip, _ = rod_with_tendons()
     law = GroundSection(stiffness=2e3, damping=2e4)
     ground = make_surface(law, Coulomb(), Flat())
     contact = AddGroundContact(builder, plant, frames=[tip], ground=ground)
@@ -144,10 +146,7 @@ def test_a_hinged_rod_sinks_into_the_ground_by_half_its_weight_over_the_stiffnes
 
 def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
     def angle(actuation: Winch | None) -> float:
-        builder = DiagramBuilder()
-        plant, tip = hinged_rod(builder)
-        cables = tendons(plant, tip, LAW._replace(free_length=0.15))
-        plant.Finalize()
+        builder, plant, _, cables = rod_with_tendons(free_length=0.15)
         actuated = {"pull": ["right"]}
         network = AddCables(builder, plant, cables=cables, actuated=actuated, actuation=actuation)
         signal = builder.AddSystem(ConstantVectorSource([6.0]))
@@ -158,84 +157,53 @@ def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
     assert angle(winch) == pytest.approx(angle(None), abs=1e-6)
 
 
-def test_an_unknown_cable_and_a_frame_of_the_world_are_refused(refused):
-    builder = DiagramBuilder()
-    plant, tip = hinged_rod(builder)
-    cables = tendons(plant, tip)
-    plant.Finalize()
-    with refused("AddCables", "actuated.pull", "'rigth'", "right"):
-        AddCables(builder, plant, cables=cables, actuated={"pull": ["rigth"]})
-    ground = make_surface(GroundSection(stiffness=1e3, damping=0.0), Coulomb(), Flat())
-    with refused("AddGroundContact", "frames", "world"):
-        AddGroundContact(builder, plant, frames=[cables[0].frame_a], ground=ground)
-
-
 @pytest.mark.parametrize(
-    ("constant", "value"),
+    ("constants", "key", "fact"),
     [
-        ("stiffness", -1.0),
-        ("damping", -1e-9),
-        ("free_length", -0.1),
-        ("free_length", math.nan),
-        ("damping", math.inf),
-        ("stiffness", "60 N/m"),
+        ({}, "actuated.pull", "'right'"),
+        ({"stiffness": -1.0}, "cables.left.stiffness", "-1.0"),
+        ({"free_length": math.nan}, "cables.left.free_length", "nan"),
+        ({"stiffness": "60 N/m"}, "cables.left.stiffness", "60 N/m"),
     ],
 )
-def test_constants_that_no_cable_has_are_refused(constant, value, refused):
-    builder = DiagramBuilder()
-    plant, tip = hinged_rod(builder)
-    cables = tendons(plant, tip, LAW._replace(**{constant: value}))
-    plant.Finalize()
-    with refused("AddCables", f"cables.left.{constant}", str(value)):
-        AddCables(builder, plant, cables=cables)
+def test_cables_that_cannot_be_are_refused(constants, key, fact, refused):
+    builder, plant, _, cables = rod_with_tendons(**constants)
+    with refused("AddCables", key, fact):
+        AddCables(builder, plant, cables=cables, actuated={"pull": ["rigth"]})
 
 
 def test_two_cables_of_one_name_are_refused(refused):
-    builder = DiagramBuilder()
-    plant, tip = hinged_rod(builder)
-    cables = tendons(plant, tip)
-    plant.Finalize()
+    builder, plant, _, cables = rod_with_tendons()
     with refused("AddCables", "cables.left", "twice"):
         AddCables(builder, plant, cables=[*cables, cables[0]])
 
 
-@pytest.mark.parametrize(
-    ("constant", "force"),
-    [("stiffness", NormalForce(-1.0, 0.0)), ("damping", NormalForce(1e3, math.nan))],
-)
-def test_constants_that_no_ground_has_are_refused(constant, force, refused):
-    builder = DiagramBuilder()
-    plant, tip = hinged_rod(builder)
-    plant.Finalize()
+def test_ground_that_cannot_be_is_refused(refused):
+    builder, plant, tip, cables = rod_with_tendons()
     ground = make_surface(GroundSection(stiffness=1e3, damping=0.0), Coulomb(), Flat())
-    with refused("AddGroundContact", f"ground.{constant}"):
-        wrong = ground._replace(normal=np.array(force))
+    with refused("AddGroundContact", "frames", "world"):
+        AddGroundContact(builder, plant, frames=[cables[0].frame_a], ground=ground)
+    wrong = ground._replace(normal=np.array(NormalForce(1e3, math.nan)))
+    with refused("AddGroundContact", "ground.damping"):
         AddGroundContact(builder, plant, frames=[tip], ground=wrong)
 
 
-def test_forces_add_to_what_is_connected_to_the_plant(scenario):
-    def acceleration(push: float, *, attached: bool) -> np.ndarray:
-        builder = DiagramBuilder()
-        plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-        bodies = [
-            plant.AddRigidBody(name, SpatialInertia.SolidSphereWithMass(1.0, 0.1)) for name in "ab"
-        ]
-        plant.Finalize()
-        force = builder.AddSystem(ConstantVectorSource(np.full(12, push)))
+def test_forces_add_to_what_is_connected_to_the_plant():
+    def acceleration(moment: float) -> float:
+        """Of the level rod at rest, in rad/s²."""
+        builder, plant, _, cables = rod_with_tendons()
+        motor = builder.AddSystem(ConstantVectorSource([moment]))
         port = plant.get_applied_generalized_force_input_port()
-        builder.Connect(force.get_output_port(), port)
-        plant.SetDefaultFloatingBaseBodyPose(bodies[1], RigidTransform([0.3, 0.0, 0.0]))
-        if attached:
-            ends = [body.body_frame() for body in bodies]
-            AddCables(builder, plant, cables=[Cable("between", *ends, CableLaw(10.0, 0.0, 0.1))])
+        builder.Connect(motor.get_output_port(), port)
+        AddCables(builder, plant, cables=cables)
         diagram = builder.Build()
         derivatives = diagram.EvalTimeDerivatives(diagram.CreateDefaultContext())
-        return derivatives.get_generalized_velocity().CopyToVector()
+        return float(derivatives.get_generalized_velocity().CopyToVector()[0])
 
-    difference = acceleration(3.0, attached=True) - acceleration(3.0, attached=False)
-    expected = np.zeros((2, 6))
-    expected[:, 3] = [2.0, -2.0]  # 10 N/m (0.3 m - 0.1 m) on 1 kg
-    np.testing.assert_allclose(difference.reshape(2, 6), expected, atol=1e-12)
+    pull = LAW.stiffness * (LEFT + RIGHT)[2] - 0.5 * MASS * GRAVITY  # at the tip, upward
+    for moment in (0.0, 3.0):
+        expected = (moment + LENGTH * pull) / (MASS * LENGTH**2 / 3.0)
+        assert acceleration(moment) == pytest.approx(expected, rel=1e-12)
 
 
 def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
@@ -252,20 +220,15 @@ def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
     for height in (0.5, 1.0, 1.5):
         place = RigidTransform([0.0, 0.0, height])
         plant.SetFreeBodyPose(plant.GetMyMutableContextFromRoot(root), ball, place)
-        ends = np.sort(shown_cylinders(scene_graph, scene_graph.GetMyContextFromRoot(root)), axis=0)
-        assert (ends.min(), ends.max()) == pytest.approx((0.0, height))
-        assert (ends[1:, 0] <= ends[:-1, 1] + 1e-12).all()  # no gap
-
-
-def shown_cylinders(scene_graph: SceneGraph, context: object) -> np.ndarray:
-    """Lower and upper ends (cylinders, 2) of all upright cylinders in m."""
-    query = scene_graph.get_query_output_port().Eval(context)
-    inspector, ends = query.inspector(), []
-    for geometry in inspector.GetAllGeometryIds():
-        half = inspector.GetShape(geometry).length() / 2
-        height = query.GetPoseInWorld(geometry).translation()[2]
-        ends.append([height - half, height + half])
-    return np.array(ends)
+        context = scene_graph.GetMyContextFromRoot(root)
+        query = scene_graph.get_query_output_port().Eval(context)
+        inspector = query.inspector()
+        pieces = inspector.GetAllGeometryIds()
+        middles = np.sort([query.GetPoseInWorld(piece).translation()[2] for piece in pieces])
+        (length,) = {inspector.GetShape(piece).length() for piece in pieces}
+        assert middles[0] - length / 2 == pytest.approx(0.0)
+        assert middles[-1] + length / 2 == pytest.approx(height)
+        assert np.diff(middles).max() <= length + 1e-12, "no gap"
 
 
 def test_a_robot_is_shown_in_meshcat_with_struts_nodes_and_cables():

@@ -26,11 +26,6 @@ def gait(scenario: Scenario, data: Path) -> Gait:
     return load_gait(data / "gait_b.json", scenario)
 
 
-def test_has_the_blocks_of_the_thesis_and_nothing_to_show_or_log(robot, gait):
-    names = {system.get_name() for system in MakeTensegrityDiagram(robot, gait).GetSystems()}
-    assert names == {"cpg", "start_up", "cables", "ground", "forces", "plant"}
-
-
 def test_exports_what_a_user_plots(robot, gait):
     diagram = MakeTensegrityDiagram(robot, gait)
     context = diagram.CreateDefaultContext()
