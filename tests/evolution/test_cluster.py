@@ -38,23 +38,22 @@ def cluster(one_cluster):
 @pytest.fixture
 def tasks(scenario):
     generator, space = np.random.default_rng(2), ParameterSpace.of(scenario)
-    return analytic.tasks_of(space.random(generator) for _ in range(40))
+    return analytic.tasks_of(space.random(generator) for _ in range(15))
 
 
+@pytest.mark.slow
 def test_what_ends_its_worker_is_named(cluster, tasks, tmp_path, monkeypatch, refused):
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 1)
-    others = {}
     with (
         refused(tasks[12], "", "died"),
         dask_cluster(cluster) as make,
         OnExecutor(analytic.Dying(tmp_path, always=(12,)), make, 2) as evaluator,
     ):
-        for task, evaluation in evaluate_all(evaluator, tasks[:15]):
-            others[task.index] = evaluation
-    assert others == {i: analytic.Bowl()(tasks[i]) for i in others}
-    assert 12 not in others
+        for task, evaluation in evaluate_all(evaluator, tasks):
+            assert evaluation == analytic.Bowl()(task)
 
 
+@pytest.mark.slow
 def test_only_this_machine_can_reach_the_cluster(cluster):
     for address in (cluster.scheduler_address, cluster.dashboard_link):
         port = urlsplit(address).port
@@ -76,26 +75,20 @@ class Killer:
             self.killed += 1
 
 
-DRAWN = analytic.DrawnBowl(delay=0.05)
-
-
-def record_on(evaluator, directory, **options):
-    """The record of two trials of 28 evaluations among draws."""
-    analytic.record_run(
-        directory, analytic.drawn_scenario(iterations=8), evaluator=evaluator, **options
-    )
-    return analytic.read_record(directory)
-
-
+@pytest.mark.slow
 def test_killed_workers_leave_no_trace(cluster, tmp_path):
+    """Of two trials of 28 evaluations among draws."""
+    scenario, bowl = analytic.drawn_scenario(iterations=8), analytic.DrawnBowl(delay=0.05)
+    analytic.record_run(tmp_path / "whole", scenario, evaluate=bowl)
     killer = Killer(cluster)
-    whole = record_on(analytic.in_threads(DRAWN), tmp_path / "whole")
     with dask_cluster(cluster) as make:
-        disturbed = OnExecutor(DRAWN, make, 2)
-        assert record_on(disturbed, tmp_path / "disturbed", show=killer) == whole
+        evaluator = OnExecutor(bowl, make, 2)
+        analytic.record_run(tmp_path / "run", scenario, evaluator=evaluator, show=killer)
     assert killer.killed >= 1
+    assert analytic.read_record(tmp_path / "run") == analytic.read_record(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, tasks):
     with (
         pytest.raises(KeyboardInterrupt),
@@ -106,11 +99,12 @@ def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, tasks):
             assert cluster.scheduler.tasks
             raise KeyboardInterrupt
     deadline = time.monotonic() + 10.0
-    while cluster.scheduler.tasks and time.monotonic() < deadline:
+    while cluster.scheduler.tasks:
+        assert time.monotonic() < deadline
         time.sleep(0.05)
-    assert not cluster.scheduler.tasks
 
 
+@pytest.mark.slow
 def test_workers_with_other_versions_are_refused(cluster, refused):
     with distributed.Client(cluster) as client:
         client.run(setattr, metadata, "version", str.upper)

@@ -52,9 +52,8 @@ def highest(result):
     return result.trajectory["p_WN"].sel(axis="z").max()
 
 
-@pytest.mark.parametrize("engine", ["!Drake", "!Compiled"])
-def test_objectives_that_read_the_trajectory_say_so(tiny, vectors, engine, refused, monkeypatch):
-    scenario = tiny.with_changes({"engine": engine})
+def test_objectives_that_read_the_trajectory_say_so(tiny, vectors, refused, monkeypatch):
+    scenario = tiny.with_changes({"engine": "!Compiled"})
     with refused("objective", "", "needs_trajectory"):
         GaitEvaluation(scenario, highest)(Task(vectors[0]))
     monkeypatch.setattr(highest, "needs_trajectory", True, raising=False)
@@ -69,7 +68,6 @@ FAILING = [
     ({"simulation.max_evaluations": 50}, None, "step budget: "),
     ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, None, "diverged: "),
     ({}, lambda result: math.nan, "diverged: "),
-    ({"simulation.duration": "60 s", "evolution.time_budget": "0.01 s"}, None, "time budget: "),
 ]
 
 
@@ -109,7 +107,7 @@ def test_an_error_of_an_objective_in_lanes_ends_the_run(tiny, vectors):
         evaluated(lanes, tasks_of(vectors))
 
 
-@pytest.mark.parametrize("returned", ["far", "3.2", None, [1.0], np.zeros(2), 1j])
+@pytest.mark.parametrize("returned", ["3.2", None, np.zeros(2)])
 def test_an_objective_that_returns_no_number_is_named_with_what_it_returned(
     tiny, vectors, refused, monkeypatch, returned
 ):

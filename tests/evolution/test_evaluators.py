@@ -29,35 +29,24 @@ def on_processes(evaluate, workers):
     return OnExecutor(evaluate, ProcessPoolExecutor, workers)
 
 
-@pytest.mark.parametrize("make", [InProcesses, analytic.in_threads])
-def test_every_task_is_evaluated_once_also_when_workers_are_recycled(tasks, monkeypatch, make):
+@pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
+def test_every_task_is_evaluated_also_when_workers_are_recycled_or_die(
+    tasks, tmp_path, monkeypatch, make, once
+):
     monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 4)
-    with make(analytic.Bowl(), 2) as evaluator:
+    with make(analytic.Dying(tmp_path, once=once), 2) as evaluator:
         evaluations = analytic.evaluated(evaluator, tasks)
         assert analytic.evaluated(evaluator, []) == {}
     assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
 
 
-@pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
-def test_a_task_whose_worker_dies_is_tried_once_more(tasks, tmp_path, make, once):
-    with make(analytic.Dying(tmp_path, once=once), 2) as evaluator:
-        evaluations = analytic.evaluated(evaluator, tasks)
-    assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
-
-
 @pytest.mark.parametrize("make", [InProcesses, on_processes])
-def test_a_task_whose_worker_dies_twice_is_named(tasks, tmp_path, make, refused):
-    dying = analytic.Dying(tmp_path, always=(4,))
-    with refused("trial 0, evaluation 4", "", "died"), make(dying, 2) as evaluator:
-        analytic.evaluated(evaluator, tasks)
-
-
-def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, refused):
-    run = tmp_path / "run"
-    analytic.record_run(tmp_path / "whole", analytic.small_scenario(trials=1))
+def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, make, refused):
+    run, scenario = tmp_path / "run", analytic.small_scenario(trials=1)
+    analytic.record_run(tmp_path / "whole", scenario)
     with refused("trial 0, evaluation 17", "", "died"):
         dying = analytic.Dying(tmp_path, always=(17,))
-        analytic.record_run(run, analytic.small_scenario(trials=1), evaluator=InProcesses(dying, 2))
+        analytic.record_run(run, scenario, evaluator=make(dying, 2))
     assert load_run(run).evaluations["failure"].isin([None, "fell off the table"]).all()
     analytic.record_run(run)
     assert analytic.read_record(run) == analytic.read_record(tmp_path / "whole")
@@ -123,9 +112,9 @@ def test_a_program_without_guard_is_told(call, tmp_path):
 @pytest.mark.parametrize(
     ("how", "call", "alone"),
     [
-        ("stdin", "evolve()", True),
         ("argument", "evolve(objective=objective)", True),
-        ("argument", "evolve()", False),
+        pytest.param("stdin", "evolve()", True, marks=pytest.mark.slow),
+        pytest.param("argument", "evolve()", False, marks=pytest.mark.slow),
     ],
 )
 def test_evolution_works_where_processes_cannot_import_the_program(how, call, alone, tmp_path):
