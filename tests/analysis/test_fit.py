@@ -152,7 +152,8 @@ def test_predictions_that_are_not_smooth_have_no_intervals(add_waves, uncertaint
     assert said in warning and not_said not in warning
 
 
-def test_a_search_finds_the_deepest_of_many_minima(add_waves):
+def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
+    monkeypatch.setattr("tetra_drake.analysis.fit.MOST", 160)
     cases = pulled_down(310.0, 0.4, np.zeros(4))[:: len(PULLS) - 1]
     add_waves(5e-3, 0.2)
     bounds = {STIFFNESS: (100.0, 400.0)}
@@ -273,8 +274,7 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
     assert f"{fitted.stiffness:.1f} ± " in printed
     assert pandas.read_csv(out / "parameters.csv")["value"][0] == pytest.approx(fitted.stiffness)
     assert json.loads((out / "summary.json").read_text())["evaluations"] > 3
-    page = (out / "README.md").read_text()
-    assert "robot.cables.line.stiffness" in page
+    assert STIFFNESS in (out / "README.md").read_text()
     assert (out / "residuals.figure.svg").stat().st_size > 1000
 
 
@@ -327,13 +327,9 @@ def test_a_log_in_parquet_has_the_numbers_of_the_csv_file(lab, tmp_path, monkeyp
     def numbers(log):
         return captured(log, lab).read(scenario, "").numbers
 
-    for times_are_the_index in (False, True):
-        written = table.set_index("time_s") if times_are_the_index else table
+    for written in (table, table.set_index("time_s")):
         written.to_parquet(tmp_path / "log.parquet")
         assert numbers(tmp_path / "log.parquet").equals(numbers(lab / "log.csv"))
-    (tmp_path / "text.parquet").write_text("time_s,n3 z_mm\n0,1\n")
-    with refused(tmp_path / "text.parquet", ""):
-        numbers(tmp_path / "text.parquet")
 
     def without_pyarrow(content):
         raise ImportError("pyarrow")
