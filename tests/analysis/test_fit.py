@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pandas
@@ -11,7 +12,7 @@ from helpers.anchored import HUNG, scenario_of, supported_prism
 
 from tetra_drake.analysis import measurements
 from tetra_drake.analysis.fit import fit_values
-from tetra_drake.analysis.measurements import MotionCapture, Rest, load_fit_file
+from tetra_drake.analysis.measurements import MotionCapture, Rest
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.experiment import fit
@@ -58,20 +59,6 @@ def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_str
     assert found.correlations.loc[STIFFNESS, FREE_LENGTH] == pytest.approx(-expected, rel=1e-3)
     fitted = found.scenario.robot.cables["line"]
     assert (fitted.stiffness, fitted.free_length) == tuple(found.parameters["value"])
-
-
-@pytest.mark.slow
-def test_hidden_constants_are_within_their_intervals_in_nine_of_ten_noise_draws():
-    """Of 100 intervals of 95 % each, fewer than 90 hold with a probability of 1 %; the draws are
-    fixed."""
-    generator, inside = np.random.default_rng(4), np.zeros(2)
-    truth = np.array([210.0, 0.39])
-    for _ in range(100):
-        noise = NOISE * generator.standard_normal(4)
-        least_and_most_load = pulled_down(*truth, noise)[:: len(PULLS) - 1]
-        table = fit_values(hung(), least_and_most_load, BOUNDS).parameters
-        inside += (table["low"] <= truth) & (truth <= table["high"])
-    assert (inside >= 90).all()
 
 
 def test_a_parameter_without_influence_is_told_and_stays():
@@ -163,17 +150,13 @@ def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
     assert found.misfit < 1e-3
 
 
-class Stopped(Exception):
-    pass
-
-
 def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
     cases, predict = pulled_down(210.0, 0.39, np.zeros(4)), measurements._MeasuredRest.predict
     cases, predicted, stop = cases[:: len(PULLS) - 1], [], math.inf
 
     def counted(self, scenarios):
         if len(predicted) >= stop:
-            raise Stopped
+            raise InterruptedError
         predicted.append(len(scenarios))
         return predict(self, scenarios)
 
@@ -182,7 +165,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
     whole = fit(hung(), cases, BOUNDS, search=True)
     needed = len(predicted)
     predicted, stop = [], 2 * len(cases)
-    with pytest.raises(Stopped):
+    with pytest.raises(InterruptedError):
         fit(hung(), cases, BOUNDS, search=True, out=tmp_path)
     stop = math.inf
     again = fit(hung(), cases, BOUNDS, search=True, out=tmp_path)
@@ -307,7 +290,6 @@ def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, tmp_pat
         ("time,n3 z_mm\n0,1\n", "time_s"),
         ("time_s,n3 z_mm\n0,1\n2,1\n1,1\n", "line 4, time_s"),
         ("time_s,n3 z_mm\n0,1\n,1\n", "line 3, time_s"),
-        ("time_s,n3 z_mm\n0,\n1,\n", ""),
         ("time_s,n3 z_mm\n0,1\n9,1\n", "time_s"),
         ("time_s,n3 z_mm\n0,1\n1,1\n", "time_s"),  # the command takes 1.45 s
     ],
@@ -330,25 +312,17 @@ def test_a_log_in_parquet_has_the_numbers_of_the_csv_file(lab, tmp_path, monkeyp
     for written in (table, table.set_index("time_s")):
         written.to_parquet(tmp_path / "log.parquet")
         assert numbers(tmp_path / "log.parquet").equals(numbers(lab / "log.csv"))
-
-    def without_pyarrow(content):
-        raise ImportError("pyarrow")
-
-    monkeypatch.setattr(pandas, "read_parquet", without_pyarrow)
+    monkeypatch.setattr(pandas, "read_parquet", Mock(side_effect=ImportError))
     with refused(tmp_path / "log.parquet", "", "pip install 'tetra_drake[parquet]'"):
         numbers(tmp_path / "log.parquet")
 
 
-def test_unknown_names_and_keys_of_measurements_are_refused(tmp_path, refused):
+def test_unknown_names_of_measurements_are_refused(refused):
     bounds = {STIFFNESS: (100.0, 400.0)}
     with refused("measurement 1", "positions.c z"):
         fit_values(hung(), [Rest(positions={"c z": 0.1})], bounds)
     with refused("measurement 1", "tensions.line"):
         fit_values(hung(), [Rest(tensions={"line": 0.1})], bounds)
-    file = tmp_path / "fit.yaml"
-    file.write_text(FIT_FILE.replace("583 mm", "583"))
-    with refused(file, "measurements[0].positions.a z"):
-        load_fit_file(Path(file))
 
 
 SLIDING = SIDE | {"friction.kinetic": (0.1, 0.26)}

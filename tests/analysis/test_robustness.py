@@ -194,10 +194,6 @@ def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement
     assert {row["what"] for row in summary["changes"]} == set(judgement.alone["what"])
 
 
-def test_nothing_is_written_for_a_gait_of_another_robot(scenario, tmp_path, refused, capsys):
+def test_a_gait_of_another_robot_is_refused(scenario, refused):
     with refused("gait random gait 1", "weights", "expected 4"):
         robustness.judge(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)
-    gait, out = tmp_path / "gait.json", tmp_path / "out"
-    save_gait(seeded_gait(scenario, 1), gait, scenario)
-    assert main(["robustness", str(gait), "--out", str(out)]) == 2
-    assert str(gait) in capsys.readouterr().err and not out.exists()

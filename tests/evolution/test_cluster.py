@@ -62,29 +62,23 @@ def test_only_this_machine_can_reach_the_cluster(cluster):
             socket.create_connection(("127.0.0.2", port), timeout=5.0)
 
 
-class Killer:
-    """Kills one of the cluster's workers, any, after every 30 evaluations of a run."""
-
-    def __init__(self, cluster):
-        self.cluster, self.generator, self.killed = cluster, np.random.default_rng(), 0
-
-    def __call__(self, statuses):
-        up = [nanny.pid for nanny in list(self.cluster.workers.values()) if nanny.pid]
-        if up and sum(status.evaluations for status in statuses) >= 30 * (self.killed + 1):
-            os.kill(self.generator.choice(up), signal.SIGKILL)
-            self.killed += 1
-
-
 @pytest.mark.slow
 def test_killed_workers_leave_no_trace(cluster, tmp_path):
-    """Of two trials of 28 evaluations among draws."""
+    """Of two trials of 28 evaluations among draws, a worker is killed after every 20."""
     scenario, bowl = analytic.drawn_scenario(iterations=8), analytic.DrawnBowl(delay=0.05)
     analytic.record_run(tmp_path / "whole", scenario, evaluate=bowl)
-    killer = Killer(cluster)
+    killed = []
+
+    def kill(statuses):
+        up = [nanny.pid for nanny in list(cluster.workers.values()) if nanny.pid]
+        if up and sum(status.evaluations for status in statuses) >= 20 * (len(killed) + 1):
+            killed.append(np.random.default_rng().choice(up))
+            os.kill(killed[-1], signal.SIGKILL)
+
     with dask_cluster(cluster) as make:
         evaluator = OnExecutor(bowl, make, 2)
-        analytic.record_run(tmp_path / "run", scenario, evaluator=evaluator, show=killer)
-    assert killer.killed >= 1
+        analytic.record_run(tmp_path / "run", scenario, evaluator=evaluator, show=kill)
+    assert killed
     assert analytic.read_record(tmp_path / "run") == analytic.read_record(tmp_path / "whole")
 
 

@@ -21,8 +21,7 @@ def test_a_run_loads_as_tables(run_small):
     assert len(run.evaluations) == 2 * 42
     assert run.evaluations["weight_3"].iloc[20] == run.vector(0, 20)[2]
     failed = run.evaluations["failure"].notna()
-    assert failed.any()
-    assert run.evaluations["fitness"][failed].isna().all()
+    assert failed.any() and failed.equals(run.evaluations["fitness"].isna())
     walked = run.evaluations[~failed]
     np.testing.assert_array_equal(walked["distance_in"], walked["distance"] / INCH)
     means = run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness")
@@ -34,11 +33,9 @@ def test_a_run_loads_as_tables(run_small):
 
 def test_a_run_in_progress_loads_and_is_left_alone(run_small):
     run = run_small()
-    path = run / "trial_00" / "evaluations.jsonl"
-    path.write_bytes(path.read_bytes()[:-10])
+    for path in run.glob("trial_00/*s.jsonl"):
+        path.write_bytes(path.read_bytes()[:-10])
     torn = path.read_bytes()
-    iterations = path.with_name("iterations.jsonl")
-    iterations.write_bytes(b"".join(iterations.read_bytes().splitlines(keepends=True)[:-1]))
     assert len(load_run(run).evaluations) == 2 * 42 - 1
     assert path.read_bytes() == torn
     for file in run.glob("trial_*/*"):
@@ -91,10 +88,7 @@ def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(
     assert run.initial_best(1).equals(run.evaluations.query("trial == 1 and index == 0").iloc[0])
     assert run.best_gait() == run.gait(1, 1) != run.gait(0, 0)
     assert run.gaits() == [run.gait(0, 0), run.gait(1, 1)]
-    names = [gait.name for gait in run.gaits(3)]
-    numbers = [(0, 0), (0, 3), (1, 1), (1, 0)]
-    assert names == [f"tiny, seed 7, trial {i}, evaluation {k}" for i, k in numbers]
-    assert run.scenario == run.manifest.scenario
+    assert run.gaits(3)[1].name == "tiny, seed 7, trial 0, evaluation 3"
     assert run.initial()["index"].tolist() == [0, 1, 2, 3, 0]
 
 

@@ -142,12 +142,9 @@ def test_steps_are_the_thesis_s(scenario):
         changed = scenario.with_changes(changes)
         return mutation_steps(ParameterSpace.of(changed), changed.optimizer)
 
-    assert steps({})[0] == 0.2
-    np.testing.assert_allclose(steps({})[[TAU_A, TAU_B]], [0.05, 0.1])
+    np.testing.assert_allclose(steps({})[[0, TAU_A, TAU_B]], [0.2, 0.05, 0.1])
     listing = {"optimizer.tau_mutation": "listing"}
     np.testing.assert_allclose(steps(listing)[[TAU_A, TAU_B]], [0.0, 0.1])
-    fixed = {"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}
-    np.testing.assert_array_equal(steps(fixed)[[TAU_A, TAU_B]], 0.0)
 
 
 def evaluate(vector):
