@@ -71,7 +71,6 @@ def test_the_interval_of_separated_trials_has_no_width_and_a_single_trial_has_no
     assert found.improvement.loc["b", "a"].tolist() == [0.0, 0.0, 0.0]
     single = found.improvement.loc["a", "c"]
     assert single["probability"] == 1.0 and single[["low", "high"]].isna().all()
-    assert compare(paths[:1]).improvement.empty
 
 
 def ends(**fitnesses):
@@ -166,10 +165,6 @@ def test_only_search_may_differ_without_a_note(run):
     assert compare([base, searches]).notes == []
     (note,) = compare([base, run("c", trial(1.0), changes={"robot.cables.slack": True})]).notes
     assert "robot.cables.slack" in note
-    required = run("d", trial(1.0), changes={"require.clearance": "1 mm"})
-    for pair in ([base, required], [required, base]):
-        (note,) = compare(pair).notes
-        assert "require.clearance" in note
 
 
 def test_different_objectives_and_runs_given_twice_are_refused(run, refused):
@@ -200,8 +195,8 @@ def test_the_command_prints_and_writes(run, tmp_path, capsys):
     assert main(["compare", *map(str, paths), *options]) == 0
     printed = capsys.readouterr().out
     assert all(text in printed for text in ("14.34 in", "never", "1 of 1", "0 of 1"))
-    files = ["comparison.png", "comparison.svg", "curves.csv", "summary.json", "trials.csv"]
-    assert sorted(path.name for path in out.iterdir()) == files
+    files = {"comparison.png", "comparison.svg", "curves.csv", "summary.json", "trials.csv"}
+    assert {path.name for path in out.iterdir()} == files
     summary = json.loads((out / "summary.json").read_text())
     assert [row["reached"] for row in summary["runs"]] == [2.0, None]
     assert pandas.read_csv(out / "trials.csv")["fitness"].tolist() == [30.0, 2.0]

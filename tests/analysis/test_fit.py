@@ -312,6 +312,9 @@ def test_a_log_in_parquet_has_the_numbers_of_the_csv_file(lab, tmp_path, monkeyp
     for written in (table, table.set_index("time_s")):
         written.to_parquet(tmp_path / "log.parquet")
         assert numbers(tmp_path / "log.parquet").equals(numbers(lab / "log.csv"))
+    (tmp_path / "text.parquet").write_text("time_s,n3 z_mm\n0,1\n")
+    with refused(tmp_path / "text.parquet", ""):
+        numbers(tmp_path / "text.parquet")
     monkeypatch.setattr(pandas, "read_parquet", Mock(side_effect=ImportError))
     with refused(tmp_path / "log.parquet", "", "pip install 'tetra_drake[parquet]'"):
         numbers(tmp_path / "log.parquet")
