@@ -123,20 +123,13 @@ def add_waves(monkeypatch):
     return add
 
 
-@pytest.mark.parametrize(
-    ("uncertainty", "said", "not_said"),
-    [(NOISE, "explain", "better"), (NOISE / 100.0, "better", "explain")],
-)
-def test_predictions_that_are_not_smooth_have_no_intervals(add_waves, uncertainty, said, not_said):
-    cases = pulled_down(210.0, 0.39, np.zeros(4))
-    cases = [case.model_copy(update={"position_uncertainty": uncertainty}) for case in cases]
+def test_predictions_that_are_not_smooth_have_no_intervals(add_waves):
     add_waves(2e-4, 1e3)
-    found = fit_values(hung(), cases, BOUNDS)
+    found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), BOUNDS)
     assert found.parameters["determined"].all() and found.parameters["low"].isna().all()
     (warning,) = [each for each in found.warnings if STIFFNESS in each and "smooth" in each]
-    # Whether the values may be far off follows from the misfit.
-    assert (found.misfit > 10.0) == (uncertainty < NOISE)
-    assert said in warning and not_said not in warning
+    # The values explain the data nevertheless.
+    assert found.misfit < 1.0 and "explain" in warning
 
 
 def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
