@@ -43,7 +43,7 @@ def test_an_interrupted_run_ends_alike_and_evaluates_nothing_again(optimizer, tm
     statuses = record_run(tmp_path / "whole", scenario, workers=1)
     assert [status.evaluations for status in statuses] == [40, 40]
     whole = read_record(tmp_path / "whole")
-    # After two iterations of the first trial, within some, and in the second trial.
+    # After two iterations of the first trial, within one, and in the second trial.
     ends = (tmp_path / "whole/trial_00/iterations.jsonl").read_text().splitlines()
     counts = [json.loads(line)["evaluations"] for line in (ends[0], ends[-1])]
     for count in {*counts, 11, 65}:
