@@ -1,7 +1,6 @@
 """Gaits evaluated among draws of disturbances, and requirements."""
 
 import dataclasses
-import json
 import math
 import re
 
@@ -20,14 +19,12 @@ from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"robot.cables.outer_stiffness": 0.05}
 SEED = (5, 0, 3)
-BOWL = analytic.DrawnBowl()
 
 
 @pytest.fixture(scope="module")
@@ -73,28 +70,10 @@ def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
     assert combined.fitness == approx((least + second / 2) / 1.5, rel=1e-14)
 
 
-def test_in_lanes_each_draw_has_one_robot_for_all_gaits_of_an_iteration(tiny, monkeypatch):
-    made, make = [], Robot.of
-
-    def counted(scenario):
-        made.append(scenario)
-        return make(scenario)
-
-    monkeypatch.setattr(Robot, "of", counted)
-    generator, space = np.random.default_rng(2), ParameterSpace.of(tiny)
-    tasks = analytic.tasks_of((space.random(generator) for _ in range(6)), SEED)
-    with InLanes(GaitEvaluation(tiny), LanePool(2)) as lanes:
-        first = lanes.submit(tasks[0]).result()
-        rest = analytic.evaluated(lanes, tasks[1:]).values()
-    assert len({gait.fitness for gait in (first, *rest)}) == 6
-    assert len(made) == 3
-
-
 def test_the_mean_over_the_worst_share_is_continuous_from_the_mean_to_the_least():
     fitnesses = [3.0, -1.0, 2.0, 8.0]
-    assert worst_mean(fitnesses, 1.0) == 3.0
-    assert worst_mean(fitnesses, 0.5) == 0.5
-    assert worst_mean(fitnesses, 0.25) == worst_mean(fitnesses, 0.1) == -1.0
+    found = [worst_mean(fitnesses, share) for share in (1.0, 0.5, 0.25, 0.1)]
+    assert found == [3.0, 0.5, -1.0, -1.0]
     shares = np.linspace(0.01, 1.0, 1000)
     means = np.array([worst_mean(fitnesses, share) for share in shares])
     # Beyond the least, share s counts 4 s draws: dm/ds = (worst of the rest - m) / s < 9 / 0.25.
@@ -159,52 +138,30 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, 
         assert (gait.fitness, gait.metrics, gait.draws) == (-math.inf, {}, None)
 
 
-@pytest.fixture
-def run_drawn(tmp_path):
-    """run_drawn(...): a small run among draws; its directory."""
-
-    def run(*, evaluate=BOWL, **options):
-        analytic.record_run(tmp_path / "run", analytic.drawn_scenario(**options), evaluate=evaluate)
-        return tmp_path / "run"
-
-    return run
-
-
-def test_all_gaits_of_an_iteration_share_its_draws(run_drawn):
+def test_all_gaits_of_an_iteration_share_its_draws_which_are_recorded(tmp_path, monkeypatch):
     seeds = []
 
     def evaluate(task):
         seeds.append(task.seed)
         return analytic.DrawnBowl()(task)
 
-    run_drawn(evaluate=evaluate)
-    expected = [(5, trial, 0) for trial in (0, 1) for _ in range(12)]
-    expected += [(5, t, i) for i in range(1, 16) for t in (0, 1) for _ in range(2)]
-    assert sorted(seeds) == sorted(expected)
+    analytic.record_run(tmp_path, analytic.drawn_scenario(), evaluate=evaluate)
+    iterations = [0] * 12 + [i for i in range(1, 16) for _ in range(2)]
+    assert sorted(seeds) == [(5, trial, i) for trial in (0, 1) for i in iterations]
 
+    table = load_run(tmp_path).evaluations
+    walked = table.dropna(subset="fitness")
+    assert table["draws_fitness"].notna().sum() == len(walked) < len(table)
+    for _, gait in walked.iterrows():
+        assert gait["fitness"] == worst_mean(gait["draws_fitness"], analytic.TAIL)
+        assert gait["distance"] == approx(np.mean(gait["draws_distance"]))
+        assert gait["worst_distance"] == min(gait["draws_distance"])
 
-def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
-    directory = run_drawn(trials=1)
-    lines = (directory / "trial_00" / "evaluations.jsonl").read_text().splitlines()
-    entries = [json.loads(line) for line in lines]
-    walked = [entry for entry in entries if entry["failure"] is None]
-    assert 0 < len(walked) < len(entries)
-    for entry in walked:
-        assert entry["fitness"] == worst_mean(entry["draws"]["fitness"], analytic.TAIL)
-        assert entry["metrics"]["distance"] == approx(np.mean(entry["draws"]["distance"]))
-    assert all("draws" not in entry for entry in entries if entry["failure"])
-    table = load_run(directory).evaluations.dropna(subset="fitness")
-    assert table["draws_fitness"].tolist() == [entry["draws"]["fitness"] for entry in walked]
-    worst = [min(entry["draws"]["distance"]) for entry in walked]
-    assert table["worst_distance"].tolist() == worst
-
-
-def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn, monkeypatch):
+    # A gait is evaluated once more among the draws that it had.
     name = "tetra_drake.evolution.reevaluation.evaluator_of"
-    monkeypatch.setattr(name, lambda *_, **__: analytic.in_threads(BOWL))
-    run = reevaluate(run_drawn())
-    again = run.reevaluations.set_index(["trial", "index"])
-    first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
+    monkeypatch.setattr(name, lambda *_, **__: analytic.in_threads(evaluate))
+    again = reevaluate(tmp_path).reevaluations.set_index(["trial", "index"])
+    first = table.set_index(["trial", "index"]).loc[again.index]
     assert len(again) == 2, "the best of each trial: 5 gaits would be 15 simulations"
     assert first["iteration"].max() > 0
     assert again["draws_fitness"].equals(first["draws_fitness"])

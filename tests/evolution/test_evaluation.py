@@ -35,12 +35,10 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
     with InProcesses(GaitEvaluation(tiny), 1) as processes:
         there = evaluated(processes, tasks)
     for index, vector in enumerate(vectors):
-        gait = ParameterSpace.of(tiny).gait(vector, name="any")
-        result = simulate(scenario=tiny, gait=gait, record=True)
-        assert here[index].fitness == there[index].fitness == result.fitness
-        assert here[index].metrics == there[index].metrics == result.metrics.to_json()
-        assert there[index].engine == "drake"
-        assert there[index].wall_time > 0.0
+        result = simulate(tiny, ParameterSpace.of(tiny).gait(vector, name="any"), record=True)
+        for found in (here[index], there[index]):
+            assert (found.fitness, found.metrics) == (result.fitness, result.metrics.to_json())
+            assert found.engine == "drake" and found.wall_time > 0.0
     assert here[0].fitness != here[1].fitness
     twisting = GaitEvaluation(tiny, lambda result: -result.metrics.twist - 1.0)(tasks[0])
     assert twisting.fitness == -here[0].metrics["twist"] - 1.0
@@ -52,9 +50,8 @@ def highest(result):
     return result.trajectory["p_WN"].sel(axis="z").max()
 
 
-@pytest.mark.parametrize("engine", ["!Drake", "!Compiled"])
-def test_objectives_that_read_the_trajectory_say_so(tiny, vectors, engine, refused, monkeypatch):
-    scenario = tiny.with_changes({"engine": engine})
+def test_objectives_that_read_the_trajectory_say_so(tiny, vectors, refused, monkeypatch):
+    scenario = tiny.with_changes({"engine": "!Compiled"})
     with refused("objective", "", "needs_trajectory"):
         GaitEvaluation(scenario, highest)(Task(vectors[0]))
     monkeypatch.setattr(highest, "needs_trajectory", True, raising=False)
@@ -69,7 +66,6 @@ FAILING = [
     ({"simulation.max_evaluations": 50}, None, "step budget: "),
     ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, None, "diverged: "),
     ({}, lambda result: math.nan, "diverged: "),
-    ({"simulation.duration": "60 s", "evolution.time_budget": "0.01 s"}, None, "time budget: "),
 ]
 
 
@@ -109,13 +105,11 @@ def test_an_error_of_an_objective_in_lanes_ends_the_run(tiny, vectors):
         evaluated(lanes, tasks_of(vectors))
 
 
-@pytest.mark.parametrize("returned", ["far", "3.2", None, [1.0], np.zeros(2), 1j])
-def test_an_objective_that_returns_no_number_is_named_with_what_it_returned(
-    tiny, vectors, refused, monkeypatch, returned
-):
+@pytest.mark.parametrize("returned", ["3.2", None, np.zeros(2)])
+def test_an_objective_that_returns_no_number_is_named(tiny, vectors, refused, returned):
     def judge(result):
         return returned
 
-    monkeypatch.setattr("tetra_drake.evolution.evaluation.simulate", lambda **_: None)
+    evaluate = GaitEvaluation(tiny.with_changes({"engine": "!Compiled"}), judge)
     with refused("objective", f"{__name__}.{judge.__qualname__}", f"returned {returned!r}"):
-        GaitEvaluation(tiny, judge)(Task(vectors[0]))
+        evaluate(Task(vectors[0]))

@@ -2,18 +2,16 @@
 
 import importlib
 import os
-import shutil
 import subprocess
 import sys
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
 from helpers import analytic
 
 from tetra_drake.evolution import evaluators
-from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.evaluators import InProcesses, OnExecutor, evaluator_of
+from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
 from tetra_drake.evolution.run import load_run
 from tetra_drake.robot.gait import ParameterSpace
 
@@ -29,35 +27,24 @@ def on_processes(evaluate, workers):
     return OnExecutor(evaluate, ProcessPoolExecutor, workers)
 
 
-@pytest.mark.parametrize("make", [InProcesses, analytic.in_threads])
-def test_every_task_is_evaluated_once_also_when_workers_are_recycled(tasks, monkeypatch, make):
+@pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
+def test_every_task_is_evaluated_also_when_workers_are_recycled_or_die(
+    tasks, tmp_path, monkeypatch, make, once
+):
     monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 4)
-    with make(analytic.Bowl(), 2) as evaluator:
+    with make(analytic.Dying(tmp_path, once=once), 2) as evaluator:
         evaluations = analytic.evaluated(evaluator, tasks)
         assert analytic.evaluated(evaluator, []) == {}
     assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
 
 
-@pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
-def test_a_task_whose_worker_dies_is_tried_once_more(tasks, tmp_path, make, once):
-    with make(analytic.Dying(tmp_path, once=once), 2) as evaluator:
-        evaluations = analytic.evaluated(evaluator, tasks)
-    assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
-
-
 @pytest.mark.parametrize("make", [InProcesses, on_processes])
-def test_a_task_whose_worker_dies_twice_is_named(tasks, tmp_path, make, refused):
-    dying = analytic.Dying(tmp_path, always=(4,))
-    with refused("trial 0, evaluation 4", "", "died"), make(dying, 2) as evaluator:
-        analytic.evaluated(evaluator, tasks)
-
-
-def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, refused):
-    run = tmp_path / "run"
-    analytic.record_run(tmp_path / "whole", analytic.small_scenario(trials=1))
+def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, make, refused):
+    run, scenario = tmp_path / "run", analytic.small_scenario(trials=1)
+    analytic.record_run(tmp_path / "whole", scenario)
     with refused("trial 0, evaluation 17", "", "died"):
         dying = analytic.Dying(tmp_path, always=(17,))
-        analytic.record_run(run, analytic.small_scenario(trials=1), evaluator=InProcesses(dying, 2))
+        analytic.record_run(run, scenario, evaluator=make(dying, 2))
     assert load_run(run).evaluations["failure"].isin([None, "fell off the table"]).all()
     analytic.record_run(run)
     assert analytic.read_record(run) == analytic.read_record(tmp_path / "whole")
@@ -74,10 +61,8 @@ def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, 
 PROGRAM = """
 import numpy as np
 import tetra_drake
-from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
+from tetra_drake.evolution.evaluators import InProcesses
 from helpers.analytic import Bowl, evaluated, small_scenario, tasks_of
-def evaluate(task):
-    return Bowl()(task)
 def objective(result):
     return result.metrics.twist
 def evolve(**options):
@@ -87,84 +72,43 @@ def evolve(**options):
     print(len(run.evaluations), run.statuses[0].failures)
 """
 EVALUATE = """
-with InProcesses(evaluate, 1) as processes:
+with InProcesses(Bowl(), 1) as processes:
     print(evaluated(processes, tasks_of(np.ones((1, 26)))))
 """
 
 
-def run_program(folder, call, *, how, launcher=()):
+def run_program(folder, call, *, how):
     """A program that is a file, read from standard input or given by -c, as it has ended."""
     program = PROGRAM + call
     (folder / "program.py").write_text(program)
     source = {"file": [folder / "program.py"], "stdin": ["-"], "argument": ["-c", program]}[how]
-    as_root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return subprocess.run(
-        [*launcher, sys.executable, *(["-m", "mpi4py.futures"] if launcher else []), *source],
+        [sys.executable, *source],
         input=program if how == "stdin" else None,
         text=True,
         capture_output=True,
-        env=os.environ | as_root | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
         timeout=300,  # s; a minute is too short beside other work
         cwd=folder,
     )
 
 
-@pytest.mark.parametrize(
-    "call", [EVALUATE, pytest.param("evolve(overwrite=True)", marks=pytest.mark.slow)]
-)
-def test_a_program_without_guard_is_told(call, tmp_path):
-    ended = run_program(tmp_path, call, how="file")
+def test_a_program_without_guard_is_told(tmp_path):
+    ended = run_program(tmp_path, EVALUATE, how="file")
     assert ended.returncode == 1 and ended.stdout == ""
     error = ended.stderr.splitlines()[-1]
     assert "InputError" in error and "__main__" in error
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
     ("how", "call", "alone"),
     [
-        ("stdin", "evolve()", True),
         ("argument", "evolve(objective=objective)", True),
-        ("argument", "evolve()", False),
+        pytest.param("stdin", "evolve()", True, marks=pytest.mark.slow),
+        pytest.param("argument", "evolve()", False, marks=pytest.mark.slow),
     ],
 )
 def test_evolution_works_where_processes_cannot_import_the_program(how, call, alone, tmp_path):
     ended = run_program(tmp_path, call, how=how)
     assert ended.stdout == "6 0\n", ended.stderr
     assert ended.stderr.count("in this process") == alone
-
-
-MPI = """
-from mpi4py.futures import MPIPoolExecutor
-if __name__ == "__main__":
-    tasks = tasks_of(np.full(26, 1.0 + i / 7) for i in range(9))
-    for _ in range(2):
-        with OnExecutor(Bowl(), MPIPoolExecutor, 2) as evaluator:
-            evaluations = evaluated(evaluator, tasks)
-            print([evaluations[i] == Bowl()(tasks[i]) for i in range(9)])
-"""
-
-
-def test_mpi_is_an_executor(tmp_path):
-    pytest.importorskip("mpi4py")
-    if not (mpiexec := shutil.which("mpiexec")):
-        pytest.skip("mpiexec is not installed")
-    launcher = [mpiexec, "--oversubscribe", "-n", "3"]
-    ended = run_program(tmp_path, MPI, how="file", launcher=launcher)
-    assert ended.stdout.splitlines() == [str([True] * 9)] * 2, ended.stderr
-
-
-def test_the_engine_and_what_is_given_choose_the_evaluator(scenario, monkeypatch):
-    monkeypatch.setattr("tetra_drake.engines.simulate.prepare", lambda scenario: None)
-    told: list[str] = []
-    for engine, executor, objective, expected in (
-        ("!Compiled", None, None, evaluators.InLanes),
-        ("!Drake", None, None, InProcesses),
-        ("!Drake", None, lambda result: 1.0, OnExecutor),
-        ("!Compiled", ThreadPoolExecutor, None, OnExecutor),
-    ):
-        evaluate = GaitEvaluation(scenario.with_changes({"engine": engine}), objective)
-        chosen = evaluator_of(evaluate, workers=1, executor=executor, warn=told.append)
-        with chosen:
-            assert type(chosen) is expected
-    assert len(told) == 1

@@ -1,24 +1,16 @@
 """What is shown of a run while it lasts."""
 
-import dataclasses
 import io
+from dataclasses import replace
 
 from tetra_drake.evolution.progress import Display, overview
 from tetra_drake.evolution.trials import TrialStatus
 
-STATUS = TrialStatus(
-    number=0,
-    evaluations_at_most=140,
-    iteration=10,
-    evaluations=40,
-    failures=1,
-    best_fitness=4.25,
-    best_distance=0.127,
+FRESH = TrialStatus(number=0, evaluations_at_most=140)
+STATUS = replace(
+    FRESH, iteration=9, evaluations=40, failures=1, best_fitness=4.25, best_distance=0.127
 )
-ENDED = dataclasses.replace(
-    STATUS, number=1, evaluations=100, best_fitness=6.0, stop="levelled off"
-)
-FRESH = TrialStatus(number=2, evaluations_at_most=140)
+ENDED = replace(STATUS, evaluations=100, best_fitness=6.0, stop="levelled off")
 
 
 class Terminal(io.StringIO):
@@ -37,7 +29,7 @@ def test_plain_lines_come_now_and_then_and_at_the_end_with_one_time_left(monkeyp
     now = [100.0]
     monkeypatch.setattr("tetra_drake.evolution.progress.time.monotonic", lambda: now[0])
     stream = io.StringIO()
-    status = dataclasses.replace(STATUS)
+    status = replace(STATUS)
     with Display(stream) as progress:
         for second in range(25):
             now[0] = 100.0 + second

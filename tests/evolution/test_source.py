@@ -20,17 +20,13 @@ def run(tmp_path):
     return path
 
 
-def test_the_gaits_of_a_run_come_with_its_scenario(run):
-    recorded, source = load_run(run), load_source(run)
+def test_the_gaits_of_a_run_and_files_in_it_come_with_its_scenario(run):
+    recorded, source, told = load_run(run), load_source(run), []
     assert source.scenario == recorded.scenario
     assert source.best == recorded.gait(1, 0)
     assert source.gaits == {"trial 0": recorded.gait(0, 0), "trial 1": recorded.gait(1, 0)}
-
-
-def test_a_gait_file_in_a_run_is_simulated_on_the_runs_scenario(run):
-    told = []
     source = load_source(run / "trial_01" / "best_gait.json", warn=told.append)
-    assert (source.scenario.name, source.best) == ("tiny", load_run(run).best_gait())
+    assert (source.scenario.name, source.best) == ("tiny", recorded.best_gait())
     assert source.gaits == {"best_gait": source.best}
     assert told == []
 

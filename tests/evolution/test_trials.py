@@ -5,8 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from helpers.analytic import Bowl, RandomSearch, read_record, record_run, small_scenario
-from thinning import last_population
+from helpers.analytic import Bowl, read_record, record_run, small_scenario
 
 from tetra_drake.evolution.evaluators import InProcesses
 from tetra_drake.evolution.run import load_run
@@ -51,15 +50,11 @@ def test_neither_workers_nor_executor_nor_timing_change_the_record(run_small, tm
 
 
 def test_trials_differ_and_do_not_depend_on_their_number(run_small):
-    def lines_of_trials(directory):
-        run = load_run(directory)
-        count = run.scenario.evolution.trials
-        return [run.file("evaluations.jsonl", trial).read() for trial in range(count)]
-
-    two, three = (lines_of_trials(run_small(f"{n}", trials=n)) for n in (2, 3))
-    other = lines_of_trials(run_small("other", trials=2, seed=6))
-    assert two == three[:2]
-    assert two[0] not in (two[1], other[0])
+    two, three = (load_run(run_small(f"{n}", trials=n)).evaluations for n in (2, 3))
+    other = load_run(run_small("other", trials=1, seed=6)).evaluations
+    assert two.equals(three.query("trial < 2"))
+    first, second = (two.query("trial == @trial")["weight_1"].tolist() for trial in (0, 1))
+    assert first not in (second, other["weight_1"].tolist())
 
 
 def test_as_many_evaluations_as_workers_are_under_way(run_small):
@@ -81,14 +76,3 @@ def test_a_run_in_which_everything_fails_goes_to_its_end(run_small):
     assert len(lines(trial / "evaluations.jsonl")) == 42
     assert lines(trial / "iterations.jsonl")[-1]["mean_fitness"] is None
     assert not (trial / "best_gait.json").exists()
-
-
-def test_another_optimiser_reports_its_own_numbers(tmp_path):
-    statuses = record_run(tmp_path / "run", small_scenario(), seed=2, optimizer=RandomSearch)
-    assert [(status.evaluations, status.stop) for status in statuses] == [(8, "done")] * 2
-    run = load_run(tmp_path / "run")
-    assert "placed" not in run.evaluations
-    assert last_population(run, 0).empty
-    farthest = run.evaluations.groupby("trial")["distance"].max()
-    assert run.iterations.groupby("trial")["farthest"].last().tolist() == farthest.tolist()
-    assert set(run.iterations["note"]) == {"wide"}

@@ -12,6 +12,7 @@ from tetra_drake.evolution.evaluators import InProcesses
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import open_trials, run_trials
+from tetra_drake.interrupts import heeding_interrupts
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in jobs of a script
@@ -21,6 +22,7 @@ if __name__ == "__main__":
     else:
         opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9)
     make = InProcesses if sys.argv[2] == "processes" else in_threads
-    with opened as record, make(DrawnBowl(delay=float(sys.argv[3])), 2) as evaluator:
+    evaluate = DrawnBowl(delay=float(sys.argv[3]))
+    with heeding_interrupts(), opened as record, make(evaluate, 2) as evaluator:
         print("begun", flush=True)
         run_trials(open_trials(record), evaluator)

@@ -23,13 +23,12 @@ def load(scenario, tmp_path, monkeypatch):
     return load_text
 
 
-ACTUATIONS = {"force_N": FORCE, "free_length_mm": WINCH, "tension_N": MOTOR}
-
-
-@pytest.mark.parametrize("quantity", ACTUATIONS)
-@pytest.mark.parametrize("rate", [30.0, 100.0, 2000.0])
-def test_a_command_reads_back_as_written(scenario, quantity, rate, tmp_path):
-    driven = scenario.with_changes(ACTUATIONS[quantity])
+@pytest.mark.parametrize(
+    ("quantity", "actuation", "rate"),
+    [("force_N", FORCE, 30.0), ("free_length_mm", WINCH, 100.0), ("tension_N", MOTOR, 2000.0)],
+)
+def test_a_command_reads_back_as_written(scenario, quantity, actuation, rate, tmp_path):
+    driven = scenario.with_changes(actuation)
     robot = Robot.of(driven)
     samples = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 8))
     text = command_text(robot, Command("random", 1.0 / rate, samples))
@@ -62,14 +61,9 @@ BAD = {
     "twice": ((FIRST, FIRST.replace("left", "right")), FIRST.replace("left", "right"), "twice"),
     "a column too few": ((FIRST + ",", ""), FIRST, "is missing"),
     "a cell too many": (("0.010000,", "0.010000,1,"), "line 3", "found 10 cells, expected 9"),
-    "far too many cells": (("0.5", "[1, 2], " * 30_000), "line 2", "found 60009 cells"),
     "an open quote": (("0.010000,", '0.010000,"'), "", "is no table"),
-    "no number": (("0.010000,0.500000", "0.010000,"), f"line 3, {FIRST}", "''"),
-    "NaN": (("0.010000,0.500000", "0.010000,nan"), f"line 3, {FIRST}", "'nan'"),
     "infinite": (("0.010000,0.500000", "0.010000,inf"), f"line 3, {FIRST}", "'inf'"),
-    "a cell too few": (("0.010000,0.500000", "0.010000"), "line 3", "found 8 cells, expected 9"),
     "a gap": (("0.030000", "0.040000"), "line 5, time_s", "found 0.04 after 0.02"),
-    "back in time": (("0.030000", "0.010000"), "line 5, time_s", "found 0.01 after 0.02"),
     "a late start": (("0.000000,0", "0.005000,0"), "time_s", "the first at 0"),
 }
 
@@ -94,9 +88,7 @@ def test_times_may_be_uneven_by_a_twentieth(robot, late, is_even, load, refused)
             load(changed)
 
 
-@pytest.mark.parametrize(
-    ("share", "is_enough"), [(0.955, True), (0.945, False), (0.0, False), (-1.0, False)]
-)
+@pytest.mark.parametrize(("share", "is_enough"), [(0.955, True), (0.945, False), (0.0, False)])
 def test_samples_may_be_a_twentieth_closer_than_the_signals(
     robot, scenario, share, is_enough, load, refused
 ):
@@ -112,9 +104,7 @@ def test_samples_may_be_a_twentieth_closer_than_the_signals(
             load(text)
 
 
-@pytest.mark.parametrize(
-    ("rows", "key", "problem"), [(0, "", "is no table"), *((n, "time_s", "two") for n in (1, 2))]
-)
+@pytest.mark.parametrize(("rows", "key", "problem"), [(0, "", "is no table"), (2, "time_s", "two")])
 def test_a_file_without_two_samples_is_refused(robot, rows, key, problem, load, refused):
     lines = command_text(robot, Command("short", 0.01, np.zeros((5, 8)))).splitlines()
     with refused("c.csv", key, problem):

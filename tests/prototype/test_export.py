@@ -22,7 +22,7 @@ SHORT = {"simulation.duration": "3 s", "simulation.steady_from": "1 s", "cpg.sta
 
 
 def rows_of(file):
-    with open(file, encoding="utf-8", newline="") as lines:
+    with file.open(newline="") as lines:
         return list(csv.DictReader(lines))
 
 
@@ -40,9 +40,8 @@ def test_a_robot_walks_by_the_file_as_far_as_by_the_gait(actuation, tmp_path):
     own = simulate(scenario=scenario, gait=gait).metrics.distance_in
     assert own > 30.0
     command = load_command(tmp_path / "lab" / COMMAND, scenario)
-    assert simulate(scenario=scenario, command=command).metrics.distance_in == pytest.approx(
-        own, rel=0.02
-    )
+    played = simulate(scenario=scenario, command=command).metrics.distance_in
+    assert played == pytest.approx(own, rel=0.02)
 
 
 def test_the_folder_loads_and_begins_where_the_robot_does(short, tmp_path):
@@ -68,9 +67,8 @@ def test_forces_are_the_signals_of_the_gait(short, tmp_path):
     of_cable = Robot.of(short).structure.cables["signal"][Robot.of(short).driven]
     np.testing.assert_allclose(samples, signals.values[:, of_cable], atol=1e-6)
     assert not samples[:20].any() and samples[21:].any(), "start-up until 0.2 s"
-    limits = rows_of(tmp_path / "lab" / LIMITS)
-    assert {row["limit_of_force_N"] for row in limits} == {""}
-    assert {row["time_at_a_limit_percent"] for row in limits} == {""}
+    for row in rows_of(tmp_path / "lab" / LIMITS):
+        assert row["limit_of_force_N"] == row["time_at_a_limit_percent"] == ""
 
 
 def test_a_tension_motor_is_commanded_the_whole_law_of_the_cable(short, tmp_path):
@@ -125,16 +123,10 @@ def test_least_length_and_travel_are_those_of_what_is_wound(short, actuation, wh
 
 
 def test_a_weak_motor_is_told_to_be_too_weak(short, tmp_path):
-    weak = short.with_changes(MOTOR).with_changes({"actuation.max_force": "2 N"})
-    verdict = export(weak, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
-    assert (
-        "cannot play all of it" in verdict
-        and "first at 0.000 s (T1-T2 outer bottom_left)" in verdict
-    )
-    strong = export(
-        short.with_changes(MOTOR), seeded_gait(short), rate=100.0, out=tmp_path / "other"
-    )
-    assert "can play it" in strong
+    first = "a limit binds first at 0.000 s (T1-T2 outer bottom_left)"
+    for force, verdict in (("10 N", "can play it"), ("2 N", f"cannot play all of it: {first}")):
+        motor = short.with_changes(MOTOR).with_changes({"actuation.max_force": force})
+        assert verdict in export(motor, seeded_gait(short), rate=100.0, out=tmp_path / force)
 
 
 def test_a_gait_with_feedback_is_exported_as_it_walked_once(tmp_path):
@@ -146,44 +138,36 @@ def test_a_gait_with_feedback_is_exported_as_it_walked_once(tmp_path):
     assert np.abs(played.p_WN.values - walked.p_WN.values).max() < 2e-3
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0, 2001.0, 0.5, 7.1, float("nan")])
+@pytest.mark.parametrize("rate", [0.0, 2001.0, 7.1, float("nan")])
 def test_a_rate_without_meaning_is_refused(short, rate, tmp_path, refused):
     with refused("export", "rate", "Hz"):
         export(short, seeded_gait(short), rate=rate, out=tmp_path / "lab")
     assert not list(tmp_path.iterdir())
 
 
-def test_an_existing_folder_is_left_alone(short, tmp_path, refused):
-    (tmp_path / "lab").mkdir()
-    with refused(tmp_path / "lab", "", "exists"):
-        export(short, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
-    assert not list((tmp_path / "lab").iterdir())
-
-
-def test_an_export_that_fails_leaves_nothing(short, tmp_path):
-    wrong = load_gait(RECORDED, short) if RECORDED.exists() else seeded_gait(short)
+def test_an_existing_folder_is_left_alone_and_a_failure_leaves_nothing(short, tmp_path, refused):
+    with refused(tmp_path, "", "exists"):
+        export(short, seeded_gait(short), rate=100.0, out=tmp_path)
     smaller = short.with_changes({"robot.tetrahedra": 3})
     with pytest.raises(InputError):
-        export(smaller, wrong, rate=100.0, out=tmp_path / "new" / "lab")
-    assert not (tmp_path / "new").exists()
+        export(smaller, seeded_gait(short), rate=100.0, out=tmp_path / "new" / "lab")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_command_is_played_on_the_scenario_beside_it(short, tmp_path, monkeypatch, capsys):
+    def played(out, *options):
+        """The scenario on which it was played."""
+        assert main(["simulate", "--command", "lab/command.csv", "--out", out, *options]) == 0
+        return load_scenario(tmp_path / out / SCENARIO)
+
     monkeypatch.chdir(tmp_path)
     export(short, seeded_gait(short), rate=50.0, out="lab")
-    written = (tmp_path / "lab" / SCENARIO).read_text()
-    assert main(["simulate", "--command", "lab/command.csv", "--out", "beside"]) == 0
-    assert (tmp_path / "beside/scenario.yaml").read_text() == written
+    beside = load_scenario("lab/scenario.yaml")
+    assert played("beside") == beside
     assert capsys.readouterr().err == ""
-    (tmp_path / "other.yaml").write_text("base: lab/scenario.yaml\nname: other\n")
-    given = "simulate --command lab/command.csv --scenario other.yaml --out given"
-    assert main(given.split()) == 0
-    assert load_scenario(tmp_path / "given/scenario.yaml").name == "other"
+    Path("other.yaml").write_text("base: lab/scenario.yaml\nname: other\n")
+    assert played("given", "--scenario", "other.yaml").name == "other"
     (line,) = capsys.readouterr().err.splitlines()
     assert all(word in line for word in ("lab/command.csv", "other", "lab/scenario.yaml"))
-    (tmp_path / "lab" / SCENARIO).rename(tmp_path / "elsewhere.yaml")
-    assert (
-        main(["simulate", "--command", "lab/command.csv", "--engine", "compiled", "--out", "alone"])
-        == 0
-    )
-    assert load_scenario(tmp_path / "alone/scenario.yaml").name == "thesis"
+    Path("lab/scenario.yaml").unlink()
+    assert played("alone", "--engine", "compiled").name == "thesis"
