@@ -27,14 +27,14 @@ def terminated(x):
 
 
 def compile_terminated(scenario):
-    """Takes the place of prepare()."""
+    """Takes the place of the engine's prepare()."""
     numba.njit(terminated)(1)
     time.sleep(60.0)
 
 
 if __name__ == "__main__":
-    import tetra_drake.engines.simulate
     from tetra_drake.cli import main
+    from tetra_drake.engines.drake import ENGINE
 
-    tetra_drake.engines.simulate.prepare = compile_terminated
+    ENGINE.prepare = compile_terminated
     sys.exit(main(["simulate", "--out", sys.argv[1]]))
