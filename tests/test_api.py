@@ -128,4 +128,4 @@ def test_every_parameter_and_the_errors_are_described(name: str) -> None:
     assert re.findall(r"^    (\w+): \S", parameters, re.M) == [
         *inspect.signature(function).parameters
     ]
-    assert "InputError: " in errors
+    assert "InputError: " in errors or name == "prepare", "it has no input"

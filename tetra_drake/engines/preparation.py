@@ -34,8 +34,12 @@ _BRIEF |= {"simulation.steady_from": "0 s"}
 def prepare(tell: Callable[[], None] = lambda: None) -> None:
     """Compiles all kernels for this processor. Later runs reuse the machine code.
 
-    It takes half a minute on two cores: a second process compiles the kernel of the lanes. `tell`
-    is called for each compiled function, about FUNCTIONS times.
+        >>> td.prepare()
+
+    It takes half a minute on two cores: a second process compiles the kernel of the lanes.
+
+    Args:
+        tell: function that is called for each compiled function, about FUNCTIONS times.
     """
     program = f"from {__name__} import *; compile_lanes(lambda: print(end='.', flush=True))"
     command = [sys.executable, "-c", program]
