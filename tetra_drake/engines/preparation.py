@@ -25,7 +25,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 
-FUNCTIONS = 440
+FUNCTIONS = 380
 """Number of functions that numba compiles in prepare(), roughly."""
 _BRIEF = {f"simulation.{key}": "10 ms" for key in ("duration", "sample_period")}
 _BRIEF |= {"simulation.steady_from": "0 s"}
