@@ -43,11 +43,9 @@ def controller(walking):
 
 
 @pytest.mark.parametrize("engine", ["!Drake", "!Mujoco"])
-@pytest.mark.parametrize("duration", ["1.5 s", pytest.param("6 s", marks=pytest.mark.slow)])
-def test_a_controller_walks_alike_on_all_engines(walking, controller, engine, duration):
-    timed = walking.with_changes({"simulation.duration": duration})
+def test_a_controller_walks_alike_on_all_engines(walking, controller, engine):
     expected, found = (
-        simulate(timed.with_changes({"engine": each}), controller=controller, record=True)
+        simulate(walking.with_changes({"engine": each}), controller=controller, record=True)
         for each in ("!Compiled", engine)
     )
     moved = found.trajectory.p_WN - expected.trajectory.p_WN
@@ -65,6 +63,8 @@ def test_a_controller_excludes_a_gait(walking, controller, refused):
         simulate(walking, seeded_gait(walking), controller=controller)
     with refused("simulate", "gait", "or a controller"):
         simulate(walking)
+    with refused("MakeTensegrityDiagram", "gait", "or a controller"):
+        MakeTensegrityDiagram(controlled_robot(walking), None)
 
 
 def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
@@ -95,9 +95,10 @@ def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
 class Spring(LeafSystem):
     """A controller without a state, so its signals depend on its inputs at the same time."""
 
-    def __init__(self, *inputs: str, cables: int, driven: np.ndarray) -> None:
+    def __init__(self, driven: np.ndarray) -> None:
         super().__init__()
-        self._ports, self._driven = [self.DeclareVectorInputPort(i, cables) for i in inputs], driven
+        self._ports = [self.DeclareVectorInputPort(name, 24) for name in ("lengths", "rates")]
+        self._driven = driven
         self.DeclareVectorOutputPort("signals", driven.size, self._calc)
 
     def _calc(self, context: Context, output: BasicVector) -> None:
@@ -106,20 +107,11 @@ class Spring(LeafSystem):
 
 def test_a_controller_of_lengths_and_rates_makes_no_algebraic_loop(walking):
     robot = controlled_robot(walking)
-    spring = Spring("lengths", "rates", cables=24, driven=robot.driven)
+    spring = Spring(robot.driven)
     diagram = MakeTensegrityDiagram(robot, None, controller=spring)
     context = diagram.CreateDefaultContext()
     found = diagram.GetOutputPort("signals").Eval(context)
     np.testing.assert_allclose(found, robot.starting_cables().length, rtol=1e-12)
-
-
-def test_a_controller_is_connected_by_the_names_of_its_ports(walking, refused):
-    robot = controlled_robot(walking)
-    spring = Spring("length", cables=24, driven=robot.driven)
-    with refused("MakeTensegrityDiagram", "controller", "'length'"):
-        MakeTensegrityDiagram(robot, None, controller=spring)
-    with refused("MakeTensegrityDiagram", "gait", "or a controller"):
-        MakeTensegrityDiagram(robot, None)
 
 
 def test_the_rates_of_the_cables_are_the_slopes_of_their_lengths(robot):
@@ -137,13 +129,6 @@ def test_the_rates_of_the_cables_are_the_slopes_of_their_lengths(robot):
     cables.GetInputPort("state").FixValue(context, state)
     slopes = (lengths[1] - lengths[0]) / (2.0 * step)
     np.testing.assert_allclose(cables.GetOutputPort("rates").Eval(context), slopes, atol=1e-6)
-    inputs = {cables.get_input_port(i).get_name(): i for i in range(cables.num_input_ports())}
-    for name in ("lengths", "rates"):
-        output = cables.GetOutputPort(name).get_index()
-        assert not cables.HasDirectFeedthrough(inputs["signals"], output)
-    assert cables.HasDirectFeedthrough(
-        inputs["signals"], cables.GetOutputPort("tensions").get_index()
-    )
 
 
 class Ports(LeafSystem):
@@ -176,6 +161,7 @@ def test_a_controller_may_have_further_outputs(walking):
         ({}, {"signals": 7}, ("'signals'", "size 7", "8")),
         ({"lengths": 23}, {"signals": 8}, ("'lengths'", "size 23", "24")),
         ({"state": 12}, {"signals": 8}, ("'state'", "size 12", "65")),
+        ({"length": 24}, {"signals": 8}, ("'length'",)),
     ],
 )
 def test_a_controller_of_other_ports_is_refused(walking, refused, inputs, outputs, facts):

@@ -152,6 +152,7 @@ def scenarios_of_their_own(short: Scenario) -> list[Scenario]:
         senses | {"cpg.gain": "1 lbf"},
         {"robot.cables.slack": True, "cpg.listing_step": "0.1 ms"},
         {"robot.gravity": "1.6 m/s^2", "ground.stiffness": "20 lbf/in"},
+        {"engine": "!Drake"},
     ]
     scenarios = [short.with_changes(each) for each in changes]
     hung = scenario_of(HUNG | {"loads": {"b": [0.1, 0.0, 0.0]}}, duration=1.0)
