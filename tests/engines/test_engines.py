@@ -58,8 +58,8 @@ WALKS = {
 )
 def test_recording_and_watching_change_nothing(walk, engine):
     name, changes, _ = WALKS[walk]
-    short = shortly(load_scenario(name), engine, duration="0.4 s", steady_from="0.25 s")
-    short = short.with_changes({"cpg.start_up": "0.1 s"} | changes)
+    short = shortly(load_scenario(name), engine, duration="0.4 s", steady_from="0.3 s")
+    short = short.with_changes(changes)
     drive = {"command": WAVES} if walk == "command" else {"gait": seeded_gait(short)}
     plain = simulate(short, **drive)
     recorded = simulate(short, **drive, record=True)

@@ -15,15 +15,10 @@ WELL_CONDITIONED = [f"gait_{letter}" for letter in "bcdefgh"]
 GAITS = ["gait_a", *WELL_CONDITIONED]
 
 
-@pytest.fixture(
-    scope="module",
-    params=[
-        ("drake", ["gait_b"]),
-        pytest.param(("drake", GAITS), marks=pytest.mark.slow),
-        ("compiled", GAITS),
-    ],
-    ids=["drake, one", "drake", "compiled"],
-)
+ALL_ON_DRAKE = pytest.param(("drake", GAITS), marks=pytest.mark.slow)
+
+
+@pytest.fixture(scope="module", params=[("drake", ["gait_b"]), ALL_ON_DRAKE, ("compiled", GAITS)])
 def results(request, data: Path) -> dict[str, SimulationResult]:
     engine, names = request.param
     scenario = load_scenario("thesis").with_changes({"engine": f"!{engine.capitalize()}"})

@@ -6,7 +6,6 @@ In tests/data/structures.json sines pull at the cables of structures at rest. Af
 
 import dataclasses
 import json
-from collections.abc import Iterator
 from unittest.mock import Mock
 
 import numpy as np
@@ -20,11 +19,7 @@ from helpers.structures import (
     recorded_structure,
     simulated,
 )
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import Sine
 
-from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
 from tetra_drake.experiment import evolve
@@ -37,82 +32,44 @@ from tetra_drake.report import run_figures
 from tetra_drake.results.result import save_result
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot, make_structure
-from tetra_drake.robot.structure import AddBodies, node_positions
-from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.packed import Packed
-from tetra_drake.systems import Attach, CableNetwork, GroundContact
 
 AMPLITUDE, FREQUENCY, INTERVAL = 1.5, 2.0 * np.pi, 0.5  # N, rad/s, s between recorded centres
 
-Phase = np.ndarray
-States = Iterator[np.ndarray]
 
-
-def by_compiled_steps(robot: Robot, phase: Phase) -> States:
-    """The state after every interval."""
-    stepper, modes = Stepper(robot.model), np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
-    h, parts, work = 1e-4, Packed((robot.model, stepper.forces)), stepper.work
-    every = round(INTERVAL / h)
-
-    def signals(time: float) -> np.ndarray:
-        return AMPLITUDE * np.sin(FREQUENCY * time + phase)
-
-    work.state[:] = robot.structure.initial_state
-    for i in range(10 * every):
-        modes_after_step(parts, work.state, modes)
-        stepper.take(modes, signals(i * h), signals((i + 1) * h), h)
-        if (i + 1) % every == 0:
-            yield work.state.copy()
-
-
-def by_systems_of_a_diagram(robot: Robot, phase: Phase) -> States:
-    """The state after every interval."""
-    builder = DiagramBuilder()
-    plant = builder.AddSystem(MultibodyPlant(time_step=0.0))
-    AddBodies(plant, robot.structure)
-    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -robot.scenario.robot.gravity])
-    plant.Finalize()
-    sines = builder.AddSystem(Sine(AMPLITUDE + 0.0 * phase, FREQUENCY + 0.0 * phase, phase))
-    cables = builder.AddSystem(CableNetwork(robot.model, signals=phase.size))
-    builder.Connect(sines.get_output_port(0), cables.GetInputPort("signals"))
-    for part in (cables, builder.AddSystem(GroundContact(robot.model))):
-        Attach(builder, plant, part)
-    builder.ExportOutput(plant.get_state_output_port(), "state")
-    diagram = builder.Build()
-    simulator = MakeSimulator(diagram, Drake(scheme="radau3", accuracy=1e-6, max_step=1e-3))
-    simulator.get_mutable_context().SetContinuousState(robot.structure.initial_state)
-    for i in range(1, 11):
-        simulator.AdvanceTo(i * INTERVAL)
-        yield diagram.GetOutputPort("state").Eval(simulator.get_context())
-
-
-@pytest.mark.parametrize(
-    ("name", "motion", "intervals"),
-    [
-        ("prism", by_compiled_steps, 10),
-        ("six_bar", by_compiled_steps, 10),
-        ("prism", by_systems_of_a_diagram, 2),
-        pytest.param("prism", by_systems_of_a_diagram, 10, marks=pytest.mark.slow),
-        pytest.param("six_bar", by_systems_of_a_diagram, 10, marks=pytest.mark.slow),
-    ],
-)
-def test_driven_structures_move_as_the_independent_simulation(name, motion, intervals, data):
+@pytest.mark.parametrize("name", ["prism", "six_bar"])
+def test_driven_structures_move_as_the_independent_simulation(name, data):
     recorded = recorded_structure(data, name)
     scenario = load_scenario(name).with_sections(robot=driven_as_recorded(name))
     # Coulomb friction without bristles, as in MuJoCo and in the independent simulation.
     robot = Robot.of(scenario.with_changes({"friction.stiffness": "0 N/m"}))
-    structure = robot.structure
+    structure, phase, h = robot.structure, np.array(recorded["drive"]["phase"]), 1e-4
+    stepper, modes = Stepper(robot.model), np.zeros((len(structure.contacts), MODE_COLUMNS))
+    parts, work = Packed((robot.model, stepper.forces)), stepper.work
+
+    def signals(time: float) -> np.ndarray:
+        return AMPLITUDE * np.sin(FREQUENCY * time + phase)
+
+    def centre() -> np.ndarray:
+        return poses_of(work.state[np.newaxis])[0, :, 4:].mean(axis=0)
+
+    work.state[:] = structure.initial_state
+    centres, every = [centre()], round(INTERVAL / h)
+    for i in range(10 * every):
+        modes_after_step(parts, work.state, modes)
+        stepper.take(modes, signals(i * h), signals((i + 1) * h), h)
+        if (i + 1) % every == 0:
+            centres.append(centre())
     p_WN = node_positions(structure, structure.initial_state)
     transform = onto_recorded(recorded, structure.node_names, p_WN)
-    states = motion(robot, np.array(recorded["drive"]["phase"]))
-    centres = [poses_of(next(states)[None])[0, :, 4:].mean(axis=0) for _ in range(intervals)]
     there = np.array(centres) @ transform[:, :3].T + transform[:, 3]
-    expected = np.array(recorded["drive"]["centre_of_bars"])[1 : intervals + 1]
-    assert np.ptp(expected, axis=0).max() > 1e-3, "it moves"
+    expected = np.array(recorded["drive"]["centre_of_bars"])
+    assert np.ptp(expected, axis=0).max() > 3e-3, "it moves"
     np.testing.assert_allclose(there, expected, atol=1e-5)
 
 
