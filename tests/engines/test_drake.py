@@ -53,7 +53,7 @@ def test_a_live_network_walks_as_the_listing_with_short_steps_does(scenario, gai
     changes = {
         "cpg.start_up": "0.1 s",
         "cpg.listing_step": "0.01 ms",
-        "engine": Drake(scheme="runge_kutta3", accuracy=1e-5, max_step=1e-4),
+        "engine": Drake(scheme="runge_kutta3", accuracy=1e-5, max_step=2e-4),
         "simulation.duration": "0.7 s",
         "simulation.steady_from": "0.5 s",
     }

@@ -46,7 +46,7 @@ WALKS = {
     "feedback": ("thesis", FEELS, ["drake", "compiled"]),
     "winch": ("prism", {"actuation": LIMITED["winch"]}, ["drake", "compiled"]),
     "motor": ("prism", {"actuation": LIMITED["motor"]}, ["compiled"]),
-    "command": ("coulomb", {}, ["drake", "compiled"]),
+    "command": ("coulomb", {}, ["compiled"]),
 }
 """A shipped scenario, its changes, and engines that simulate it."""
 
