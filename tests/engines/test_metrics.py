@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-import xarray
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.curves import travelling_index
-from tetra_drake.physics.rigid_motions import rigid_motions
 from tetra_drake.results.measures import off_ground
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -23,15 +21,6 @@ def short_walk() -> Scenario:
     changes |= {"simulation.duration": "2.0 s", "simulation.steady_from": "0.5 s"}
     changes |= {"simulation.sample_period": "1e-3 s", "friction.stiffness": "0 N/m"}
     return load_scenario("coulomb").with_changes(changes | {"engine": "!Compiled"})
-
-
-def turned_forward(trajectory: xarray.Dataset) -> float:
-    """Integral of the angular velocity about y of the rigid motions nearest to those of nodes."""
-    rates = []
-    for p_WN, v_WN in zip(trajectory.p_WN.values, trajectory.v_WN.values, strict=True):
-        motions = rigid_motions(p_WN).reshape(-1, 6)
-        rates.append(np.linalg.lstsq(motions, v_WN.ravel())[0][1])
-    return float(np.trapezoid(rates, trajectory.time.values))
 
 
 def test_speed_is_of_the_centre_of_mass_of_bodies_with_payloads():
@@ -72,7 +61,6 @@ def test_tallied_metrics_are_those_of_the_trajectory():
     shares = off.mean("time").sel(contact_body=steady.body.values).values
     assert metrics.lifted_shares == pytest.approx(shares, abs=5e-3)
     assert metrics.tension == pytest.approx(walk.trajectory.tension.values.min(), rel=1e-3)
-    assert metrics.rolled == pytest.approx(turned_forward(walk.trajectory), rel=1e-3)
     states = np.hstack(
         [
             np.concatenate([walk.trajectory.q_WB, walk.trajectory.p_WB], axis=2).reshape(2001, -1),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.structures import unit_inertias
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
@@ -34,7 +35,7 @@ def test_mujoco_has_the_robot_at_rest_in_its_key_frame(study):
     mujoco.mj_forward(model, data)
     assert model.body_mass[1:] == pytest.approx(structure.mass)
     assert "\n    <body name=" in text  # indented
-    greatest = [np.linalg.eigvalsh(full(unit))[-1] for unit in structure.unit_inertia]
+    greatest = np.linalg.eigvalsh(unit_inertias(structure))[:, -1]
     assert model.body_inertia[1:].max(axis=1) == pytest.approx(structure.mass * greatest)
     sites = [data.site(name).xpos for name in structure.node_names]
     np.testing.assert_allclose(sites, study.nodes[["x", "y", "z"]], atol=1e-9)
@@ -67,7 +68,7 @@ def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(stu
     bodies = [plant.GetBodyByName(name) for name in structure.bodies]
     assert [body.default_mass() for body in bodies] == pytest.approx(structure.mass)
     inertia = [body.default_unit_inertia().CopyToFullMatrix3() for body in bodies]
-    np.testing.assert_allclose(inertia, list(map(full, structure.unit_inertia)), atol=1e-15)
+    np.testing.assert_allclose(inertia, unit_inertias(structure), atol=1e-15)
     context = plant.CreateDefaultContext()
     p_WN = [node.CalcPoseInWorld(context).translation() for node in nodes]
     np.testing.assert_allclose(p_WN, node_positions(structure, state), atol=1e-9)
@@ -82,9 +83,3 @@ def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(stu
     here = network.GetMyContextFromRoot(diagram.CreateDefaultContext())
     tensions = network.GetOutputPort("tensions").Eval(here)
     np.testing.assert_allclose(tensions, study.cables["tension"], rtol=1e-6, atol=1e-9)
-
-
-def full(unit: np.ndarray) -> np.ndarray:
-    """Matrix (3, 3) of the six numbers of a unit inertia."""
-    xx, yy, zz, xy, xz, yz = unit
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 import xarray
-from helpers.bars import CROSSED, RADIUS, STIFFNESS, loose_bars
 
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -123,14 +122,6 @@ def test_many_gaits_walk_or_fail_as_each_alone(short, workers, monkeypatch):
 
 
 @needs_mujoco
-def test_nodes_that_do_not_touch_the_ground_change_nothing(short):
-    few, all_nodes = (
-        trajectory_of(short.with_changes({"robot.contacts": nodes})) for nodes in ("thesis", "all")
-    )
-    xarray.testing.assert_allclose(few["p_WN"], all_nodes["p_WN"], rtol=0.0, atol=1e-9)
-
-
-@needs_mujoco
 def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure):
     angle, times = math.radians(3.0), {"simulation.duration": "1.2 s", "cpg.start_up": "1.25 s"}
     creeping = {"terrain": Incline(slope=angle), "friction": Coulomb(), **times}
@@ -173,8 +164,6 @@ def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
         ("cpg.feedback", ["load"]),
         ("friction.static", 0.6),
         ("friction.stiffness", 1e3),
-        ("friction.forward", 0.5),
-        ("friction.backward", 0.5),
         ("friction.lateral", 2.0),
         ("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2)),
     ],
@@ -192,17 +181,3 @@ def test_without_mujoco_its_engine_is_refused(short, monkeypatch, refused):
     monkeypatch.setattr(engine, "installed", lambda: False)
     with refused("thesis", "engine"):
         simulate(scenario=short, gait=seeded_gait(short))
-
-
-@needs_mujoco
-def test_a_bar_rests_across_two_others_as_on_the_other_engines():
-    beams = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
-    across = ((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))
-    robot = loose_bars(
-        [*beams, across], dissipation=1.0, gravity=9.80665, duration=0.5, anchors=CROSSED
-    )
-    resting = robot.scenario.with_changes({"engine": "!Mujoco", "friction.stiffness": 0.0})
-    p_WB = trajectory_of(resting)["p_WB"].values
-    depth = 2.0 * RADIUS - (p_WB[-1, 2, 2] - p_WB[-1, :2, 2].mean())
-    assert 2.0 * STIFFNESS * depth == pytest.approx(robot.weight / 3.0, rel=0.02)
-    np.testing.assert_allclose(p_WB[-1], robot.structure.p_WB, atol=2e-5)

@@ -15,19 +15,10 @@ WELL_CONDITIONED = [f"gait_{letter}" for letter in "bcdefgh"]
 GAITS = ["gait_a", *WELL_CONDITIONED]
 
 
-SOME = ["gait_b", "gait_f"]
-"""Those that the fast tests simulate on the diagram, in some seconds."""
+ALL_ON_DRAKE = pytest.param(("drake", GAITS), marks=pytest.mark.slow)
 
 
-@pytest.fixture(
-    scope="module",
-    params=[
-        ("drake", SOME),
-        pytest.param(("drake", GAITS), marks=pytest.mark.slow),
-        ("compiled", GAITS),
-    ],
-    ids=["drake, some", "drake", "compiled"],
-)
+@pytest.fixture(scope="module", params=[("drake", ["gait_b"]), ALL_ON_DRAKE, ("compiled", GAITS)])
 def results(request, data: Path) -> dict[str, SimulationResult]:
     engine, names = request.param
     scenario = load_scenario("thesis").with_changes({"engine": f"!{engine.capitalize()}"})
@@ -47,25 +38,10 @@ def test_distances_are_those_of_the_independent_simulation(results, data):
     ]
     assert np.median(errors) < 0.1
     # Gait d passes a touchdown that decides half an inch with some integrators.
-    assert sorted(errors)[-2] < 0.25
+    assert all(error < 0.25 for error in sorted(errors)[:-1])
 
 
 def test_the_robot_walks_straight_by_its_symmetry(results):
     for result in results.values():
         assert result.metrics.twist < 3e-5
         assert result.metrics.lateral_drift < 3e-5
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "settings",
-    [{"scheme": "runge_kutta3"}, {"mode_changes": "witness", "max_step": "2 ms"}],
-    ids=["explicit", "witness"],
-)
-@pytest.mark.parametrize("name", WELL_CONDITIONED)
-def test_other_settings_agree_with_the_independent_simulation(data, name, settings):
-    changes = {f"engine.{key}": value for key, value in settings.items()}
-    scenario = load_scenario("thesis").with_changes({"engine.accuracy": 1e-3} | changes)
-    expected = json.loads((data / "expected.json").read_text())["gaits"][name]["distance_in"]
-    result = simulate(scenario=scenario, gait=load_gait(data / f"{name}.json", scenario))
-    assert abs(result.metrics.distance_in - expected) < 0.1

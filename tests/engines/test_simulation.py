@@ -20,6 +20,11 @@ SPANS = {"!Force": 2.0, "!Winch": 0.01, "!TensionMotor": 1.0}
 """Actions differ from those at rest by up to this, in N, m and N."""
 
 
+READINGS = {"length": "lengths", "normal_force": "normal_forces", "tension": "tensions"}
+READINGS |= {name: name for name in ("p_WN", "v_WN", "q_WB")}
+"""Of variables of a trajectory."""
+
+
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
     """0.3 s on the compiled engine, with a mark within a control period, in samples of one."""
@@ -54,14 +59,7 @@ def test_steps_with_the_samples_of_a_command_give_its_digits(short, actuation, c
         assert result.trajectory.equals(trajectory)
         assert result.integrator == expected.integrator
         assert result.metrics.distance == expected.metrics.distance
-        for name, readings in {
-            "p_WN": "p_WN",
-            "v_WN": "v_WN",
-            "length": "lengths",
-            "normal_force": "normal_forces",
-            "tension": "tensions",
-            "q_WB": "q_WB",
-        }.items():
+        for name, readings in READINGS.items():
             read = np.array([getattr(each, readings)[robot] for each in found[1:]])
             np.testing.assert_allclose(read, trajectory[name][1:], rtol=0, atol=1e-9)
     assert found[-1].time.tolist() == [0.3] * count
@@ -138,36 +136,38 @@ def test_the_last_period_ends_with_the_simulation(short):
     assert times[-2:] == [0.24, 0.25] and simulation.ended.all()
 
 
-def test_wrong_input_is_told_in_a_line(short, refused):
+NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "key", "facts"),
+    [
+        (lambda two: two.step(np.zeros((2, 7))), "actions", ("(2, 7)", "(2, 8)")),
+        (lambda two: two.step("fast"), "actions", ("'fast'",)),
+        (lambda two: two.step(NAN), "actions[1], T3-T4 outer bottom_left", ("nan",)),
+        (lambda two: two.result(1), "result", ("robot 1 is at 0 s",)),
+        (lambda two: two.reset(indices=[2]), "indices", ("0 to 1",)),
+        (lambda two: two.reset(indices=[0.5]), "indices", ("0 to 1",)),
+        (lambda two: two.reset(indices=1), "indices", ("0 to 1",)),
+        (lambda two: Simulation(two.scenario, control_period=0.00075), "control_period", ()),
+        (lambda two: Simulation(two.scenario, control_period="fast"), "control_period", ()),
+        (lambda two: Simulation(two.scenario, count=0), "count", ("0",)),
+        (lambda two: Simulation(two.scenario, count=1.5), "count", ("1.5",)),
+        (lambda two: two.reset(seed=-1), "seed", ("-1",)),
+    ],
+)
+def test_wrong_input_is_told_in_a_line(short, call, key, facts, refused):
+    two = Simulation(short.with_sections(disturbances=Disturbances(draws=1)), count=2, workers=1)
+    with refused("Simulation", key, *facts):
+        call(two)
+
+
+def test_a_robot_that_has_ended_is_not_moved_on(short, refused):
     two = Simulation(short, count=2, workers=1)
-    with refused("Simulation", "actions", "(2, 7)", "(2, 8)"):
-        two.step(np.zeros((2, 7)))
-    with refused("Simulation", "actions", "'fast'"):
-        two.step("fast")
-    actions = np.zeros((2, 8))
-    actions[1, 4] = math.nan
-    with refused("Simulation", f"actions[1], {two.robot.structure.oscillators[4]}", "nan"):
-        two.step(actions)
-    with refused("Simulation", "result", "robot 1 is at 0 s"):
-        two.result(1)
-    for _ in range(PERIODS):
-        two.step(np.zeros((2, 8)))
+    go(two, np.zeros((PERIODS, 2, 8)))
     two.reset(indices=[0])
     with refused("Simulation", "step", "robot 1", "0.3 s"):
         two.step(np.zeros((2, 8)))
-    for indices in ([2], [-1], [0.5], 1):
-        with refused("Simulation", "indices", "0 to 1"):
-            two.reset(indices=indices)
-    for period in (0.0, 0.00075, math.nan, -0.02, "fast"):
-        with refused("Simulation", "control_period", "0.0005 s"):
-            Simulation(short, control_period=period)
-    for count in (0, 1.5):
-        with refused("Simulation", "count", str(count)):
-            Simulation(short, count=count)
-    disturbed = Simulation(short.with_sections(disturbances=Disturbances(draws=1)))
-    for seed in (-1, 0.5):
-        with refused("Simulation", "seed", str(seed)):
-            disturbed.reset(seed=seed)
 
 
 def test_an_engine_that_cannot_pause_is_named(short, monkeypatch):

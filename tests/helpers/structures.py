@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.prepared import Prepared
@@ -20,6 +21,7 @@ from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario import robot_structure
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +52,18 @@ def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]
     while not engine.advance(100_000):
         pass
     return engine.result(0), engine.motion(0)
+
+
+def end_on_diagram(robot: Robot) -> np.ndarray:
+    """(bodies, 7): the poses of a robot, which may be thrown, at the end on the diagram, with small
+    errors."""
+    diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
+    simulator = Simulator(diagram)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3).set_target_accuracy(1e-9)
+    simulator.get_mutable_context().SetContinuousState(robot.structure.initial_state)
+    simulator.AdvanceTo(robot.scenario.simulation.duration)
+    state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+    return poses_of(state[np.newaxis])[0]
 
 
 def poses_of(states: np.ndarray) -> np.ndarray:

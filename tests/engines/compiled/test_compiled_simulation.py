@@ -9,7 +9,6 @@ from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.engine_kinds import SHORTEST_STEP, Compiled
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -35,14 +34,6 @@ def test_extreme_settings_come_to_an_end(compiled, setting, value, failure):
     extreme = compiled.with_changes(changes)
     with time_limit(30.0), pytest.raises(failure) if failure else contextlib.nullcontext():
         simulate(scenario=extreme, gait=seeded_gait(extreme))
-
-
-@pytest.mark.parametrize(
-    ("tolerance", "look_ahead"),
-    [(1e-3, 2e-5), (Compiled().tolerance, 2e-5), (1e-6, 2e-7), (1e-200, 2.0 * SHORTEST_STEP)],
-)
-def test_steps_end_sooner_after_a_mode_change_if_the_tolerance_is_finer(tolerance, look_ahead):
-    assert Compiled(tolerance=tolerance).look_ahead == look_ahead
 
 
 def test_cables_in_no_order_of_the_bodies_that_they_join_are_refused(scenario, structure):

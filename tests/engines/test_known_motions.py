@@ -1,0 +1,358 @@
+"""Robots whose motion is known: analytic answers, what is conserved, Drake's own contact."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from helpers.anchored import HUNG, SWINGING, scenario_of, supported_prism
+from helpers.bars import ACROSS, CROSSED, RADIUS, STIFFNESS, loose_bars
+from helpers.converged import CONVERGED
+from helpers.hanging import HANGING, MASS
+from helpers.hanging import STIFFNESS as CABLE_STIFFNESS
+from helpers.states import mass_matrix
+from helpers.structures import (
+    driven_as_recorded,
+    end_on_diagram,
+    poses_of,
+    simulated,
+    thrown,
+    unit_inertias,
+)
+from pydrake.geometry import AddContactMaterial, Capsule, ProximityProperties
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import DiagramBuilder
+from scipy.integrate import solve_ivp
+
+from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.interface import engine_of
+from tetra_drake.engines.mujoco import INSTALL, installed
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.physics.forces import Forces, compute_state_forces
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import AddBodies, moved_nodes, node_positions
+from tetra_drake.scenario.engine_kinds import Drake, Mujoco
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.section import written
+from tetra_drake.simd.packed import Packed
+
+G = 9.80665
+ENGINES = {
+    "compiled": CONVERGED["compiled"],
+    "drake": Drake(scheme="radau3", accuracy=1e-6, max_step=1e-3),
+    "mujoco": Mujoco(),
+}
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request) -> str:
+    if request.param == "mujoco" and not installed():
+        pytest.skip(INSTALL)
+    return request.param
+
+
+def trajectory_of(robot: Robot, engine: str):
+    """That of a robot that starts at rest, on an engine."""
+    changes = {"engine": ENGINES[engine], "friction.stiffness": "0 N/m"}
+    robot = dataclasses.replace(robot, scenario=robot.scenario.with_changes(changes))
+    simulation = GaitSimulation(robot, seeded_gait(robot.scenario, 3), record=True)
+    return engine_of(robot.scenario).simulate(simulation).trajectory
+
+
+def on_a_spring(robot: Robot, times: np.ndarray) -> np.ndarray:
+    """A bar that was let go 1 cm below its rest bounces up and down."""
+    k, mass = HUNG["cables"]["line"]["stiffness"], robot.structure.mass.sum()
+    z = 1.0 - 0.4 - mass * G / k - 0.01 * np.cos(np.sqrt(k / mass) * times)
+    upright = np.stack([z, z - 0.2, 1.0 + 0.0 * z], axis=1)
+    return upright[:, :, None] * [0.0, 0.0, 1.0]
+
+
+def between_two_cables(robot: Robot, times: np.ndarray) -> np.ndarray:
+    """A point mass between cables without free length, each of which pulls by k times its way."""
+    rest = 1.0 - MASS * G / (2.0 * CABLE_STIFFNESS)
+    z = rest - 0.01 * np.cos(np.sqrt(2.0 * CABLE_STIFFNESS / MASS) * times)
+    held = np.tile([[0.0, 0.0, 1.0], [0.2, 0.0, 1.0]], (len(times), 1, 1))
+    return np.concatenate([held, np.stack([0.1 + 0 * z, 0 * z, z], axis=1)[:, None]], axis=1)
+
+
+ANGLE = 0.5
+
+
+def leaning() -> Robot:
+    """A bar whose upper end is held, turned about it."""
+    robot = Robot.of(scenario_of(SWINGING, duration=0.6))
+    c, s = np.cos(ANGLE), np.sin(ANGLE)
+    p_WB = robot.structure.p_WB @ [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]
+    q_WB = np.array([[np.cos(0.5 * ANGLE), 0.0, np.sin(0.5 * ANGLE), 0.0]])
+    return dataclasses.replace(
+        robot, structure=dataclasses.replace(robot.structure, p_WB=p_WB, q_WB=q_WB)
+    )
+
+
+def as_a_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
+    structure, lever = robot.structure, np.linalg.norm(robot.structure.p_BN[0])
+    square = G * lever / (structure.unit_inertia[0, 0] + lever**2)
+    start, span, exact = [ANGLE, 0.0], (0.0, times[-1]), {"rtol": 1e-10, "atol": 1e-12}
+    swing = solve_ivp(
+        lambda _, y: [y[1], -square * np.sin(y[0])], span, start, t_eval=times, **exact
+    )
+    angle = swing.y[0]
+    place = 0.4 * np.stack([-np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)
+    return np.stack([0.0 * place, place], axis=1)
+
+
+def lowered(tree: dict, duration: float) -> Robot:
+    """A robot whose last body starts 1 cm below its place of rest."""
+    bodies = 2 if tree is HANGING else 1
+    offsets = [[0.0, 0.0, 0.0]] * (bodies - 1) + [[0.0, 0.0, -0.01]]
+    return Robot.of(scenario_of(tree | {"offsets": offsets}, duration=duration))
+
+
+KNOWN = {
+    "a bar on a cable": (lambda: lowered(HUNG, 2.0), on_a_spring, 1e-6),
+    "a point mass": (lambda: lowered(HANGING, 0.6), between_two_cables, 1e-6),
+    # The anchor gives way by m g / k, 0.7 um, and by some more as the bar speeds up.
+    "a pendulum": (leaning, as_a_pendulum, 1e-5),
+}
+
+
+@pytest.mark.parametrize(("make", "expected", "atol"), KNOWN.values(), ids=KNOWN)
+def test_what_hangs_swings_as_analysis_says(make, expected, atol, engine):
+    robot = make()
+    trajectory = trajectory_of(robot, engine)
+    atol = 2e-4 if engine == "mujoco" else atol
+    p_WN = expected(robot, trajectory.time.values)
+    np.testing.assert_allclose(trajectory.p_WN, p_WN, atol=atol)
+    assert np.ptp(p_WN, axis=0).max() > 0.015
+
+
+def test_a_point_mass_between_two_cables_has_a_self_stress_and_two_mechanisms():
+    study = study_equilibrium(Robot.of(scenario_of(HANGING)))
+    # Without weight the point is in the middle of the bar, that is, on a line with both cables:
+    # they prestress each other, and it moves across them.
+    assert (len(study.statics.self_stresses), study.statics.mechanisms) == (1, 2)
+
+
+def test_a_mass_that_nothing_holds_is_refused(refused):
+    lonely = StructureFile.model_validate(HANGING).model_dump() | {"cables": {}}
+    with refused("file", "masses.p", "cable"):
+        StructureFile.from_tree(written(lonely), "file")
+
+
+def bent_body_and_bar() -> Robot:
+    """Two bodies, one of three different moments, and a cable that hangs loose between them."""
+    make = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.016}
+    bent = {"a": [0, 0, 0.5], "b": [0.1, 0, 0.5], "c": [0.1, 0.06, 0.5], "d": [0.1, 0.06, 0.52]}
+    slack = {"pairs": [["b", "e"]], "stiffness": 1.0, "damping": 0.0, "free_length": 99.0}
+    tree = {
+        "nodes": bent | {"e": [0.3, 0.0, 0.5], "f": [0.45, 0.05, 0.6]},
+        "struts": {
+            "bent": {"pairs": [["a", "b"], ["b", "c"], ["c", "d"]], **make},
+            "bar": {"pairs": [["e", "f"]], **make},
+        },
+        "cables": {"loose": slack},
+        "gravity": 0.0,
+    }
+    scenario = scenario_of(tree, duration=0.5)
+    fine = {"engine.tolerance": "1e-7 m/s", "engine.max_step": "1e-3 s"}
+    v_WB = [[3.0, 7.0, -5.0, 0.1, 0.0, 0.2], [4.0, -9.0, 6.0, 0.0, -0.3, 0.1]]
+    return thrown(Robot.of(scenario.with_changes({"engine": "!Compiled"} | fine)), np.array(v_WB))
+
+
+def test_thrown_bodies_turn_by_eulers_equations():
+    # In the frame of a body, I w' = I w x w.
+    robot = bent_body_and_bar()
+    poses = [robot.structure.p_WB + 0.5 * robot.structure.v_WB[:, 3:]]
+    inertias = unit_inertias(robot.structure)
+    moments = np.linalg.eigvalsh(inertias[0])
+    assert (np.diff(moments) > 0.1 * moments[0]).all(), "three different moments"
+
+    def rates(_: float, state: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+        q, w = state[:4], state[4:]
+        turn = np.append(-0.5 * q[1:] @ w, 0.5 * (q[0] * w + np.cross(q[1:], w)))
+        return np.append(turn, np.linalg.solve(inertia, np.cross(inertia @ w, w)))
+
+    starts = np.hstack([robot.structure.q_WB, robot.structure.v_WB[:, :3]])  # R_WB = 1
+    ends = [
+        solve_ivp(rates, (0.0, 0.5), start, args=(inertia,), rtol=1e-11, atol=1e-12).y[:4, -1]
+        for start, inertia in zip(starts, inertias, strict=True)
+    ]
+    expected = np.hstack([ends, *poses])
+    np.testing.assert_allclose(end_on_diagram(robot), expected, atol=1e-9)
+    np.testing.assert_allclose(poses_of(simulated(robot)[1].states)[-1], expected, atol=1e-6)
+
+
+def flying(name: str, **changes: object) -> Robot:
+    """A shipped structure without weight, high up, whose bodies move and turn at random."""
+    scenario = load_scenario(name)
+    lifted = {"robot.gravity": 0.0, "robot.offsets": [[0, 0, "1 m"]] * scenario.robot.body_count}
+    lifted |= {f"robot.cables.{group}.damping": 0.0 for group in scenario.robot.cables}
+    times = {"simulation.duration": "0.5 s", "simulation.steady_from": "0.25 s"}
+    fine = {"engine": "!Compiled", "engine.tolerance": "1e-7 m/s", "cpg.gain": 0.0}
+    robot = Robot.of(scenario.with_changes(times | lifted | fine | changes))
+    v_WB = np.random.default_rng(0).normal(size=(scenario.robot.body_count, 6))
+    return thrown(robot, v_WB * [2.0, 2.0, 2.0, 0.2, 0.2, 0.2])  # rad/s, m/s
+
+
+def tumbling(dissipation: float) -> Robot:
+    """Two bars that tumble towards each other and touch several times."""
+    v_WB = [[3.0, 2.0, -1.0, 0.1, 0.0, 0.1], [-2.0, 4.0, 3.0, 0.0, 0.05, -0.1]]
+    return thrown(loose_bars(ACROSS, dissipation=dissipation, duration=0.5), np.array(v_WB))
+
+
+def energy_and_momenta(robot: Robot, state: np.ndarray) -> np.ndarray:
+    """(7,): energy of bodies and cables; momentum, and angular momentum about the origin."""
+    structure, poses = robot.structure, poses_of(state[np.newaxis])[0]
+    velocities, cables = state[poses.size :], structure.cables
+    wrench = (mass_matrix(robot.model, state) @ velocities).reshape(-1, 6)
+    p_WN = node_positions(structure, state)
+    lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
+    stretch = np.maximum(lengths - cables["free_length"], 0.0)
+    energy = 0.5 * (velocities @ wrench.ravel() + cables["stiffness"] @ stretch**2)
+    angular = (wrench[:, :3] + np.cross(poses[:, 4:], wrench[:, 3:])).sum(axis=0)
+    return np.concatenate([[energy], wrench[:, 3:].sum(axis=0), angular])
+
+
+DAMPED = {f"robot.cables.{group}.damping": "1 N*s/m" for group in ("bottom", "side", "top")}
+FLYING: dict[str, tuple[Callable[[], Robot], float]] = {
+    "prism": (lambda: flying("prism"), 1e-8),
+    "six-bar": (lambda: flying("six_bar"), 1e-8),
+    "prism whose cables are damped": (lambda: flying("prism", **DAMPED), np.inf),
+    "bars that touch": (lambda: tumbling(0.0), 1e-3),
+}
+
+
+@pytest.mark.parametrize(("make", "rtol"), FLYING.values(), ids=FLYING)
+def test_what_flies_keeps_its_momenta_and_without_dissipation_its_energy(make, rtol):
+    robot = make()
+    states = simulated(robot)[1].states
+    found = np.array([energy_and_momenta(robot, state) for state in states])
+    energy, momenta = found[:, 0], found[:, 1:]
+    assert np.abs(poses_of(states)[-1] - poses_of(states)[0]).max() > 0.05, "it moves"
+    largest = np.abs(momenta).max()
+    np.testing.assert_allclose(momenta - momenta[0], 0.0, atol=1e-6 * largest)
+    if rtol < np.inf:
+        assert energy[-1] == pytest.approx(energy[0], rel=rtol)
+    else:
+        assert energy[-1] < 0.999 * energy[0]
+
+
+@pytest.mark.parametrize("dissipation", [0.5, 3.0])
+def test_two_bars_rebound_as_hunt_and_crossley_say(dissipation):
+    # m v dv/dd = -k d (1 + c v) has the integral v / c - ln(1 + c v) / c² + k d² / (2 m): it is the
+    # same at both ends of the impact, where d = 0.
+    speed, c = 0.3, dissipation
+    robot = loose_bars(ACROSS, dissipation=dissipation, duration=0.2)
+    robot = thrown(robot, np.array([[0.0] * 6, [0.0, 0.0, 0.0, 0.0, 0.0, -speed]]))
+    v_WB = simulated(robot)[1].states[-1, 14:].reshape(2, 6)
+    np.testing.assert_allclose(v_WB[:, :5], 0.0, atol=1e-6)
+    ends = np.array([speed, v_WB[0, 5] - v_WB[1, 5]])
+    before, after = ends / c - np.log(1.0 + c * ends) / c**2
+    assert after == pytest.approx(before, rel=2e-3) and ends[1] < -0.05
+    assert v_WB[:, 5].sum() == pytest.approx(-speed, abs=1e-6), "momentum"
+
+
+def with_drakes_contact(robot: Robot, dissipation: float, duration: float) -> np.ndarray:
+    """Poses of bars after a duration (s) with Drake's own point contact of capsules."""
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    for body, (a, b) in zip(AddBodies(plant, robot.structure), robot.structure.struts, strict=True):
+        start, end = robot.structure.p_BN[a], robot.structure.p_BN[b]
+        pose = RigidTransform(RotationMatrix.MakeFromOneVector(end - start, 2), (start + end) / 2)
+        properties = ProximityProperties()
+        # Two equal springs in series.
+        AddContactMaterial(dissipation, 2.0 * STIFFNESS, CoulombFriction(0.0, 0.0), properties)
+        shape = Capsule(RADIUS, float(np.linalg.norm(end - start)))
+        plant.RegisterCollisionGeometry(body, pose, shape, body.name(), properties)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_target_accuracy(1e-9)
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositionsAndVelocities(context, robot.structure.initial_state)
+    simulator.AdvanceTo(duration)
+    return plant.GetPositions(context).reshape(-1, 7)
+
+
+def test_bars_that_tumble_move_as_drakes_capsules():
+    robot = tumbling(1.0)
+    poses = poses_of(simulated(robot)[1].states)[-1]
+    np.testing.assert_allclose(poses, with_drakes_contact(robot, 1.0, 0.5), atol=1e-4)
+    np.testing.assert_allclose(poses, end_on_diagram(robot), atol=1e-5)
+
+
+def test_a_bar_rests_across_two_others_where_the_contact_bears_its_weight(engine):
+    beams = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
+    across = ((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))
+    given = {"dissipation": 1.0, "gravity": G, "anchors": CROSSED, "duration": 0.3}
+    robot = loose_bars([*beams, across], **given)
+    heights = moved_nodes(robot.structure, robot.structure.initial_state)[:, 5]
+    depth = 2.0 * RADIUS - (heights[-1] - heights[0])
+    assert 2.0 * STIFFNESS * depth == pytest.approx(robot.weight / 3.0, rel=1e-6)
+    p_WB = trajectory_of(robot, engine).p_WB[-1]
+    atol = 2e-5 if engine == "mujoco" else 1e-6
+    np.testing.assert_allclose(p_WB, robot.structure.p_WB, atol=atol)
+
+
+def test_forces_do_not_depend_on_when_near_struts_were_searched():
+    robot = tumbling(0.0)
+    states = simulated(robot)[1].states
+
+    def forces_at(state: np.ndarray, memory: Forces) -> np.ndarray:
+        force = np.empty(12)
+        compute_state_forces(Packed((robot.model, memory)), state, force)
+        return force
+
+    kept = Forces.of(robot.model)
+    forces = np.array([forces_at(state, kept) for state in states])
+    anew = np.array([forces_at(state, Forces.of(robot.model)) for state in states])
+    assert 3 < np.count_nonzero(anew.any(axis=1)) < len(states)
+    np.testing.assert_array_equal(forces, anew)
+
+
+def test_struts_that_overlap_at_the_start_are_named(refused):
+    scenario = loose_bars(ACROSS, dissipation=1.0).scenario
+    offsets = [["0 m", "0 m", "1 m"], ["0 m", "0 m", "0.9875 m"]]  # 0.5 mm too near
+    with refused("prism", "strut_contact", "a0 b0", "a1 b1", "0.5 mm"):
+        Robot.of(scenario.with_changes({"robot.offsets": offsets}))
+
+
+def test_the_spin_of_a_bar_about_its_axis_hardly_shortens_steps():
+    # It exerts no torque. It turns with the axis, so it does add to the error of a long step.
+    times = {"simulation.duration": "2 s", "simulation.steady_from": "1 s", "cpg.start_up": "0.5 s"}
+    prism = load_scenario("prism").with_sections(robot=driven_as_recorded("prism"))
+    robot = Robot.of(prism.with_changes(times))
+    a, b = robot.structure.struts.T
+    axes = robot.structure.p_BN[b] - robot.structure.p_BN[a]
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    (still, motion), (spinning, spun) = (
+        simulated(thrown(robot, np.hstack([spin * axes, np.zeros((3, 3))])))
+        for spin in (0.0, 10.0)  # rad/s
+    )
+    assert spinning.integrator.steps < 1.25 * still.integrator.steps
+    poses, others = poses_of(motion.states), poses_of(spun.states)
+    np.testing.assert_allclose(others[..., 4:], poses[..., 4:], atol=5e-4)
+    assert np.ptp(poses[..., 4:], axis=0).max() > 5e-3, "it moves"
+
+
+def test_a_stiff_anchor_takes_no_shorter_steps():
+    def steps(stiffness: float) -> int:
+        scenario = supported_prism(**{"robot.anchor_stiffness": f"{stiffness} N/m"})
+        return simulate(scenario, seeded_gait(scenario, 3)).integrator.steps
+
+    assert steps(1e9) < 2.0 * steps(1e5)
+
+
+def test_an_offset_moves_a_body_only_along_its_free_axes():
+    offsets = [["0.01 m", "0.02 m", "0.03 m"]] * 3
+    structure = Robot.of(supported_prism()).structure
+    moved = Robot.of(supported_prism(**{"robot.offsets": offsets})).structure
+    by_bar = {"n0": [0.0, 0.0, 0.0], "n1": [0.01, 0.0, 0.0], "n2": [0.01, 0.02, 0.0]}
+    for node, expected in by_bar.items():
+        bar = structure.carriers[structure.node_names.index(node)]
+        np.testing.assert_allclose(moved.p_WB[bar] - structure.p_WB[bar], expected, atol=1e-15)
