@@ -39,12 +39,18 @@ def test_every_task_is_evaluated_also_when_workers_are_recycled_or_die(
 
 
 @pytest.mark.parametrize("make", [InProcesses, on_processes])
-def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, make, refused):
+def test_a_task_whose_worker_dies_twice_is_named(tasks, tmp_path, make, refused):
+    dying = analytic.Dying(tmp_path, always=(4,))
+    with refused("trial 0, evaluation 4", "", "died"), make(dying, 2) as evaluator:
+        analytic.evaluated(evaluator, tasks)
+
+
+def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, refused):
     run, scenario = tmp_path / "run", analytic.small_scenario(trials=1)
     analytic.record_run(tmp_path / "whole", scenario)
     with refused("trial 0, evaluation 17", "", "died"):
         dying = analytic.Dying(tmp_path, always=(17,))
-        analytic.record_run(run, scenario, evaluator=make(dying, 2))
+        analytic.record_run(run, scenario, evaluator=InProcesses(dying, 2))
     assert load_run(run).evaluations["failure"].isin([None, "fell off the table"]).all()
     analytic.record_run(run)
     assert analytic.read_record(run) == analytic.read_record(tmp_path / "whole")
