@@ -33,16 +33,6 @@ def test_a_table_aligns_numbers_to_the_right():
     assert broken.splitlines()[-1] == "| a word | 5\u00a0(4–\u20606) |", "numbers stay on one line"
 
 
-def test_texts_and_headings_are_folded_where_the_terminal_ends_and_numbers_are_not(monkeypatch):
-    table = Table(["body", "load (N)"], [["front_leg/knee front_leg/center", "1.25 to 1000"]])
-    monkeypatch.setenv("COLUMNS", "32")
-    assert table.text().splitlines() == [
-        "body                    load (N)",
-        "front_leg/knee      1.25 to 1000",
-        "  front_leg/center",
-    ]
-
-
 def test_a_range_without_width_or_ends_is_not_shown():
     assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
     assert ranged(2.0, 1.0, 3.0) == "2.00 (1.00 to 3.00)"
