@@ -51,15 +51,17 @@ class Prepared:
         """Prepares a simulation. Raises InputError if gait or steering do not fit the scenario."""
         robot, gait, record = simulation.robot, simulation.gait, simulation.record
         settings, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        instants = [0.0, settings.steady_from, settings.duration, start_up]
-        marks = np.unique(np.concatenate([instants, _jumps(robot)]).round(MARK_DECIMALS))
+        duration = settings.duration
+        instants = np.concatenate([[0.0, settings.steady_from, start_up], _jumps(robot)])
+        marks = np.unique(instants.round(MARK_DECIMALS))
+        before = marks[marks < duration - 0.5 * 10.0**-MARK_DECIMALS]
         turns, solver = robot.turns(gait, simulation.steering), Solver.of(robot.model)
         return cls(
             robot=robot,
             gait=gait,
             record=record,
             times=motion_times(settings, record=record),
-            marks=marks[marks <= settings.duration],
+            marks=np.append(before, duration),
             turns=turns,
             constants=_constants(robot, gait, solver),
             start=_start(robot, turns, solver),
