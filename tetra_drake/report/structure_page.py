@@ -17,6 +17,7 @@ from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.robot import Robot, overlaps, undisturbed_structure
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
@@ -36,14 +37,18 @@ _NOISE = 1e-9
 
 _SURROUNDINGS = "prism"
 """Shipped scenario with the ground and friction for structure files."""
+_SINKS, _RESTS = 0.03, 0.01
+"""Depths of the feet in the ground, as shares of the robot's height: too deep, and as deep as on a
+ground that bears the robot."""
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     """The robot of a structure or of a scenario on flat ground, with forces as actuators, for
     MuJoCo. A structure gets Coulomb friction.
 
-    A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in some of
-    NTRT's; in equilibrium they touch. Raises InputError that names file and key.
+    A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
+    for it. A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in
+    some of NTRT's; in equilibrium they touch. Raises InputError that names file and key.
     """
     shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
     if name_or_file not in shipped and not os.path.exists(name_or_file):
@@ -60,10 +65,23 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     friction = given.friction.without_bristles()
     scenario = given.with_sections(friction=friction, engine=Mujoco())
     try:
-        return Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
+        robot = Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
+        return robot if is_scenario else _on_firm_ground(robot)
     except InputError as error:
         key = error.key if is_scenario else error.key.removeprefix("robot.")
         raise InputError(name_or_file, key, error.problem) from error
+
+
+def _on_firm_ground(robot: Robot) -> Robot:
+    """The robot on a ground in which its weight presses no node deeper than a share of its size."""
+    scenario, p_WN = robot.scenario, node_positions(robot.structure, robot.structure.initial_state)
+    least = robot.weight / (_RESTS * float(np.ptp(p_WN, axis=0).max()))
+    ground = scenario.ground
+    if least <= ground.stiffness:
+        return robot
+    damping = ground.damping * least / ground.stiffness
+    firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
+    return Robot.of(firm, undisturbed_structure(firm, may_overlap=True))
 
 
 def structure_text(study: EquilibriumStudy) -> str:
@@ -80,7 +98,7 @@ def structure_text(study: EquilibriumStudy) -> str:
         f"Without weight: self-stress states {len(statics.self_stresses)}, "
         f"infinitesimal mechanisms {statics.mechanisms}.",
         f"Lowest natural frequencies{on_ground}, undamped: {lowest or 'none'} Hz.",
-        "At rest, without actuation:",
+        f"At rest, without actuation{_ground_text(study)}:",
         _bodies_table(study).text(),
     ]
     if len(structure.cables):
@@ -91,10 +109,17 @@ def structure_text(study: EquilibriumStudy) -> str:
     return "\n\n".join(lines)
 
 
+def _ground_text(study: EquilibriumStudy) -> str:
+    if not study.robot.structure.contacts.size:
+        return ""
+    scenario = study.robot.scenario
+    return f", on a ground of {scenario.units.shown(scenario.ground.stiffness, 'N/m')} per node"
+
+
 def _faults(study: EquilibriumStudy) -> list[str]:
     """Lines with the nodes that are below the ground at rest, and the struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
-    lines, allowed = [], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
+    lines, allowed = [_sinking(study)], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
         depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]
@@ -103,7 +128,20 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     if through:
         pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), (depth, _) in through.items()]
         lines.append(f"Struts that pass through each other: {listed(pairs)}.")
-    return lines
+    return [line for line in lines if line]
+
+
+def _sinking(study: EquilibriumStudy) -> str:
+    """Sentence with the stiffness of the ground that would bear the robot, if it sinks in; empty if
+    it does not."""
+    robot, units = study.robot, study.robot.scenario.units
+    z = study.nodes["z"].to_numpy()
+    depth, height = -z[robot.structure.contacts].min(initial=0.0), np.ptp(z)
+    if depth <= _SINKS * height:
+        return ""
+    stiffness = robot.scenario.ground.stiffness * depth / (_RESTS * height)
+    needed = f"a ground.stiffness of {units.shown(stiffness, 'N/m')} would bear it"
+    return f"Sinks into the ground by {units.shown(depth, 'm')}: {needed}."
 
 
 def _bodies_table(study: EquilibriumStudy) -> Table:

@@ -109,12 +109,18 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def _fitting(lengths: tuple[float, ...]) -> Units:
-    """The units that need the fewest digits for the long ones among lengths (m)."""
+    """The units that need the fewest digits for the long ones among lengths (m); metric ones for
+    lengths that are round in no unit, such as those of a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
-    return min(SYSTEMS.values(), key=lambda units: sum(_digits(x / units.length) for x in long))
+    return min(
+        SYSTEMS.values(),
+        key=lambda units: sum(min(_MANY, _digits(x / units.length)) for x in long),
+    )
 
 
+_MANY = 6
+"""Number of digits from which on a number is not round."""
 _LONG = 0.25
 """Least length, as a share of the greatest, that counts. Diameters are in mm also where lengths are
 in cm."""

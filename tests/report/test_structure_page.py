@@ -1,0 +1,46 @@
+"""What `structure` says of heavy robots and of turned ones."""
+
+import numpy as np
+import pytest
+
+from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.report.structure_page import robot_of_file, structure_text
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.units import units_for
+
+TRIPOD = """
+unit: m
+nodes: {a: [0, 0, 0], b: [1, 0, 0], c: [0.5, 0.8, 0], top: [0.5, 0.3, 1]}
+struts:
+  leg:
+    pairs: [[a, top], [b, top], [c, top]]
+    diameter: 2 cm
+    density: 1 g/cm^3
+    node_diameter: 0 m
+masses: {top: 300 kg}
+contacts: [a, b, c]
+"""
+
+
+def test_a_heavy_structure_stands_on_a_ground_that_bears_it(tmp_path):
+    (tmp_path / "tripod.yaml").write_text(TRIPOD)
+    robot = robot_of_file(str(tmp_path / "tripod.yaml"))
+    assert robot.scenario.ground.stiffness == pytest.approx(robot.weight / 0.01, rel=0.02)
+    assert 0.0 < -study_equilibrium(robot).nodes["z"].min() < 0.01
+
+
+def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path):
+    file = tmp_path / "soft.yaml"
+    file.write_text("{base: prism, name: soft, ground: {stiffness: 20 N/m, damping: 0 N*s/m^2}}")
+    study = study_equilibrium(robot_of_file(str(file)))
+    depth, height = -study.nodes["z"].min(), np.ptp(study.nodes["z"])
+    assert depth > 0.03 * height
+    told = study.robot.scenario.units.shown(20.0 * depth / (0.01 * height), "N/m")
+    assert f"a ground.stiffness of {told} would bear it" in structure_text(study)
+    assert "would bear it" not in structure_text(study_equilibrium(robot_of_file("prism")))
+
+
+def test_lengths_that_are_round_in_no_unit_are_shown_in_metric_units():
+    turned = tuple(0.2 * np.cos([0.1, 0.7, 1.3]))
+    assert units_for(turned, None).length_name == "cm"
+    assert units_for(load_scenario("thesis").robot.lengths, None).length_name == "in"
