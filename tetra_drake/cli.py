@@ -587,7 +587,7 @@ def _structure(
     Example: tetra-drake structure six_bar --out six_bar.html
     """
     from tetra_drake.analysis.equilibrium import study_equilibrium
-    from tetra_drake.engines.mjcf import make_mjcf
+    from tetra_drake.engines.mjcf import loose_remark, make_mjcf
     from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
     from tetra_drake.robot.sdf import make_sdf
 
@@ -600,6 +600,8 @@ def _structure(
     if mjcf:
         write_whole(mjcf, make_mjcf(robot, rest=rest))
         text += f"\nwrote {mjcf}"
+        if remark := loose_remark(robot):
+            _warn(remark)
     if sdf:
         write_whole(sdf, make_sdf(robot.structure, rest, name=robot.scenario.name))
         text += f"\nwrote {sdf}"

@@ -6,7 +6,7 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.cable import CableLaw, cable_tension
+from tetra_drake.physics.cable import CableLaw, cable_tension, slack_tension
 from tetra_drake.physics.forces import Forces, compute_cable_forces
 from tetra_drake.robot.structure import AddBodies
 from tetra_drake.simd.packed import Packed
@@ -15,6 +15,23 @@ from tetra_drake.simd.packed import Packed
 def test_tension_is_equation_6():
     # 35 N/m (0.3 m - 0.1 m) + 8 N s/m * -0.25 m/s + 1.5 N = 7 - 2 + 1.5
     assert cable_tension(0.3, -0.25, 1.5, CableLaw(35.0, 8.0, 0.1)) == pytest.approx(6.5, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("stretch", "rate", "tension"),
+    [
+        (0.2, 0.5, 11.0),  # 7 N of the spring and 4 N of the damper: Eq. 6
+        (0.2, 1.0, 14.0),  # the damper's 8 N count as the spring's 7 N
+        (0.2, -1.0, 0.0),
+        (-0.001, 50.0, 0.0),  # loose, however fast it lengthens
+        (0.0, 50.0, 0.0),
+    ],
+)
+def test_a_cable_that_goes_slack_pulls_only_while_it_is_stretched(stretch, rate, tension):
+    law = CableLaw(35.0, 8.0, 0.1)
+    found, per_rate = slack_tension(35.0 * stretch, rate, law)
+    assert found == pytest.approx(tension, rel=1e-12)
+    assert per_rate == (8.0 if tension == 11.0 else 0.0)
 
 
 def test_passive_cables_are_drakes_linear_spring_dampers(robot, structure):

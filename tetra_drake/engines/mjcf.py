@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Comment, Element
 
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
@@ -51,9 +51,10 @@ def check_mjcf(scenario: Scenario) -> None:
     scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
 
-def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
+def make_mjcf(robot: Robot, *, rest: Array | None = None, pulled: bool = False) -> str:
     """Model of a robot with a tendon for each cable and a motor for each driven one. If the
-    actuators have drives, tendons have no law, and a motor for each cable exerts its tension.
+    actuators have drives, or if `pulled`, tendons have no law, and a motor for each cable exerts
+    its tension.
 
     Motors are in the order of their cables; for their names see motor_names(). With a state
     (13 bodies,) at `rest`, there is a key frame of this name. Raises InputError if MuJoCo does not
@@ -62,10 +63,16 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
     scenario = robot.scenario
     check_mjcf(scenario)
     model = Element("mujoco", model=scenario.name)
-    steps = {"integrator": integrator_of(robot), "timestep": scenario.settings_of(Mujoco).step}
+    pulled = pulled or has_drive(robot.model.actuator)
+    steps = {
+        "integrator": integrator_of(robot, pulled=pulled),
+        "timestep": scenario.settings_of(Mujoco).step,
+    }
     add_element(model, "compiler", inertiafromgeom="false")
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     add_element(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
+    if not pulled and (remark := loose_remark(robot)):
+        model.append(Comment(f" {remark} "))
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
         _add_floor(world, robot)
@@ -75,19 +82,35 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None) -> str:
         _add_key_frame(model, robot.structure, rest)
     if robot.model.strut_contact.acts:
         _add_strut_contacts(model, robot)
-    _add_cables(model, robot)
+    _add_cables(model, robot, pulled=pulled)
     _add_pushes(model, world, robot.structure)
     return xml_text(model)
 
 
-def integrator_of(robot: Robot) -> str:
+def is_pulled(robot: Robot) -> bool:
+    """True if MuJoCo's tendons lack the law of the cables: those of actuators with drives, and
+    damped cables that go slack."""
+    return has_drive(robot.model.actuator) or bool(loose_remark(robot))
+
+
+def loose_remark(robot: Robot) -> str:
+    """What tendons do otherwise than the robot's cables, if these are damped and can go slack."""
+    damped = np.flatnonzero(robot.structure.cables["damping"])
+    if not robot.structure.slack or not damped.size or has_drive(robot.model.actuator):
+        return ""
+    names = [robot.structure.cable_names[i] for i in damped[:3].tolist()]
+    some = ", ".join(names) + (f" and {damped.size - 3} more" if damped.size > 3 else "")
+    return f"the dampers of MuJoCo's tendons also act where a cable is slack: {some}"
+
+
+def integrator_of(robot: Robot, *, pulled: bool) -> str:
     """Name of MuJoCo's integrator for a robot: implicit, unless its tendons are damped.
 
     The implicit integrators know how a damper's force on a body depends on this body's velocity,
     but not on the other body's. Damped tendons would brake the robot as if their other ends were
     fixed: in steps of 0.125 ms, the mast would fall with 0.76 g.
     """
-    has_dampers = robot.structure.cables["damping"].any() and not has_drive(robot.model.actuator)
+    has_dampers = robot.structure.cables["damping"].any() and not pulled
     return "Euler" if has_dampers else "implicitfast"
 
 
@@ -193,10 +216,10 @@ def _feet(robot: Robot) -> int:
     return robot.structure.feet or max(1, robot.equilibrium.feet)
 
 
-def _add_cables(model: Element, robot: Robot) -> None:
-    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if the
-    actuators have drives."""
-    structure, has_drives = robot.structure, has_drive(robot.model.actuator)
+def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
+    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if motors
+    exert their tensions."""
+    structure = robot.structure
     tendons, actuators = add_element(model, "tendon"), add_element(model, "actuator")
     width, motors = structure.strut_radius.min() / 2, motor_names(structure)
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
@@ -204,11 +227,11 @@ def _add_cables(model: Element, robot: Robot) -> None:
         least = 0.0 if structure.slack else cable["free_length"]
         springlength = [least, cable["free_length"]]  # the spring exerts no force in between
         colour = ACTUATED_COLOUR if name in motors else PASSIVE_COLOUR
-        own = {} if has_drives else {"springlength": springlength, **law}
+        own = {} if pulled else {"springlength": springlength, **law}
         tendon = add_element(tendons, "spatial", name=name, width=width, rgba=colour, **own)
         for node in (cable["node_a"], cable["node_b"]):
             add_element(tendon, "site", site=structure.node_names[node])
-        if has_drives or name in motors:
+        if pulled or name in motors:
             motor = motors.get(name, name)
             # A motor's force lengthens its tendon, ours shortens it.
             add_element(actuators, "motor", name=motor, tendon=name, gear="-1")

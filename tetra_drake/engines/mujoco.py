@@ -3,9 +3,9 @@
 Bodies, cables, actuation and gravity are the same as in the other engines. The ground differs: it
 is MuJoCo's soft contact with a friction cone.
 
-- Actuators with drives (winches and tension motors): each cable's tension is computed by the law of
-  the other engines, from MuJoCo's lengths at the beginning of each step. Otherwise cables are
-  MuJoCo's own tendons.
+- Actuators with drives (winches and tension motors), and damped cables that go slack: each cable's
+  tension is computed by the law of the other engines, from MuJoCo's lengths at the beginning of
+  each step. Otherwise cables are MuJoCo's own tendons.
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
   grows with depth. Both agree at the depth of a robot in equilibrium.
 - Contact of struts: capsules with the scenario's stiffness. The damping is constant, too.
@@ -30,12 +30,12 @@ import numpy as np
 
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.engines.interface import Engine, Outcome
-from tetra_drake.engines.mjcf import check_mjcf, integrator_of, make_mjcf
+from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_mjcf
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator, has_drive
+from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator
 from tetra_drake.physics.cable import PASSIVE, Cables
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.physics.forces import pull_of_cable
@@ -117,9 +117,9 @@ class _Simulator:
             # The handler is not restored, because other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
-        self._robot = robot
+        self._robot, self.pulled = robot, is_pulled(robot)
         try:
-            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot))
+            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot, pulled=self.pulled))
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
@@ -134,8 +134,6 @@ class _Simulator:
         self._contacts = [self._model.site(name).id for name in names]
         driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # index of each motor's signal
-        self.has_drives = has_drive(robot.model.actuator)
-        """True if the actuators have states."""
 
     def start(self) -> Array:
         """MuJoCo's state at the start."""
@@ -246,7 +244,7 @@ class _Simulator:
         """MuJoCo's contact forces on the nodes along t1, t2 and n (contacts, 3), in N."""
         mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        if self.has_drives:
+        if self.pulled:
             mujoco.mj_step1(model, data)
             self._pull(data, signals, drives.copy(), 0.0)
         else:
@@ -308,7 +306,7 @@ class _MujocoWalk:
             for first in range(0, len(signals), _STRETCH):
                 check_time()
                 some = signals[first : first + _STRETCH]
-                if simulator.has_drives:
+                if simulator.pulled:
                     states, drives = simulator.step_through(self._state, some, self._drives)
                 else:
                     states = simulator.roll_out(rollout, self._state, some)
@@ -341,19 +339,15 @@ class _MujocoWalk:
         )
 
     def result(self) -> SimulationResult:
-        """The result, at the end. Raises SimulationFailure if a damped cable went slack."""
+        """The result, at the end."""
         robot, totals = self._simulation.robot, self._observer.totals()
-        is_damped = robot.structure.cables["damping"].any() and not self._simulator.has_drives
-        if robot.model.slack and is_damped and totals.tension.of_all[0] <= 0.0:
-            reason = "a cable went slack, and the damper of MuJoCo's tendon would push"
-            raise SimulationFailure(time=float(totals.time[0]), reason=reason)
         return make_result(
             robot,
             self._simulation.gait,
             self._simulator.motion(self.times, self._kept, self.signals, self._drives_kept),
             totals=totals,
             work=IntegratorWork(
-                scheme=integrator_of(robot),
+                scheme=integrator_of(robot, pulled=self._simulator.pulled),
                 accuracy=self.step,
                 steps=self.steps,
                 derivative_evaluations=self.steps,

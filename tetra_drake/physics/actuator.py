@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.physics.cable import CableLaw, cable_tension, elastic_tension
+from tetra_drake.physics.cable import CableLaw, cable_tension, elastic_tension, slack_tension
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, named, select
 
@@ -96,10 +96,11 @@ def winch_force(
 ) -> ActuatorForce:
     """Force of a winch. `drive` is the free length of its cable.
 
-    The winch follows its command with a lag. It pays out with at most max_speed, and winds with at
-    most max_speed (1 - tension / max_force). Above max_force the cable pulls it backward. The
-    tension depends on the winding speed because of the cable's damping, and the winding speed
-    depends on the tension because of the force-speed line. Both equations are linear and are solved
+    The cable goes slack as a passive one does; see physics.cable. The winch follows its command
+    with a lag. It pays out with at most max_speed, and winds with at most max_speed
+    (1 - tension / max_force). Above max_force the cable pulls it backward. The tension depends on
+    the winding speed because of the cable's damping, and the winding speed depends on the tension
+    because of the force-speed line. Both equations are linear, within limits, and are solved
     together. A command below least_length counts as least_length, so the winch slows down before
     it. A sudden stop would be a jump of the tension, which an integrator cannot handle.
     """
@@ -110,13 +111,14 @@ def winch_force(
     per_force = limits.max_speed / limits.max_force
     stiffening = 1.0 + per_force * law.damping
     on_line = (per_force * (elastic + law.damping * rate) - limits.max_speed) / stiffening
+    most = 2.0 * maximum(elastic, 0.0)  # tension
+    on_line = minimum(on_line, per_force * most - limits.max_speed)
     slowed = on_line > maximum(allowed, -limits.max_speed)
     winds = maximum(allowed, maximum(on_line, -limits.max_speed))
-    tension = elastic + law.damping * (rate - winds)
-    tension_per_rate = select(slowed, law.damping / stiffening, law.damping)
+    tension, tension_per_rate = slack_tension(elastic, rate - winds, law)
     return ActuatorForce(
-        tension=maximum(tension, 0.0),
-        tension_per_rate=select(tension > 0.0, tension_per_rate, 0.0),
+        tension=tension,
+        tension_per_rate=select(slowed, tension_per_rate / stiffening, tension_per_rate),
         rate=winds,
         limited=select(winds != wanted, 1.0, 0.0),
     )
@@ -128,8 +130,9 @@ def motor_force(
 ) -> ActuatorForce:
     """Force of a tension motor. `drive` is its tension.
 
-    The motor follows its command with a lag. Its tension is at most max_force
-    (1 - winding speed / max_speed).
+    The motor keeps its cable taut at any length, so the spring and the damper that its software
+    plays are those of Eq. 6, but it does not push. It follows its command with a lag. Its tension
+    is at most max_force (1 - winding speed / max_speed).
     """
     left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
     most = limits.max_force * left

@@ -1,4 +1,14 @@
-"""Cables: springs with damping, and an actuation force added to the tension (Eq. 6)."""
+"""Cables: springs with damping, and an actuation force added to the tension (Eq. 6).
+
+The cables of Eq. 6 also push. Other cables go slack: such a cable pulls only while it is stretched,
+and its damper then at most doubles its tension, or takes it away. With the stretch x = l - l0,
+
+    E = max(0, k x)
+    T = E + c dl/dt, limited to 0 ... 2 E
+
+A loose cable exerts no force, however fast it lengthens. The tension is continuous. Where the
+damper is weaker than the spring, this is Eq. 6.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +17,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.simd.compiling import inlined
-from tetra_drake.simd.lanes import Real, Table
+from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
 PASSIVE = -1
 """Value of `signal` for a cable without actuation."""
@@ -82,3 +92,14 @@ def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real
     `length` is in m, `rate` (m/s) is the rate of the length, `signal` (N) is the actuation force.
     """
     return elastic_tension(length - law.free_length, law) + law.damping * rate + signal
+
+
+@inlined
+def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]:
+    """Tension (N) of a cable that goes slack, and its derivative by the rate (N s/m).
+
+    `elastic` (N) is elastic_tension(), `rate` (m/s) the rate of the length.
+    """
+    linear = elastic + law.damping * rate
+    tension = minimum(maximum(linear, 0.0), 2.0 * maximum(elastic, 0.0))
+    return tension, select(tension == linear, law.damping, 0.0)

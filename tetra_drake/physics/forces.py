@@ -99,17 +99,23 @@ def pull_of_cable(
 
     `drive` is the index of the cable's drive, if it has one; then its rate and limit are written to
     `drives`. The length is in m, its rate in m/s, `signals` (signals,) in N. With `slack`, a cable
-    without a drive does not push.
+    without a drive goes slack; an actuation force acts beside its spring and damper.
     """
     driver, signal = cables.signal[i], 0.0
     if driver != cable.PASSIVE:
         signal = signals[driver]
     law = cable.law_of(cables, i)
     if driver == cable.PASSIVE or not actuator.has_drive(of_cables):
-        tension = cable.cable_tension(length, rate, signal, law)
-        if slack:
-            tension = maximum(tension, 0.0)
-        return tension, law.damping, drive
+        if not slack:
+            return cable.cable_tension(length, rate, signal, law), law.damping, drive
+        elastic = cable.elastic_tension(length - law.free_length, law)
+        tension, tension_per_rate = cable.slack_tension(elastic, rate, law)
+        tension += signal
+        return (
+            maximum(tension, 0.0),
+            select(tension > 0.0, tension_per_rate, 0.0),
+            drive,
+        )
     driven = actuator.actuator_force(
         of_cables, drives[drive, actuator.DRIVE], length, rate, signal, law
     )

@@ -113,7 +113,7 @@ class RowCables(CableConstants):
     free_length: Length = Field(ge=0)
     """Length without tension."""
     slack: bool
-    """True if a cable that would push has no tension."""
+    """True if a cable pulls only while it is stretched; otherwise it also pushes (Eq. 6)."""
 
     def law(self, cable: str) -> dict[str, float]:
         """Constants of a cable of a junction, by name."""

@@ -1,0 +1,63 @@
+"""A ball on a loose tether: it falls freely, then the tether catches it."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.anchored import BAR, LINE, scenario_of
+from scipy.integrate import solve_ivp
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario.scenario import Scenario
+
+DROP, G = 0.5, 9.80665  # m until the tether of 1 m is taut, m/s^2
+
+
+TETHER: dict[str, Any] = {
+    "nodes": {"hook": [0.0, 0.0, 2.0], "ball": [0.0, 0.0, 1.5], "p": [5.0, 0, 0], "q": [6.0, 0, 0]},
+    "struts": {"idle": BAR | {"pairs": [["p", "q"]]}},
+    "cables": {"tether": LINE | {"pairs": [["hook", "ball"]], "free_length": 1.0}},
+    "anchors": {"hook": "xyz", "p": "xyz", "q": "xyz"},
+    "masses": {"ball": 1.0},
+}
+"""A ball that hangs by a tether, and a bar that is held."""
+
+
+@pytest.fixture
+def dropped() -> Scenario:
+    """The ball dropped from half a metre below its hook."""
+    tree = {**TETHER, "cables": {"tether": TETHER["cables"]["tether"] | {"damping": 20.0}}}
+    lifted = 0.5 + G / LINE["stiffness"]  # from where it hangs
+    scenario = scenario_of(tree, duration=1.0)
+    return scenario.with_changes(
+        {
+            "robot.offsets": [["0 m", "0 m", "0 m"], ["0 m", "0 m", f"{lifted!r} m"]],
+            "simulation.sample_period": "5 ms",
+            "friction.stiffness": "0 N/m",  # the only one that MuJoCo knows
+        }
+    )
+
+
+@pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])
+def test_a_loose_tether_does_not_brake_a_falling_ball(dropped, engine):
+    scenario = dropped.with_changes({"engine": engine})
+    found = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+    height = found.p_WN.sel(node="ball", axis="z")
+    falls = found.time < math.sqrt(2.0 * DROP / G)  # 0.319 s
+    expected = 1.5 - 0.5 * G * found.time**2
+    np.testing.assert_allclose(height[falls], expected[falls], atol=2e-4)
+    tension = found.tension.isel(cable=0)
+    assert not tension[falls].values.any()
+
+    def motion(time: float, y: np.ndarray) -> list[float]:
+        return [y[1], G - pull(y)]
+
+    def pull(y: np.ndarray) -> float:
+        elastic = max(0.0, LINE["stiffness"] * (y[0] - DROP))
+        return elastic + float(np.clip(20.0 * y[1], -elastic, elastic))
+
+    caught = solve_ivp(motion, (0.0, 1.0), [0.0, 0.0], t_eval=found.time.values, max_step=1e-3)
+    np.testing.assert_allclose(1.5 - height, caught.y[0], atol=1e-3)
+    assert max(map(pull, caught.y.T)) > 60.0
