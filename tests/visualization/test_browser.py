@@ -6,10 +6,8 @@ import io
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import animation
 import numpy as np
 import pytest
-import xarray
 from helpers import quick_figures
 from helpers.synthetic_run import write_run
 from matplotlib.colors import hex2color, rgb_to_hsv
@@ -140,26 +138,6 @@ def test_on_a_phone_nothing_lies_over_the_robot(browser, replay):
             for below in ("bar", "legend"):
                 assert page.evaluate(box, below)["top"] >= pane["bottom"] - 1
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
-
-
-@pytest.mark.parametrize(
-    ("speed", "shown"), [(0.0, ["0 s", "5 s"]), (0.1, ["0 s", "2.5 s", "5 s"])]
-)
-def test_a_still_hides_no_instant_by_another(browser, trajectory, tmp_path, speed, shown):
-    """The robot walks one inch, and in the second case 0.5 m more, its own length."""
-    way = speed * trajectory["time"] * xarray.DataArray([1.0, 0.0, 0.0], dims="axis")
-    moved = {name: trajectory[name] + way for name in ("p_WN", "p_WB")}
-    path = tmp_path / "replay.html"
-    save_replay(path, robot=ROBOT, trajectory=trajectory.assign(moved), title="a: b")
-    with opened(browser, path.as_uri(), size=(300, 200)) as page:
-        wait_until_loaded(page)
-        robots = "viewer.scene.children.filter(child => child.name == 'robot').length"
-        assert page.evaluate(robots) == 1
-        animation.still(page, [0.0, 2.5, 5.0])
-        assert page.evaluate(robots) == len(shown)
-        labels = page.locator("#labels span:visible").all_text_contents()
-        assert labels[: len(shown)] == shown
-        assert not page.locator("#bar, #heading, #legend").filter(visible=True).count()
 
 
 @pytest.mark.parametrize(("name", "view"), [("talk.mp4", "side"), ("talk.gif", "top")])

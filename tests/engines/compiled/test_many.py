@@ -5,6 +5,7 @@ import itertools
 import threading
 import time
 from concurrent.futures import CancelledError
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -193,6 +194,21 @@ def test_robots_that_differ_in_numbers_alone_share_an_engine(short):
     others = {"tetrahedra": 3, "cables.slack": True, "contacts": "all", "actuation": sides}
     for change in ({f"robot.{key}": value} for key, value in others.items()):
         assert not engine.accepts(prepared(short.with_changes(change))), change
+
+
+def test_a_table_of_indices_that_somebody_adds_is_part_of_the_kind(short):
+    """Else a kernel would take a robot whose indices lead elsewhere in its tables."""
+    walk = prepared(short)
+
+    class Added(NamedTuple):
+        solver: object
+        table: np.ndarray
+
+    def kind_with(index: int) -> object:
+        solver = Added(walk.constants.solver, np.array([index]))
+        return dataclasses.replace(walk, constants=walk.constants._replace(solver=solver)).kind
+
+    assert kind_with(1) == kind_with(1) != kind_with(2)
 
 
 def test_failures_stand_in_the_place_of_results(short):
