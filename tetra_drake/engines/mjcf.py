@@ -88,8 +88,8 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None, pulled: bool = False) 
 
 
 def is_pulled(robot: Robot) -> bool:
-    """True if MuJoCo's tendons lack the law of the cables: those of actuators with drives, and
-    damped cables that go slack."""
+    """True if MuJoCo's tendons lack the law of the cables: where actuators have drives, and where
+    damped cables go slack."""
     return has_drive(robot.model.actuator) or bool(loose_remark(robot))
 
 
