@@ -130,9 +130,9 @@ def motor_force(
 ) -> ActuatorForce:
     """Force of a tension motor. `drive` is its tension.
 
-    The motor keeps its cable taut at any length, so the spring and the damper that its software
-    plays are those of Eq. 6, but it does not push. It follows its command with a lag. Its tension
-    is at most max_force (1 - winding speed / max_speed).
+    The motor keeps its cable taut at any length, so its software plays the spring and the damper of
+    Eq. 6, but it does not push. It follows its command with a lag. Its tension is at most
+    max_force (1 - winding speed / max_speed).
     """
     left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
     most = limits.max_force * left

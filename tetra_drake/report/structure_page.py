@@ -73,7 +73,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
 
 
 def _on_firm_ground(robot: Robot) -> Robot:
-    """The robot on a ground in which its weight presses no node deeper than a share of its size."""
+    """The robot on a ground that is stiff enough to bear its weight at a single node."""
     scenario, p_WN = robot.scenario, node_positions(robot.structure, robot.structure.initial_state)
     least = robot.weight / (_RESTS * float(np.ptp(p_WN, axis=0).max()))
     ground = scenario.ground
