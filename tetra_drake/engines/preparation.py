@@ -6,6 +6,7 @@ and numbers of robots, so one short use of each kernel compiles it for all.
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 from collections.abc import Callable
@@ -27,6 +28,7 @@ from tetra_drake.scenario.terrain_kinds import Incline
 
 FUNCTIONS = 380
 """Number of functions that numba compiles in prepare(), roughly."""
+_NOWHERE = subprocess.DEVNULL
 _BRIEF = {f"simulation.{key}": "10 ms" for key in ("duration", "sample_period")}
 _BRIEF |= {"simulation.steady_from": "0 s"}
 
@@ -42,14 +44,21 @@ def prepare(tell: Callable[[], None] = lambda: None) -> None:
         tell: function that is called for each compiled function, about FUNCTIONS times.
     """
     program = f"from {__name__} import *; compile_lanes(lambda: print(end='.', flush=True))"
-    command = [sys.executable, "-c", program]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as lanes:
-        try:
-            compile_others(tell)
-            while lanes.stdout and lanes.stdout.read(1):
+    lanes: list[subprocess.Popen[bytes]] = []
+    with contextlib.ExitStack() as ends:
+
+        def told() -> None:
+            if not lanes:  # something is not compiled yet
+                command = [sys.executable, "-c", program]
+                process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=_NOWHERE)
+                lanes.append(ends.enter_context(process))
+                ends.callback(process.kill)
+            tell()
+
+        compile_others(told)
+        for process in lanes:
+            while process.stdout and process.stdout.read(1):
                 tell()
-        finally:
-            lanes.kill()
     compile_lanes(tell)  # reads the machine code of the other process
 
 
@@ -67,11 +76,11 @@ def compile_others(tell: Callable[[], None]) -> None:
         "feedback": {"engine": witness},
         "motors": {"engine": "!Drake", "terrain": Incline(slope=0.01)},
     }
-    robot = Robot.of(load_scenario("prism"))
     with event.install_listener("numba:compile", _Count(tell)):
         for name, changes in uses.items():
             scenario = load_scenario(name).with_changes({**_BRIEF, **changes})
             _ = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+        robot = Robot.of(load_scenario("prism"))
         _ = robot.equilibrium
         pitch_rates(Readings.empty(robot.structure, 1), robot.structure)
         model, none = robot.model, np.zeros(0)
