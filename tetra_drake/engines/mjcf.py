@@ -90,14 +90,16 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None, pulled: bool = False) 
 def is_pulled(robot: Robot) -> bool:
     """True if MuJoCo's tendons lack the law of the cables: where actuators have drives, and where
     damped cables go slack."""
-    return has_drive(robot.model.actuator) or bool(loose_remark(robot))
+    structure = robot.structure
+    is_damped = structure.cables["damping"].any()
+    return has_drive(robot.model.actuator) or bool(structure.slack and is_damped)
 
 
 def loose_remark(robot: Robot) -> str:
     """What tendons do otherwise than the robot's cables, if these are damped and can go slack."""
-    damped = np.flatnonzero(robot.structure.cables["damping"])
-    if not robot.structure.slack or not damped.size or has_drive(robot.model.actuator):
+    if has_drive(robot.model.actuator) or not is_pulled(robot):
         return ""
+    damped = np.flatnonzero(robot.structure.cables["damping"])
     names = [robot.structure.cable_names[i] for i in damped[:3].tolist()]
     some = ", ".join(names) + (f" and {damped.size - 3} more" if damped.size > 3 else "")
     return f"the dampers of MuJoCo's tendons also act where a cable is slack: {some}"

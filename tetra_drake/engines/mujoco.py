@@ -117,7 +117,9 @@ class _Simulator:
             # The handler is not restored, because other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
-        self._robot, self.pulled = robot, is_pulled(robot)
+        self._robot = robot
+        self.pulled = is_pulled(robot)
+        """True if the law of the other engines computes the tensions at each step."""
         try:
             self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot, pulled=self.pulled))
         except ValueError as error:

@@ -9,18 +9,14 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numba.core import event
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine
-from tetra_drake.engines.compiled.prepared import Prepared
-from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import pull_cables
-from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -29,8 +25,6 @@ from tetra_drake.scenario.terrain_kinds import Incline
 FUNCTIONS = 380
 """Number of functions that numba compiles in prepare(), roughly."""
 _NOWHERE = subprocess.DEVNULL
-_BRIEF = {f"simulation.{key}": "10 ms" for key in ("duration", "sample_period")}
-_BRIEF |= {"simulation.steady_from": "0 s"}
 
 
 def prepare(tell: Callable[[], None] = lambda: None) -> None:
@@ -64,27 +58,26 @@ def prepare(tell: Callable[[], None] = lambda: None) -> None:
 
 def compile_lanes(tell: Callable[[], None]) -> None:
     """Compiles the kernel of the compiled engine."""
-    scenario = load_scenario("thesis").with_changes(_BRIEF | {"engine": "!Compiled"})
     with event.install_listener("numba:compile", _Count(tell)):
-        LaneEngine(Prepared.of(GaitSimulation(Robot.of(scenario), seeded_gait(scenario))))
+        _prepare_engine("thesis", {"engine": "!Compiled"})
 
 
 def compile_others(tell: Callable[[], None]) -> None:
     """Compiles the kernels without lanes."""
-    witness = "!Drake {scheme: runge_kutta3, mode_changes: witness}"
-    uses: dict[str, dict[str, Any]] = {
-        "feedback": {"engine": witness},
-        "motors": {"engine": "!Drake", "terrain": Incline(slope=0.01)},
-    }
     with event.install_listener("numba:compile", _Count(tell)):
-        for name, changes in uses.items():
-            scenario = load_scenario(name).with_changes({**_BRIEF, **changes})
-            _ = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+        witness = "!Drake {scheme: runge_kutta3, mode_changes: witness}"
+        _prepare_engine("feedback", {"engine": witness})
+        _prepare_engine("motors", {"engine": "!Drake", "terrain": Incline(slope=0.01)})
         robot = Robot.of(load_scenario("prism"))
         _ = robot.equilibrium
         pitch_rates(Readings.empty(robot.structure, 1), robot.structure)
         model, none = robot.model, np.zeros(0)
         pull_cables(model.cables, model.actuator, model.slack, none, none, none, 0.0, none, none)
+
+
+def _prepare_engine(name: str, changes: Mapping[str, Any]) -> None:
+    scenario = load_scenario(name).with_changes(changes)
+    engine_of(scenario).prepare(scenario)
 
 
 class _Count(event.Listener):

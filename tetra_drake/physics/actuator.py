@@ -16,7 +16,13 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.physics.cable import CableLaw, cable_tension, elastic_tension, slack_tension
+from tetra_drake.physics.cable import (
+    CableLaw,
+    cable_tension,
+    elastic_tension,
+    most_tension,
+    slack_tension,
+)
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, named, select
 
@@ -111,8 +117,7 @@ def winch_force(
     per_force = limits.max_speed / limits.max_force
     stiffening = 1.0 + per_force * law.damping
     on_line = (per_force * (elastic + law.damping * rate) - limits.max_speed) / stiffening
-    most = 2.0 * maximum(elastic, 0.0)  # tension
-    on_line = minimum(on_line, per_force * most - limits.max_speed)
+    on_line = minimum(on_line, per_force * most_tension(elastic) - limits.max_speed)
     slowed = on_line > maximum(allowed, -limits.max_speed)
     winds = maximum(allowed, maximum(on_line, -limits.max_speed))
     tension, tension_per_rate = slack_tension(elastic, rate - winds, law)

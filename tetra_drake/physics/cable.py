@@ -95,11 +95,17 @@ def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real
 
 
 @inlined
+def most_tension(elastic: Real) -> Real:
+    """Greatest tension (N) of a cable that goes slack, 2 E. `elastic` (N) is elastic_tension()."""
+    return 2.0 * maximum(elastic, 0.0)
+
+
+@inlined
 def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]:
     """Tension (N) of a cable that goes slack, and its derivative by the rate (N s/m).
 
     `elastic` (N) is elastic_tension(), `rate` (m/s) the rate of the length.
     """
     linear = elastic + law.damping * rate
-    tension = minimum(maximum(linear, 0.0), 2.0 * maximum(elastic, 0.0))
+    tension = minimum(maximum(linear, 0.0), most_tension(elastic))
     return tension, select(tension == linear, law.damping, 0.0)

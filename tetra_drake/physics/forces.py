@@ -280,9 +280,8 @@ def forces_of_motion(
     forces, samples = Forces.of(robot), len(states)
     cable_forces = np.empty((samples, *forces.cable_forces.shape))
     ground_forces = np.empty((samples, *forces.ground_forces.shape))
-    generalized = np.empty((samples, 6 * robot.bodies.mass.size))
     given = states, modes, signals, drives
-    forces_along(Packed((robot, forces)), *given, generalized, cable_forces, ground_forces)
+    forces_along(Packed((robot, forces)), *given, cable_forces, ground_forces)
     return cable_forces, ground_forces
 
 
@@ -293,22 +292,22 @@ def forces_along(
     modes: Table,
     signals: Table,
     drives: Table,
-    generalized: Table,
     cable_forces: Table,
     ground_forces: Table,
 ) -> None:
-    """Writes the forces of a motion with k samples: `generalized` (k, 6 bodies), `cable_forces`
-    (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
+    """Writes the forces of a motion with k samples: `cable_forces` (k, cables, CABLE_FORCE_COLUMNS)
+    and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
 
     The motion has states (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m) in N,
     and drives (k, drives).
     """
     robot, forces = unpacked(parts)
+    generalized = np.empty(6 * robot.bodies.mass.size)
     for k in range(states.shape[0]):
         move_robot(robot, states[k], forces)
         for i in range(drives.shape[1]):
             forces.drives[i, actuator.DRIVE] = drives[k, i]
-        compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized[k])
+        compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
         for i in range(cable_forces.shape[1]):
             for c in range(cable_forces.shape[2]):
                 cable_forces[k, i, c] = forces.cable_forces[i, c]

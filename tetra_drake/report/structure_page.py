@@ -117,9 +117,12 @@ def _ground_text(study: EquilibriumStudy) -> str:
 
 
 def _faults(study: EquilibriumStudy) -> list[str]:
-    """Lines with the nodes that are below the ground at rest, and the struts that overlap."""
+    """Lines with the depth of a robot that sinks in, the nodes that are below the ground at rest,
+    and the struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
-    lines, allowed = [_sinking(study)], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
+    lines, allowed = [], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
+    if sinking := _sinking(study):
+        lines.append(sinking)
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
         depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]
@@ -128,7 +131,7 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     if through:
         pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), (depth, _) in through.items()]
         lines.append(f"Struts that pass through each other: {listed(pairs)}.")
-    return [line for line in lines if line]
+    return lines
 
 
 def _sinking(study: EquilibriumStudy) -> str:
