@@ -88,7 +88,7 @@ def row_as_kind(row: Robot) -> StructureFile:
         cables[group]["pairs"].append(pair)
         if cable["signal"] != PASSIVE:
             actuated[oscillators[cable["signal"]]].append(" ".join([group, *pair]))
-    strut = {"density": law.density, "diameter": law.strut_diameter}
+    strut = {"density": law.density, "diameter": law.strut_diameter, "contact_radius": 0.0}
     strut |= {"pairs": [[names[a], names[b]] for a, b in structure.struts]}
     return StructureFile(
         nodes=dict(zip(names, p_WN, strict=True)),
@@ -147,7 +147,7 @@ def felt(robot: Robot, gains: list[float], *, longer: float = 1.0, pushes: float
     forces, feedback = Forces.of(robot.model), np.empty(2 * structure.signals)
     cable_forces, ground_forces = forces.cable_forces, forces.ground_forces
     cable_forces[:, LENGTH] = longer * np.linalg.norm(along, axis=1)
-    ground_forces[:, NORMAL] = pushes * (p_WN[structure.contacts, 2] < 0.01)
+    ground_forces[:, NORMAL] = pushes * (p_WN[structure.contacts, 2] < 0.02)
     sense(robot.senses, np.array(gains), state, cable_forces, ground_forces, feedback)
     return feedback.reshape(-1, 2)
 

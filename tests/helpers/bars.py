@@ -37,7 +37,12 @@ def loose_bars(
     Hunt and Crossley, with a dissipation in s/m. Without gravity they are a metre above the
     ground."""
     height = 1.0 if gravity == 0.0 else 0.0
-    make = {"diameter": 2.0 * RADIUS, "density": 1200.0, "node_diameter": 0.0}
+    make = {
+        "diameter": 2.0 * RADIUS,
+        "density": 1200.0,
+        "node_diameter": 0.0,
+        "contact_radius": 0.0,
+    }
     nodes = {f"a{i}": list(pair[0]) for i, pair in enumerate(ends)}
     nodes |= {f"b{i}": list(pair[1]) for i, pair in enumerate(ends)}
     struts = {f"bar{i}": {"pairs": [[f"a{i}", f"b{i}"]], **make} for i in range(len(ends))}

@@ -73,4 +73,4 @@ def step_once(parts: Parts, modes: Table, signals: Table, h: Real) -> Real:
 @compiled
 def write_matrix(parts: Parts, modes: Table, time: Real) -> None:
     robot, solver, forces, work = unpacked(parts)
-    implicit_matrix(robot, solver, modes, forces, time, work.lines, work.blocks)
+    implicit_matrix(robot, solver, work.state, modes, forces, time, work.lines, work.blocks)

@@ -36,7 +36,7 @@ CABLES = {
 """The oscillator that drives each cable, pair by pair of bars."""
 
 
-BAR = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.0}
+BAR = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.0, "contact_radius": 0.0}
 CABLE = {"stiffness": 100.0, "damping": 0.5, "free_length": 0.1}
 
 

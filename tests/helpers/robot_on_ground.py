@@ -48,9 +48,10 @@ class RobotOnGround:
 
     def forces(self, v=REST, p=TOUCHING) -> tuple[np.ndarray, np.ndarray]:
         """The nodes with the forces on them, and the `ground_forces`."""
-        forces = self.meet(self.state(v, p))
+        state = self.state(v, p)
+        forces = self.meet(state)
         forces.ground_forces[:] = np.nan
-        add_ground_forces(self.model, self.modes, True, forces)
+        add_ground_forces(self.model, state, self.modes, True, forces)
         return forces.nodes, forces.ground_forces
 
     def time_to_change(self, v=REST, a=REST, p=TOUCHING) -> float:

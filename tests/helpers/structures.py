@@ -95,8 +95,11 @@ SIDES_ALONE = {"first": ["side n0 n3"], "second": ["side n1 n4"], "third": ["sid
 
 
 def driven_as_recorded(name: str) -> StructureFile:
-    """A shipped structure, driven at the cables where the independent simulation pulls."""
+    """A shipped structure whose ends are points, driven at the cables where the independent
+    simulation pulls."""
     tree = read_structure(name).model_dump()
+    for group in tree["struts"].values():
+        group["contact_radius"] = 0.0
     if name == "prism":
         tree["actuated"] = SIDES_ALONE
     return StructureFile.model_validate(tree)

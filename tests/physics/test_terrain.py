@@ -106,5 +106,6 @@ def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground():
     robot = Robot.of(load_scenario("six_bar").with_changes({"terrain": Incline(slope=0.1)}))
     start = node_positions(robot.structure, robot.structure.initial_state)
     gaps = ground_frames(start[robot.structure.contacts], robot.ground)[:, GAP]
+    gaps -= robot.ground.radius
     depth = robot.weight / 3.0 / robot.scenario.ground.stiffness  # three feet bear it
     assert gaps.min() == pytest.approx(-depth, rel=1e-3)

@@ -112,6 +112,7 @@ def scaled(size: float, mass: float, stiffness: float, **changes: Any) -> Robot:
     tree["nodes"] = {node: (size * np.array(p)).tolist() for node, p in tree["nodes"].items()}
     bar = tree["struts"]["bar"]
     bar |= {"diameter": size * bar["diameter"], "node_diameter": size * bar["node_diameter"]}
+    bar["contact_radius"] = 0.0
     bar["density"] *= mass / size**3
     for cable in tree["cables"].values():
         cable["free_length"] *= size

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.structures import recorded_structure, unit_inertias
+from helpers.structures import driven_as_recorded, recorded_structure, unit_inertias
 
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
@@ -14,7 +14,8 @@ from tetra_drake.scenario.load import load_scenario
 
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_rests_where_the_independent_simulation_does(name, data):
-    recorded, robot = recorded_structure(data, name), Robot.of(load_scenario(name))
+    recorded = recorded_structure(data, name)
+    robot = Robot.of(load_scenario(name).with_sections(robot=driven_as_recorded(name)))
     structure = robot.structure
     ours = node_positions(structure, structure.initial_state)
     theirs = np.array([recorded["nodes_at_rest"][node] for node in structure.node_names])

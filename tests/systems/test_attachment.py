@@ -186,6 +186,9 @@ def test_ground_that_cannot_be_is_refused(refused):
     wrong = ground._replace(normal=np.array(NormalForce(1e3, math.nan)))
     with refused("AddGroundContact", "ground.damping"):
         AddGroundContact(builder, plant, frames=[tip], ground=wrong)
+    for radius in (-0.1, [0.1, 0.1], math.inf, "1 m"):
+        with refused("AddGroundContact", "radius", "0 or more"):
+            AddGroundContact(builder, plant, frames=[tip], ground=ground, radius=radius)
 
 
 def test_forces_add_to_what_is_connected_to_the_plant():

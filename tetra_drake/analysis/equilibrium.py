@@ -83,7 +83,7 @@ def _anchor_forces(structure: Structure, unactuated: Unactuated, p_WN: np.ndarra
     """Forces (nodes, 3) of the anchors on the structure at rest, at the last computed state."""
     fixed, anchors = structure.first_node[-1], structure.anchors
     forces = np.zeros_like(p_WN)
-    forces[fixed:] = -unactuated.forces.nodes[fixed:, FORCE : FORCE + 3]
+    forces[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
     forces[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
     return forces
 

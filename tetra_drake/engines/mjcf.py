@@ -38,7 +38,9 @@ default 1, nodes are thrown up and chatter."""
 _IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
 """Impedance of contacts. It adds inertia to a contact: the body's mass along the ground, which
 keeps friction stable in long steps, and 1 / _IMPRATIO of the mass along the normal."""
-_POINT = 1e-8  # radius (m) of the spheres that touch the floor; larger ones spin thin bars
+_POINT = 1e-8
+"""Radius (m) of the spheres that touch the floor in place of points. Radii of feet are larger by
+it, and the floor is lower."""
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
 
 
@@ -133,8 +135,8 @@ def _add_fixed_nodes(world: Element, structure: Structure) -> None:
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
-    """Adds the bodies: a site at each node, shown at least as thick as the thinnest strut; a small
-    sphere at each contact node; and struts."""
+    """Adds the bodies: a site at each node, shown at least as thick as the thinnest strut; a sphere
+    at each contact node, its foot; and struts."""
     structure, bodies = robot.structure, robot.model.bodies
     radii = structure.node_radius.clip(min=structure.strut_radius.min())
     pairs = add_element(model, "contact")
@@ -143,8 +145,9 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         body = add_element(world, "body", name=body_name, pos=pos, quat=quat)
         add_element(body, "freejoint")
         mass, inertia = bodies.mass[i], bodies.inertia[i]
-        is_bar = structure.first_node[i + 1] - structure.first_node[i] == 2
-        if is_bar:
+        nodes = range(structure.first_node[i], structure.first_node[i + 1])
+        feet = structure.contact_radius[[node for node in nodes if node in structure.contacts]]
+        if len(nodes) == 2 and not feet.any():
             # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
             # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
             # above the nodes by half the depth, so friction would soon spin a thin bar.
@@ -156,11 +159,12 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             moments = {"fullinertia": inertia}
         add_element(body, "inertial", pos="0 0 0", mass=mass, **moments)
         contact = _contact(robot, mass)
-        for node in range(structure.first_node[i], structure.first_node[i + 1]):
+        for node in nodes:
             name, p_BN = structure.node_names[node], structure.p_BN[node]
             add_element(body, "site", name=name, pos=p_BN, size=radii[node], rgba=NODE_COLOUR)
             if node in structure.contacts:
-                add_element(body, "geom", name=name, pos=p_BN, size=_POINT, **_ALONE)
+                size = structure.contact_radius[node] + _POINT
+                add_element(body, "geom", name=name, pos=p_BN, size=size, **_ALONE)
                 add_element(pairs, "pair", geom1="floor", geom2=name, **contact)
         for strut in np.flatnonzero(structure.carriers[structure.struts[:, 0]] == i):
             ends = structure.p_BN[structure.struts[strut]]

@@ -270,7 +270,8 @@ def _clear_of_ground(trajectory: xarray.Dataset, robot: Robot) -> tuple[np.ndarr
     structure = robot.structure
     start, contacts = node_positions(structure, structure.initial_state), structure.contacts
     feet, least = trajectory.p_WN.values[:, contacts], _CLEARANCE * float(np.ptp(start[:, Z]))
-    clear = feet[..., Z] - ground_heights(feet[..., :2], robot.ground) > least
+    lowest = feet[..., Z] - robot.ground.radius
+    clear = lowest - ground_heights(feet[..., :2], robot.ground) > least
     bodies, of_foot = range(len(structure.bodies)), structure.carriers[contacts]
     return np.stack([clear[:, of_foot == body].all(axis=1) for body in bodies], axis=1), least
 

@@ -1,11 +1,21 @@
 """Ground contact: normal force (Eq. 1), friction, and the modes of contact nodes.
 
-The state of a contact node is a row of the table `modes` (contacts, 8):
+A contact node touches the ground with a sphere about it, its *foot*. The ground acts on the foot's
+lowest point, along the normal of the surface. So friction has a lever about the node. A foot
+without radius is the node itself, as in the thesis.
+
+The bristle's deflection is the way that the material at the lowest point slides, not the way of the
+point: a foot that rolls does not bend its bristle. Within a step, it is the distance of the node
+from the stick point, plus what the foot has turned along the ground since the beginning of the
+step. At the end of a step, the stick point moves so that the deflection stays.
+
+The state of a contact node is a row of the table `modes` (contacts, 12):
 
 - contact: 1 if the node touches the ground, otherwise 0
 - friction mode along the tangents t1 and t2; see `friction`
 - stick point: the point in the world where the bristle deflection is zero
 - heading of the node's body at touchdown
+- orientation of the node's body at the beginning of the step; used only by round feet
 
 The laws use the frames of `terrain`. On flat ground these are the axes of the world.
 """
@@ -17,7 +27,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.physics import friction, kinematics, terrain
-from tetra_drake.physics.vectors import difference, vector_at
+from tetra_drake.physics.vectors import cross, difference, put_vector, sum_of, vector_at
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import (
     Real,
@@ -31,9 +41,9 @@ from tetra_drake.simd.lanes import (
     select,
 )
 
-CONTACT, MODE, STICK_POINT, HEADING, MODE_COLUMNS = 0, 1, 3, 6, 8
+CONTACT, MODE, STICK_POINT, HEADING, ORIENTATION, MODE_COLUMNS = 0, 1, 3, 6, 8, 12
 """Columns of the table `modes`, and their number: contact (0 or 1), friction mode (along t1, t2),
-stick point (x, y, z) in m, heading (along t1, t2)."""
+stick point (x, y, z) in m, heading (along t1, t2), orientation (inverse quaternion, w first)."""
 
 FRICTION_1, FRICTION_2, NORMAL, GROUND_FORCE_COLUMNS = range(4)
 """Columns of the table `ground_forces` (contacts, 3), and their number: friction along t1 and t2,
@@ -51,9 +61,16 @@ class Ground(NamedTuple):
     """Ground in the form of the kernels, and the nodes that may touch it (contact nodes)."""
 
     contacts: Table
+    """Rows (contacts,) of the table `nodes` that touch the ground. The row of a foot without radius
+    is the contact node; rows of round feet, their lowest points, come after all nodes."""
+    centres: Table
     """Indices of the contact nodes (contacts,)."""
+    radius: Table
+    """Radii of the feet (contacts,)."""
     carriers: Table
     """Index of the body of each contact node (contacts,), ascending."""
+    is_round: bool
+    """True if a foot has a radius."""
     normal: Table
     """Table of the numbers of NormalForce."""
     friction: friction.FrictionLaw
@@ -66,24 +83,85 @@ class Ground(NamedTuple):
     @classmethod
     def nowhere(cls) -> Self:
         """Ground that no node may touch."""
-        no_index, friction_law = np.zeros(0, dtype=np.int64), friction.FrictionLaw(0, np.zeros(1))
-        return cls(no_index, no_index, np.zeros(2), friction_law, True, np.zeros(1), np.zeros(0))
+        no_index, none = np.zeros(0, dtype=np.int64), np.zeros(0)
+        return cls(
+            contacts=no_index,
+            centres=no_index,
+            radius=none,
+            carriers=no_index,
+            is_round=False,
+            normal=np.zeros(2),
+            friction=friction.FrictionLaw(0, np.zeros(1)),
+            flat=True,
+            grid=np.zeros(len(terrain.SurfaceGrid._fields)),
+            heights=none,
+        )
+
+    def under(self, centres: Table, *, carriers: Table, radius: Table, nodes: int) -> Self:
+        """This ground under feet with a `radius` (contacts,) in m about the nodes `centres`, of a
+        model with a number of `nodes`."""
+        of_round = np.flatnonzero(radius)
+        contacts = centres.copy()
+        contacts[of_round] = nodes + np.arange(of_round.size)
+        surface = terrain.SurfaceGrid(*self.grid)._replace(reach=radius.max(initial=0.0))
+        return self._replace(
+            contacts=contacts,
+            centres=centres,
+            radius=radius,
+            carriers=carriers,
+            is_round=of_round.size > 0,
+            grid=np.array(surface),
+        )
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of round feet in the table `nodes`."""
+        return int(np.count_nonzero(self.contacts != self.centres))
 
 
 @inlined
-def meet_ground(ground: Ground, nodes: Table, frames: Table) -> None:
-    """Writes the frames of the surface at the contact nodes to `frames` (contacts, FRAME_COLUMNS).
+def meet_ground(ground: Ground, state: Table, nodes: Table, frames: Table) -> None:
+    """Writes the frames of the surface below the contact nodes to `frames` (contacts,
+    FRAME_COLUMNS), and the lowest points of round feet to the table `nodes` of `kinematics`.
 
-    `nodes` is the table of `kinematics`. On flat ground, `frames` is not used.
+    On flat ground, `frames` is not used.
     """
     if not ground.flat:
         grid = named(terrain.SurfaceGrid, ground.grid)
-        terrain.find_frames(nodes, ground.contacts, grid, ground.heights, frames)
+        terrain.find_frames(nodes, ground.centres, grid, ground.heights, frames)
+    if ground.is_round:
+        for i in range(ground.contacts.size):
+            if ground.contacts[i] != ground.centres[i]:
+                place_foot(ground, i, state, nodes, frames)
+
+
+@inlined
+def place_foot(ground: Ground, i: int, state: Table, nodes: Table, frames: Table) -> None:
+    """Writes the lowest point of a round foot, with the velocity of the body there, to `nodes`. The
+    gap in `frames` becomes the distance of this point from the surface."""
+    centre, foot, radius = ground.centres[i], ground.contacts[i], ground.radius[i]
+    if not ground.flat:
+        frames[i, terrain.GAP] -= radius
+    drop = terrain.to_world(0.0, 0.0, -radius, frames, i, ground.flat)
+    turns = cross(kinematics.angular_velocity(state, ground.carriers[i]), drop)
+    for column in (kinematics.P_BN_W, kinematics.P_WN):
+        put_vector(sum_of(vector_at(nodes, centre, column), drop), foot, column, nodes)
+    velocity = sum_of(vector_at(nodes, centre, kinematics.V_WN), turns)
+    put_vector(velocity, foot, kinematics.V_WN, nodes)
+    put_vector((0.0, 0.0, 0.0), foot, kinematics.FORCE, nodes)
+
+
+@inlined
+def add_foot_forces(ground: Ground, nodes: Table, generalized: Table) -> None:
+    """Adds the forces on round feet to the generalized force (6 bodies,)."""
+    for i in range(ground.contacts.size):
+        if ground.contacts[i] != ground.centres[i]:
+            kinematics.add_force_at(nodes, ground.contacts[i], ground.carriers[i], generalized)
 
 
 @inlined
 def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
-    """Distance (m) from the ground to a contact node; negative in the ground."""
+    """Distance (m) from the ground to a foot; negative in the ground."""
     if ground.flat:
         return nodes[ground.contacts[i], kinematics.P_WN + 2]
     return frames[i, terrain.GAP]
@@ -102,12 +180,16 @@ def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
 
 @inlined
 def sliding(
-    nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
+    state: Table, nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
 ) -> tuple[friction.Slide, Real]:
-    """Motion of contact node i along the ground, and the rate (m/s) of its gap."""
-    node = ground.contacts[i]
-    p_WN, v_WN = vector_at(nodes, node, kinematics.P_WN), vector_at(nodes, node, kinematics.V_WN)
+    """Motion of foot i along the ground, and the rate (m/s) of its gap."""
+    p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
+    v_WN = vector_at(nodes, ground.contacts[i], kinematics.V_WN)
     deflection = difference(p_WN, vector_at(modes, i, STICK_POINT))
+    if ground.is_round:
+        turn = kinematics.turn_from(modes, i, ORIENTATION, state, ground.carriers[i])
+        drop = terrain.to_world(0.0, 0.0, -ground.radius[i], frames, i, ground.flat)
+        deflection = sum_of(deflection, cross(turn, drop))
     v_1, v_2, v_n = terrain.to_frame(v_WN, frames, i, ground.flat)
     x_1, x_2, _ = terrain.to_frame(deflection, frames, i, ground.flat)
     t1 = friction.TangentSlide(v_1, x_1, modes[i, MODE])
@@ -130,7 +212,7 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         touched, touches = modes[i, CONTACT] != 0.0, gap(nodes, ground, frames, i) <= 0.0
         if not any_lane(touched | touches):
             continue
-        slide, _ = sliding(nodes, modes, ground, frames, i)
+        slide, _ = sliding(state, nodes, modes, ground, frames, i)
         before = slide.t1.mode, slide.t2.mode
         after = friction.next_mode(slide, touched & touches, ground.friction)
         lands = touches & not_(touched)
@@ -138,12 +220,36 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
             set_heading(state, ground, frames, i, lands, modes)
         begins_1, begins_2 = friction.begins_to_stick(before, after, ground.friction)
         sticks_here = lands | begins_1, lands | begins_2
-        move_stick_point(nodes, ground, frames, i, sticks_here, slide, modes)
+        if ground.is_round:
+            begin_turn(state, nodes, ground, frames, i, sticks_here, slide, modes)
+        else:
+            move_stick_point(nodes, ground, frames, i, sticks_here, slide, modes)
         modes[i, CONTACT] = select(touches, 1.0, 0.0)
         modes[i, MODE], modes[i, MODE + 1] = after
         changed = changed | (touched ^ touches)
         changed = changed | (after[0] != before[0]) | (after[1] != before[1])
     return changed
+
+
+@inlined
+def begin_turn(
+    state: Table,
+    nodes: Table,
+    ground: Ground,
+    frames: Table,
+    i: int,
+    along: tuple[Truth, Truth],
+    slide: friction.Slide,
+    modes: Table,
+) -> None:
+    """Stores the orientation of a round foot. The stick point moves so that the deflection stays,
+    or is zero along the tangents in `along`; see move_stick_point()."""
+    x_1 = select(along[0], 0.0, slide.t1.deflection)
+    x_2 = select(along[1], 0.0, slide.t2.deflection)
+    bend = terrain.to_world(x_1, x_2, 0.0, frames, i, ground.flat)
+    p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
+    put_vector(difference(p_WN, bend), i, STICK_POINT, modes)
+    kinematics.put_orientation(state, ground.carriers[i], i, ORIENTATION, modes)
 
 
 @inlined

@@ -55,7 +55,7 @@ def sizes_of(robot: Model) -> dict[str, int]:
         near = dict.fromkeys(near, 0)
     return near | {
         "bodies": len(robot.bodies.mass),
-        "nodes": len(robot.p_BN),
+        "nodes": len(robot.p_BN) + robot.ground.rows,
         "contacts": robot.ground.contacts.size,
         "cables": drivers.size,
         "drives": np.count_nonzero(drivers != cable.PASSIVE) if has_drive else 0,
@@ -77,9 +77,9 @@ def move_robot(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
-    """Computes nodes and frames for a state. Forces on the nodes become zero."""
+    """Computes nodes, feet and frames for a state. Forces on them become zero."""
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
-    contact.meet_ground(robot.ground, forces.nodes, forces.frames)
+    contact.meet_ground(robot.ground, state, forces.nodes, forces.frames)
 
 
 @inlined
@@ -158,8 +158,10 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
 
 
 @inlined
-def add_ground_forces(robot: Model, modes: Table, write_parts: bool, forces: Forces) -> None:
-    """Adds the forces of the ground to the forces on the nodes.
+def add_ground_forces(
+    robot: Model, state: Table, modes: Table, write_parts: bool, forces: Forces
+) -> None:
+    """Adds the forces of the ground to the forces on nodes and round feet.
 
     `modes` is the table of `contact`. With `write_parts`, also writes the table `ground_forces`.
     """
@@ -170,7 +172,7 @@ def add_ground_forces(robot: Model, modes: Table, write_parts: bool, forces: For
             if write_parts:
                 put_vector((0.0, 0.0, 0.0), i, contact.FRICTION_1, parts)
             continue
-        slide, _ = contact.sliding(nodes, modes, ground, frames, i)
+        slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
         f_1, f_2 = friction_force(slide, ground.friction)
         f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
         if write_parts:
@@ -196,9 +198,9 @@ def compute_forces(
     `cable_forces` and `ground_forces`.
     """
     add_cable_forces(robot, signals, write_parts, forces)
-    add_ground_forces(robot, modes, write_parts, forces)
+    add_ground_forces(robot, state, modes, write_parts, forces)
     add_state_forces(robot, state, forces)
-    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+    gather_forces(robot, forces.nodes, generalized)
     bodies = generalized.size // 6
     for body in range(bodies):
         generalized[6 * body + 5] -= robot.bodies.weight[body]
@@ -210,6 +212,14 @@ def compute_forces(
         torque = gyroscopic_torque(forces.inertia, body, w_WB)
         for axis in range(3):
             generalized[t + axis] += torque[axis]
+
+
+@inlined
+def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
+    """Writes the generalized force (6 bodies,) of the forces on nodes and round feet."""
+    kinematics.gather_forces(nodes, robot.first_node, generalized)
+    if robot.ground.is_round:
+        contact.add_foot_forces(robot.ground, nodes, generalized)
 
 
 @inlined
@@ -255,8 +265,8 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
     """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
-    add_ground_forces(robot, modes, True, forces)
-    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+    add_ground_forces(robot, state, modes, True, forces)
+    gather_forces(robot, forces.nodes, generalized)
 
 
 @compiled

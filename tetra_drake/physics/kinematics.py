@@ -15,15 +15,15 @@ from tetra_drake.physics.vectors import (
     vector_at,
 )
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Real, Table, inverse_sqrt
+from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, select
 
 Array = np.ndarray
 
 P_BN_W, P_WN, V_WN, FORCE, NODE_COLUMNS = 0, 3, 6, 9, 12
 """Columns of the table `nodes` (nodes, 12), and their number: vector from the body's origin to the
 node (m), position (m), velocity (m/s), force on the node (N), all in the world frame. The nodes of
-a body are consecutive rows. The last rows are fixed nodes, which belong to no body; the forces on
-them move nothing."""
+a body are consecutive rows. Then come fixed nodes, which belong to no body; the forces on them move
+nothing. The last rows are the lowest points of round feet; see `contact`."""
 
 
 @compiled
@@ -145,6 +145,34 @@ def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> No
 
 
 @inlined
+def put_orientation(state: Table, body: int, row: int, column: int, table: Table) -> None:
+    """Writes the inverse of a body's quaternion to four columns of a table."""
+    q = 7 * body
+    w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
+    scale = 1.0 / (w * w + x * x + y * y + z * z)
+    table[row, column] = scale * w
+    put_vector((-scale * x, -scale * y, -scale * z), row, column + 1, table)
+
+
+@inlined
+def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> Vector:
+    """Rotation vector (rad) in the world frame that turns a body from an orientation of
+    put_orientation() to its present one, to third order in the angle."""
+    w, x, y, z = state[7 * body], state[7 * body + 1], state[7 * body + 2], state[7 * body + 3]
+    i_w, i = table[row, column], vector_at(table, row, column + 1)
+    turned = sum_of(sum_of(scaled(w, i), scaled(i_w, (x, y, z))), cross((x, y, z), i))
+    cosine = w * i_w - dot((x, y, z), i)
+    return scaled(select(cosine < 0.0, -2.0, 2.0), turned)
+
+
+@inlined
+def angular_velocity(state: Table, body: int) -> Vector:
+    """Angular velocity w_WB (rad/s) of a body in the world frame."""
+    v = 7 * (state.size // 13) + 6 * body
+    return state[v], state[v + 1], state[v + 2]
+
+
+@inlined
 def forward_axis(state: Table, body: int) -> Vector:
     """The x axis of a body in the world frame."""
     x, y, z = rotation(state, body)
@@ -182,6 +210,16 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
         g = 6 * body
         generalized_force[g], generalized_force[g + 1], generalized_force[g + 2] = torque
         generalized_force[g + 3], generalized_force[g + 4], generalized_force[g + 5] = total
+
+
+@inlined
+def add_force_at(nodes: Table, row: int, body: int, generalized_force: Table) -> None:
+    """Adds the force in a row of `nodes` to the generalized force of a body."""
+    force, g = vector_at(nodes, row, FORCE), 6 * body
+    torque = cross(vector_at(nodes, row, P_BN_W), force)
+    for axis in range(3):
+        generalized_force[g + axis] += torque[axis]
+        generalized_force[g + 3 + axis] += force[axis]
 
 
 @compiled

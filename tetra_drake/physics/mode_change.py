@@ -8,9 +8,10 @@ import numpy as np
 
 from tetra_drake.physics import contact, friction
 from tetra_drake.physics.forces import Forces, Parts, move_contacts
-from tetra_drake.physics.kinematics import node_acceleration
+from tetra_drake.physics.kinematics import P_BN_W, node_acceleration
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.terrain import to_frame
+from tetra_drake.physics.vectors import Vector, cross, difference, sum_of, vector_at
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, minimum, named, select
 from tetra_drake.simd.packed import unpacked
@@ -43,7 +44,7 @@ def mode_margin(parts: Parts, state: Array, modes: Array) -> float:
             margin = min(margin, distance)
             continue
         margin = min(margin, -distance)
-        slide, _ = contact.sliding(nodes, modes, ground, frames, i)
+        slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
         margin = min(margin, friction.friction_margin(slide, ground.friction))
     return margin
 
@@ -61,10 +62,9 @@ def time_to_mode_change(
     ground, nodes, frames = robot.ground, forces.nodes, forces.frames
     time, law = horizon, named(contact.NormalForce, ground.normal)
     for i in range(ground.contacts.size):
-        node, body = ground.contacts[i], ground.carriers[i]
-        a_WN = node_acceleration(state, acceleration, nodes, node, body)
+        a_WN = foot_acceleration(ground, i, state, acceleration, nodes)
         a_1, a_2, a_n = to_frame(a_WN, frames, i, ground.flat)
-        slide, v_n = contact.sliding(nodes, modes, ground, frames, i)
+        slide, v_n = contact.sliding(state, nodes, modes, ground, frames, i)
         touches = modes[i, contact.CONTACT] != 0.0
         distance = contact.gap(nodes, ground, frames, i)
         up = select(touches, -1.0, 1.0)  # sign of the motion away from the surface
@@ -76,6 +76,22 @@ def time_to_mode_change(
         change = friction.time_to_friction_change(slide, (a_1, a_2), rate, ground.friction, horizon)
         time = minimum(time, select(touches, change, horizon))
     return time
+
+
+@inlined
+def foot_acceleration(
+    ground: contact.Ground, i: int, state: Table, acceleration: Table, nodes: Table
+) -> Vector:
+    """Rate (m/s²) of the velocity at the lowest point of foot i. The point moves with the contact,
+    not with the material, so that it has the centripetal acceleration of the node."""
+    centre, body = ground.centres[i], ground.carriers[i]
+    a_WN = node_acceleration(state, acceleration, nodes, centre, body)
+    if not ground.is_round:
+        return a_WN
+    p_BC_W = vector_at(nodes, ground.contacts[i], P_BN_W)
+    a = 6 * body
+    alpha = acceleration[a], acceleration[a + 1], acceleration[a + 2]
+    return sum_of(a_WN, cross(alpha, difference(p_BC_W, vector_at(nodes, centre, P_BN_W))))
 
 
 @compiled

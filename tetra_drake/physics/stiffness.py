@@ -52,7 +52,7 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
         _touching_struts(robot, forces, carriers),
     ):
         _add_springs(springs, blocks)
-    _add_turning(forces.nodes, carriers, blocks)
+    _add_turning(robot.ground, forces.nodes, carriers, blocks)
     return blocks[:bodies, :bodies].transpose(0, 2, 1, 3).reshape(6 * bodies, 6 * bodies)
 
 
@@ -81,7 +81,7 @@ def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     presses = forces.ground_forces[:, contact.NORMAL] > 0.0
     vertical = np.array([0.0, 0.0, law.stiffness])
     axes = np.concatenate([presses[:, None] * vertical, anchors.stiffness])
-    nodes = np.concatenate([ground.contacts, anchors.nodes])
+    nodes = np.concatenate([ground.centres, anchors.nodes])
     p_BN_W = forces.nodes[nodes, kinematics.P_BN_W : kinematics.P_BN_W + 3]
     world, motion = np.full(len(nodes), WORLD), rigid_motions(p_BN_W)
     return Springs(carriers[nodes], world, motion, -motion, axes[:, None] * np.eye(3))
@@ -147,10 +147,15 @@ def _add_springs(springs: Springs, blocks: np.ndarray) -> None:
         np.add.at(blocks, (ends[:, i], ends[:, j]), block)
 
 
-def _add_turning(nodes: np.ndarray, carriers: np.ndarray, blocks: np.ndarray) -> None:
-    """Adds the stiffness that the forces on the nodes have as the bodies turn."""
-    p = nodes[:, kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    force = nodes[:, kinematics.FORCE : kinematics.FORCE + 3]
+def _add_turning(
+    ground: contact.Ground, nodes: np.ndarray, carriers: np.ndarray, blocks: np.ndarray
+) -> None:
+    """Adds the stiffness that the forces on the nodes have as the bodies turn. The line of a normal
+    force goes through the centre of a round foot, so that the force is as one on the node."""
+    p = nodes[: len(carriers), kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    forces = nodes[:, kinematics.FORCE : kinematics.FORCE + 3]
+    force, is_round = forces[: len(carriers)].copy(), ground.contacts != ground.centres
+    force[ground.centres[is_round]] += forces[ground.contacts[is_round]]
     products = np.einsum("ni,nj->nij", p, force)
     trace = np.einsum("nii,jk->njk", products, np.eye(3))
     turning = trace - 0.5 * (products + products.transpose(0, 2, 1))

@@ -52,6 +52,8 @@ class SurfaceGrid(NamedTuple):
     """Index of the first control point in the heights."""
     top: Real
     """Height of the highest control point."""
+    reach: Real
+    """Largest distance below a node at which it touches."""
 
 
 @inlined
@@ -100,12 +102,12 @@ def find_frames(
 ) -> None:
     """Writes the `frames` at the nodes with the indices `contacts` (contacts,).
 
-    A node above the highest control point gets the frame of level ground at that height.
+    A node out of reach of the highest control point gets the frame of level ground at that height.
     """
     for i in range(contacts.size):
         node = contacts[i]
         z = nodes[node, P_WN + 2]
-        near = z <= grid.top
+        near = z <= grid.top + grid.reach
         height, h_x, h_y = grid.top, 0.0 * z, 0.0 * z
         c = n_z = 0.0 * z + 1.0
         if any_lane(near):

@@ -32,8 +32,12 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     ahead = start[:, 0].max(initial=-np.inf) + STEP_AHEAD  # not used without contact nodes
     grid = scenario.terrain.grid(ahead=ahead, source=scenario.name)
     surface = make_surface(scenario.ground, scenario.friction, scenario.terrain, grid)
-    carriers = structure.carriers[structure.contacts]
-    made = surface._replace(contacts=structure.contacts, carriers=carriers)
+    made = surface.under(
+        structure.contacts,
+        carriers=structure.carriers[structure.contacts],
+        radius=structure.contact_radius[structure.contacts],
+        nodes=len(structure.p_BN),
+    )
     if not made.flat:
         _check_start(scenario, structure, made, grid, start)
     return made
@@ -70,6 +74,7 @@ def _surface_grid(grid: Grid) -> terrain.SurfaceGrid:
         columns=columns,
         first=0.0,
         top=grid.heights.max(),
+        reach=0.0,
     )
 
 
@@ -84,7 +89,7 @@ def _check_start(
         reach = " to ".join(", ".join(shown(x, "m") for x in corner) for corner in (near, far))
         problem = f"the robot starts off its grid, which goes from x, y = {reach}"
         raise InputError(scenario.name, "terrain", problem)
-    gaps = ground_frames(start, ground)[:, terrain.GAP]
+    gaps = ground_frames(start, ground)[:, terrain.GAP] - ground.radius
     weight = float(structure.mass.sum()) * scenario.robot.gravity
     if gaps.min() < -START_DEPTH - weight / scenario.ground.stiffness:
         node = structure.node_names[structure.contacts[gaps.argmin()]]

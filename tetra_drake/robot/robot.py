@@ -264,18 +264,25 @@ def axial_forces_at_rest(scenario: Scenario, structure: Structure) -> np.ndarray
 
 
 def _lift(scenario: Scenario, placed: Structure) -> float:
-    """Distance (m) to move a structure up so that it stands on the ground. A structure with anchors
-    or without ground is not moved. Raises InputError if it is clearly below the ground."""
+    """Distance (m) to move a structure up so that its feet stand on the ground. A structure with
+    anchors or without ground is not moved. Raises InputError if a contact node, or a foot of a
+    structure that is not moved, is clearly below the ground."""
     if not placed.contacts.size:
         return 0.0
-    heights = placed.p_WN[:, 2]
-    lowest = placed.contacts[heights[placed.contacts].argmin()]
-    depth = -heights[lowest]
-    if depth > DEEPEST * np.ptp(heights):
-        key = f"robot.nodes.{placed.node_names[lowest]}"
-        found = f"starts {scenario.units.shown(depth, 'm')} below the ground"
+    heights, radius = placed.p_WN[:, 2], placed.contact_radius
+    stays = placed.held.any()
+    depths = -heights[placed.contacts]
+    depths_of_feet = radius[placed.contacts] + depths
+    below = depths_of_feet if stays else depths
+    depth = below.max()
+    if depth > DEEPEST * (np.ptp(heights) or radius.max()):
+        node = placed.contacts[below.argmax()]
+        key = f"robot.nodes.{placed.node_names[node]}"
+        shown = scenario.units.shown
+        what = f"a foot of radius {shown(radius[node], 'm')}" if stays and radius[node] else "it"
+        found = f"{what} starts {shown(depth, 'm')} below the ground"
         raise InputError(scenario.name, key, f"{found}, expected on it or above")
-    return 0.0 if placed.held.any() else float(depth)
+    return 0.0 if stays else float(depths_of_feet.max())
 
 
 def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:

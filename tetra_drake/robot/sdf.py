@@ -1,7 +1,8 @@
 """Model of a structure in SDFormat, without its cables, which SDFormat does not know.
 
 Each body is a link, with a frame "node NAME" for each node: the ends of cables, for AddCables().
-Fixed nodes are frames of the link "fixed nodes", which is welded to the world.
+Fixed nodes are frames of the link "fixed nodes", which is welded to the world. What can touch has
+collision shapes: struts, and the feet of contact nodes, unless their radius is 0.
 """
 
 from __future__ import annotations
@@ -33,6 +34,12 @@ def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
         for shape in shapes:
             if shape.body == body:
                 _add_visual(link, shape)
+                if shape.length:
+                    _add_collision(link, shape.name, shape.X_BS, shape.radius, shape.length)
+        for node in structure.contacts[structure.carriers[structure.contacts] == body]:
+            radius, X_BS = structure.contact_radius[node], RigidTransform(structure.p_BN[node])
+            if radius:
+                _add_collision(link, f"foot {structure.node_names[node]}", X_BS, radius, 0.0)
     if (structure.carriers == WORLD).any():
         add_element(model, "link", name=FIXED)
         joint = add_element(model, "joint", name=FIXED + " weld", type="fixed")
@@ -67,7 +74,21 @@ def _add_visual(link: Element, shape: Shape) -> None:
     _add_pose(visual, shape.X_BS)
     add_element(add_element(visual, "material"), "diffuse", shape.colour)
     kind = "cylinder" if shape.length else "sphere"
-    solid = add_element(add_element(visual, "geometry"), kind)
-    add_element(solid, "radius", shape.radius)
-    if shape.length:
-        add_element(solid, "length", shape.length)
+    _add_solid(visual, kind, shape.radius, shape.length)
+
+
+def _add_collision(
+    link: Element, name: str, X_BS: RigidTransform, radius: float, length: float
+) -> None:
+    """Adds a capsule along the z axis of the frame S that can touch; a sphere without length."""
+    collision = add_element(link, "collision", name=name)
+    _add_pose(collision, X_BS)
+    _add_solid(collision, "capsule" if length else "sphere", radius, length)
+
+
+def _add_solid(parent: Element, kind: str, radius: float, length: float) -> None:
+    """Adds a geometry."""
+    solid = add_element(add_element(parent, "geometry"), kind)
+    add_element(solid, "radius", radius)
+    if length:
+        add_element(solid, "length", length)

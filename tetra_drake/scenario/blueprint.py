@@ -47,6 +47,8 @@ class Blueprint:
     """Axial stiffness of the struts (struts,); infinite for rigid struts."""
     node_radius: np.ndarray
     """Radii of the spheres at the nodes (nodes,); 0 for no sphere."""
+    contact_radius: np.ndarray
+    """Radii of the feet at the nodes (nodes,): the spheres that touch the ground."""
     node_density: np.ndarray
     """Densities of the spheres at the nodes (nodes,), which are solid."""
     node_mass: np.ndarray

@@ -82,6 +82,10 @@ class StrutGroup(Section):
     node_diameter: Length = Field(ge=0)
     """Diameter of the spheres; 0 for none. A node has one sphere, from its first strut in the
     file."""
+    contact_radius: Length | None = Field(default=None, ge=0)
+    """Radius of the sphere about each end that touches the ground; by default the sphere's radius,
+    else the strut's. 0 for a ground that acts on the centres of nodes. The default is 0 for nodes
+    that anchors hold along z."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load a strut
     is as long as its nodes are apart in the file. The axial force in equilibrium shortens it, and
@@ -97,6 +101,9 @@ class SphereGroup(Section):
     """Diameter of a sphere."""
     density: Density = Field(gt=0)
     """Density of a sphere."""
+    contact_radius: Length | None = Field(default=None, ge=0)
+    """Radius with which a sphere touches the ground; by default its own. The default is 0 for nodes
+    that anchors hold along z."""
 
 
 class Sphere(NamedTuple):
@@ -104,6 +111,10 @@ class Sphere(NamedTuple):
 
     diameter: float
     density: float
+    contact_radius: float | None
+    """Radius with which it touches the ground, if the file has one."""
+    touching_radius: float
+    """Radius with which it touches the ground by default."""
 
 
 class CableGroup(CableConstants):
@@ -242,6 +253,7 @@ class StructureFile(Section):
             strut_density=np.array([group.density for group in groups]),
             strut_stiffness=np.array([group.axial_stiffness or math.inf for group in groups]),
             node_radius=np.array([one.diameter / 2 if one else 0.0 for one in spheres]),
+            contact_radius=np.array([self._contact_radius(node) for node in nodes]),
             node_density=np.array([one.density if one else 0.0 for one in spheres]),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
@@ -306,10 +318,22 @@ class StructureFile(Section):
         spheres: dict[str, Sphere] = {}
         for strut in reversed(self.all_struts):
             group = self.struts[strut.group]
-            spheres |= dict.fromkeys(strut.nodes, Sphere(group.node_diameter, group.density))
+            touching = (group.node_diameter or group.diameter) / 2
+            sphere = Sphere(group.node_diameter, group.density, group.contact_radius, touching)
+            spheres |= dict.fromkeys(strut.nodes, sphere)
         for own in self.spheres.values():
-            spheres |= dict.fromkeys(own.nodes, Sphere(own.diameter, own.density))
+            sphere = Sphere(own.diameter, own.density, own.contact_radius, own.diameter / 2)
+            spheres |= dict.fromkeys(own.nodes, sphere)
         return spheres
+
+    def _contact_radius(self, node: str) -> float:
+        """Radius (m) of the foot at a node."""
+        sphere = self.sphere_of_node.get(node)
+        if sphere is None:
+            return 0.0
+        if sphere.contact_radius is not None:
+            return sphere.contact_radius
+        return 0.0 if "z" in self._held(node) else sphere.touching_radius
 
     @cached_property
     def free_lengths(self) -> tuple[float, ...]:

@@ -207,6 +207,7 @@ class Tetrahedra(Section):
             strut_stiffness=np.full(len(struts), math.inf),
             strut_density=np.full(len(struts), self.density),
             node_radius=np.full(4 * n, self.node_diameter / 2),
+            contact_radius=np.zeros(4 * n),  # the thesis's ground acts on the centres of nodes
             node_density=np.full(4 * n, self.density),
             node_mass=np.zeros(4 * n),
             node_load=np.zeros((4 * n, 3)),

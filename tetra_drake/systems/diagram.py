@@ -113,6 +113,7 @@ def MakeTensegrityDiagram(
         plant,
         frames=[nodes[node] for node in structure.contacts],
         ground=robot.ground,
+        radius=robot.ground.radius.tolist(),
         witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
     )
     model = robot.model

@@ -56,6 +56,7 @@ class GroundContact(LeafSystem):
     def __init__(self, model: Model, *, witness: bool = False) -> None:
         super().__init__()
         bodies, count = model.bodies.mass.size, model.ground.contacts.size
+        self._is_round = model.ground.is_round
         # The kernels write to these arrays at every call.
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
         self._parts = Packed((model, self._forces))
@@ -111,7 +112,7 @@ class GroundContact(LeafSystem):
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         modes = values.get_mutable_value().reshape(-1, contact.MODE_COLUMNS)
         changed = self._update_modes(self._parts, self._state.Eval(context), modes)
-        if changed:
+        if changed or (self._is_round and modes[:, contact.CONTACT].any()):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
 
@@ -148,23 +149,25 @@ def AddGroundContact(
     *,
     frames: Sequence[Frame],
     ground: contact.Ground,
+    radius: float | Sequence[float] = 0.0,
     witness: bool = False,
     name: str = "ground",
 ) -> GroundContact:
-    """Adds a ground that touches the origins of frames of a plant's bodies.
+    """Adds a ground that touches spheres about the origins of frames of a plant's bodies.
 
-    The plant must be finalized, may have any joints, and should be continuous. `ground` is by
-    robot.ground.make_surface(), or a robot's, whose own contact nodes do not count. For `witness`
-    see GroundContact. The ports have the contact nodes in the order of `frames`. The ground of a
-    scenario under the tip of a link:
+    The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is the
+    radius of all spheres, or of each; the ground touches the origins themselves if it is 0.
+    `ground` is by robot.ground.make_surface(), or a robot's, whose own feet do not count. For
+    `witness` see GroundContact. The ports have the contact nodes in the order of `frames`. The
+    ground of a scenario under the tip of a link:
 
     >>> given = load_scenario("coulomb")
     >>> surface = make_surface(given.ground, given.friction, given.terrain)
     >>> tip = AddFrame(plant, "tip", link, [0.0, 0.0, -1.0])  # before plant.Finalize()
     >>> AddGroundContact(builder, plant, frames=[tip], ground=surface)
 
-    Raises InputError for a frame of the world, and for a constant of the normal force that is
-    negative or not finite.
+    Raises InputError for a frame of the world, and for a radius or a constant of the normal force
+    that is negative or not finite.
     """
     normal = contact.NormalForce(*ground.normal.tolist())
     check_constants("AddGroundContact", "ground", normal._asdict())
@@ -172,8 +175,26 @@ def AddGroundContact(
         raise InputError("AddGroundContact", "frames", "found a frame of the world")
     nodes = Nodes.of(plant, frames)
     contacts = np.array([nodes.of_frame[frame.index()] for frame in frames], dtype=np.int64)
-    placed = ground._replace(contacts=contacts, carriers=nodes.carriers[contacts])
+    placed = ground.under(
+        contacts,
+        carriers=nodes.carriers[contacts],
+        radius=_radii(radius, count=len(frames)),
+        nodes=len(nodes.p_BN),
+    )
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
     system = builder.AddNamedSystem(name, GroundContact(model, witness=witness))
     Attach(builder, plant, system)
     return system
+
+
+def _radii(radius: float | Sequence[float], *, count: int) -> np.ndarray:
+    """Radii of feet (count,) in m. Raises InputError if they are not numbers of 0 or more."""
+    expected = f"a number of 0 or more, or {count} of them"
+    try:
+        radii = np.broadcast_to(np.asarray(radius, dtype=float), count)
+    except (TypeError, ValueError) as error:
+        problem = f"found {radius!r:.60}, expected {expected}"
+        raise InputError("AddGroundContact", "radius", problem) from error
+    if not (np.isfinite(radii) & (radii >= 0.0)).all():
+        raise InputError("AddGroundContact", "radius", f"found {radius!r:.60}, expected {expected}")
+    return radii.copy()

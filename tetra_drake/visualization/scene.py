@@ -162,8 +162,8 @@ def set_surroundings(
     """Adds floor and light and sets the camera. Without ground there is no floor.
 
     The floor surrounds `points` (..., 3), and the camera sees all of `seen` (..., 3), both in m.
-    The ground acts on the centres of nodes. Therefore the floor is drawn lower than the ground, by
-    the least drawn radius of a node.
+    Where a contact node is drawn larger than its foot, the floor is drawn lower than the ground, by
+    the least difference.
     """
     middle = (seen.reshape(-1, 3).min(axis=0) + seen.reshape(-1, 3).max(axis=0)) / 2
     reach = float(np.linalg.norm(seen.reshape(-1, 3) - middle, axis=1).max())
@@ -184,7 +184,9 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
     ground, units = robot.ground, robot.scenario.units
     corners = floor_corners(points, (MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
     floor = floor_points(ground, corners, units)
-    floor[..., 2] -= drawn_radii(robot.structure)[1].min()
+    contacts = robot.structure.contacts
+    sunk = drawn_radii(robot.structure)[1][contacts] - robot.structure.contact_radius[contacts]
+    floor[..., 2] -= max(0.0, sunk.min())
     if ground.flat:
         _add_slab(meshcat, floor)
     else:

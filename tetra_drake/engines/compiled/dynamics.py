@@ -107,6 +107,7 @@ def refer_torques(inertia_W: Table, inertia_now: Table, force: Table) -> None:
 def implicit_matrix(
     robot: Model,
     solver: Solver,
+    state: Table,
     modes: Table,
     forces: Forces,
     time: Real,
@@ -137,7 +138,7 @@ def implicit_matrix(
     add_masses(robot, forces.inertia, blocks)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, contact.CONTACT] != 0.0):
-            add_contact(modes, forces, robot.ground, i, time, blocks)
+            add_contact(state, modes, forces, robot.ground, i, time, blocks)
     for i in range(robot.anchors.nodes.size):
         add_anchor(robot.anchors, forces.nodes, i, time, blocks)
 
@@ -267,13 +268,19 @@ def product(x: Column, y: Column) -> Real:
 
 @inlined
 def add_contact(
-    modes: Table, forces: Forces, ground: contact.Ground, i: int, time: Real, blocks: Table
+    state: Table,
+    modes: Table,
+    forces: Forces,
+    ground: contact.Ground,
+    i: int,
+    time: Real,
+    blocks: Table,
 ) -> None:
-    """Adds time * damping + time² * stiffness of a contact node, in lanes where it touches."""
+    """Adds time * damping + time² * stiffness of a foot, in lanes where it touches."""
     nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
     touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
     depth = -contact.gap(nodes, ground, frames, i)
-    slide, _ = contact.sliding(nodes, modes, ground, frames, i)
+    slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
     k_1, k_12, k_2 = friction_damping(slide, time, ground.friction)
     k_1, k_2 = select(touches, k_1, 0.0), select(touches, k_2, 0.0)
     k_12 = select(touches, k_12, 0.0)

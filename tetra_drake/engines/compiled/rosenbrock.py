@@ -38,7 +38,7 @@ from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.inertia import INERTIA_COLUMNS
 from tetra_drake.physics.kinematics import P_BN_W, move_bodies
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.vectors import cross, vector_at
+from tetra_drake.physics.vectors import Vector, cross, vector_at
 from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, select
 
@@ -93,7 +93,7 @@ def take_step(
     size, scaled = work.force.size, GAMMA * step
     bodies = size // BLOCK
     first = state.size - size
-    dynamics.implicit_matrix(robot, solver, modes, forces, scaled, work.lines, work.blocks)
+    dynamics.implicit_matrix(robot, solver, state, modes, forces, scaled, work.lines, work.blocks)
     factorise(work.blocks, solver.schedule)
     if not robot.isotropic:
         for body in range(bodies):
@@ -144,9 +144,9 @@ def compute_end_forces(
 @inlined
 def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real:
     """Largest component of k1 + k2, as the acceleration (m/s²) of a body or, for rotations, of its
-    nodes. NaN if a component is NaN.
+    nodes and feet. NaN if a component is NaN.
 
-    The spin of a thin bar about its axis does not count, because it moves no node.
+    The spin of a thin bar about its axis does not count, unless it moves a round foot.
     """
     largest = 0.0
     for body in range(k1.size // BLOCK):
@@ -159,10 +159,21 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
             largest = larger(largest, robot.bodies.radius[body] * turn)
         else:
             for node in range(robot.first_node[body], robot.first_node[body + 1]):
-                v_x, v_y, v_z = cross((x, y, z), vector_at(nodes, node, P_BN_W))
-                moves = larger(larger(abs(v_x), abs(v_y)), abs(v_z))
-                largest = larger(largest, moves)
+                largest = larger(largest, motion_at(nodes, node, (x, y, z)))
+    if not robot.ground.is_round:
+        return largest
+    for c in range(robot.ground.contacts.size):
+        i = BLOCK * robot.ground.carriers[c]
+        x, y, z = k1[i] + k2[i], k1[i + 1] + k2[i + 1], k1[i + 2] + k2[i + 2]
+        largest = larger(largest, motion_at(nodes, robot.ground.contacts[c], (x, y, z)))
     return largest
+
+
+@inlined
+def motion_at(nodes: Table, row: int, turn: Vector) -> Real:
+    """Largest component of the motion of a row of `nodes` as its body turns."""
+    x, y, z = cross(turn, vector_at(nodes, row, P_BN_W))
+    return larger(larger(abs(x), abs(y)), abs(z))
 
 
 @inlined

@@ -1,0 +1,144 @@
+"""Feet with a radius: spheres that stand, roll and slide on the ground."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RotationMatrix
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import SpatialInertia
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.physics.contact import MODE_COLUMNS, sliding
+from tetra_drake.physics.forces import Forces
+from tetra_drake.physics.mode_change import modes_after_step
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.ground import make_surface
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.sdf import make_sdf
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.common_sections import GroundSection
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.simd.packed import Packed
+from tetra_drake.systems import AddGroundContact
+
+G, RADIUS, SLOPE = 9.80665, 0.1, math.radians(10.0)
+AXLE = {"pairs": [["a", "b"]], "diameter": 0.01, "density": 1000.0, "node_diameter": 2.0 * RADIUS}
+WHEELS = {"nodes": {"a": [0.0, -0.2, RADIUS], "b": [0.0, 0.2, RADIUS]}, "struts": {"axle": AXLE}}
+"""Two balls of 4.2 kg on a thin axle."""
+
+
+def wheels(strut: dict[str, Any] | None = None, **changes: object) -> Scenario:
+    tree = WHEELS | {"struts": {"axle": AXLE | (strut or {})}}
+    scenario = load_scenario("prism").with_sections(robot=StructureFile.model_validate(tree))
+    sure = "!Coulomb {static: 0.9, kinetic: 0.9, stiffness: 0 N/m, damping: 2 kN*s/m}"
+    times = {"simulation.duration": "1 s", "simulation.steady_from": "0 s", "cpg.start_up": "0 s"}
+    return scenario.with_changes(
+        {"friction": sure, "ground.stiffness": "100 kN/m"} | times | changes
+    )
+
+
+@pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])
+@pytest.mark.parametrize("kind", ["balls", "cylinder"])
+def test_what_is_round_rolls_down_a_slope_by_its_inertia(engine, kind):
+    # s = g sin(slope) t^2 / 2 / (1 + I / (m r^2)): I = 2/5 m r^2 of a ball, 1/2 of a cylinder.
+    bare = {"node_diameter": 0.0, "diameter": 2.0 * RADIUS}
+    strut, share = (None, 2.0 / 5.0) if kind == "balls" else (bare, 1.0 / 2.0)
+    scenario = wheels(strut, terrain="!Incline {slope: -10 deg}", engine=engine)
+    centre = simulate(scenario, seeded_gait(scenario), record=True).path.centre
+    way = float(np.linalg.norm(centre[-1] - centre[0]))
+    assert way == pytest.approx(0.5 * G * math.sin(SLOPE) / (1.0 + share), rel=0.01)
+
+
+def test_a_ball_stands_its_radius_above_the_ground():
+    robot = Robot.of(wheels())
+    heights = node_positions(robot.structure, robot.equilibrium.state)[:, 2]
+    np.testing.assert_allclose(heights, RADIUS - robot.weight / 2.0 / 1e5, atol=1e-9)
+
+
+def test_a_foot_is_as_thick_as_its_sphere_else_as_its_strut_unless_the_file_says_so():
+    def radius(strut: dict[str, float], **parts: object) -> float:
+        tree = WHEELS | {"struts": {"axle": AXLE | strut}} | parts
+        return float(StructureFile.model_validate(tree).blueprint().contact_radius[0])
+
+    assert radius({}) == RADIUS
+    assert radius({"node_diameter": 0.0}) == 0.005
+    assert radius({"contact_radius": 0.02}) == 0.02
+    assert radius({}, anchors={"a": "z"}) == 0.0  # its support holds it
+    ball = {"nodes": ["a"], "diameter": 0.06, "density": 1000.0}
+    assert radius({}, spheres={"ball": ball}) == 0.03
+
+
+def test_a_foot_below_the_ground_that_anchors_keep_there_is_refused(refused):
+    tree = WHEELS | {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.0, 0.4, 0.0]}, "anchors": {"a": "x"}}
+    with refused("anchored", "robot.nodes.a", "radius"):
+        Robot.of(wheels().with_sections(name="anchored", robot=StructureFile.model_validate(tree)))
+
+
+def test_a_ball_with_backspin_slides_until_it_rolls():
+    # Angular momentum about the point of contact is kept: v = 5/7 (v_0 - 2/5 r w_0).
+    builder, mass, v_0, w_0 = DiagramBuilder(), 0.2, 1.0, 20.0
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    ball = plant.AddRigidBody("ball", SpatialInertia.SolidSphereWithMass(mass, RADIUS))
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -G])
+    plant.Finalize()
+    law = GroundSection(stiffness=20e3, damping=2e5)
+    ground = make_surface(law, Coulomb(static=0.3, kinetic=0.3), Flat())
+    AddGroundContact(builder, plant, frames=[ball.body_frame()], ground=ground, radius=RADIUS)
+    builder.ExportOutput(plant.get_state_output_port(), "state")
+    simulator = Simulator(builder.Build())
+    context = plant.GetMyContextFromRoot(simulator.get_mutable_context())
+    depth = mass * G / law.stiffness
+    plant.SetPositions(context, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, RADIUS - depth])
+    plant.SetVelocities(context, [0.0, -w_0, 0.0, v_0, 0.0, 0.0])
+    simulator.AdvanceTo(2.0)
+    v_WB = plant.GetVelocities(context)[3:]
+    assert v_WB[0] == pytest.approx(5.0 / 7.0 * (v_0 - 0.4 * RADIUS * w_0), rel=0.01)
+    assert plant.GetVelocities(context)[1] == pytest.approx(v_WB[0] / RADIUS, rel=1e-3)
+
+
+def test_the_deflection_of_a_foot_that_rolls_and_pivots_is_how_far_it_slid():
+    # With a constant w_WB and a lowest point that slides at u, the error falls with the step
+    # squared.
+    robot, duration = Robot.of(wheels()), 0.4
+    w_WB, u, up = np.array([3.0, 1.0, 2.0]), np.array([0.02, -0.01, 0.0]), np.array([0, 0, RADIUS])
+    start = robot.structure.initial_state
+    place, p_BN = start[4:7] + robot.structure.p_BN[0], robot.structure.p_BN[0]
+
+    def state_at(time: float) -> np.ndarray:
+        state, half = start.copy(), 0.5 * time * np.linalg.norm(w_WB)
+        state[:4] = np.append(math.cos(half), math.sin(half) * w_WB / np.linalg.norm(w_WB))
+        p_BN_W = RotationMatrix(Quaternion(state[:4])).matrix() @ p_BN
+        state[4:7] = place + (np.cross(w_WB, up) + u) * time - p_BN_W
+        return state
+
+    def error(steps: int) -> float:
+        modes, forces = np.zeros((2, MODE_COLUMNS)), Forces.of(robot.model)
+        parts = Packed((robot.model, forces))
+        for k in range(steps + 1):
+            state = state_at(k * duration / steps)
+            modes_after_step(parts, state, modes)
+        slide, _ = sliding(state, forces.nodes, modes, robot.ground, forces.frames, 0)
+        slid = np.array([slide.t1.deflection, slide.t2.deflection])
+        return float(np.linalg.norm(slid - u[:2] * duration))
+
+    assert error(40) < 1e-4
+    assert error(40) / error(80) == pytest.approx(4.0, rel=0.1)
+
+
+def test_drake_reads_feet_and_struts_of_the_sdf_as_collision_shapes():
+    robot, builder = Robot.of(load_scenario("prism")), DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    text = make_sdf(robot.structure, robot.structure.initial_state, name="prism")
+    Parser(plant).AddModelsFromString(text, "sdf")
+    plant.Finalize()
+    assert plant.num_collision_geometries() == 6 + 3
