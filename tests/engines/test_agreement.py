@@ -105,8 +105,9 @@ class Row:
 
 
 def loaded_prism() -> Scenario:
-    """The shipped prism, in which a point mass hangs between two bars."""
+    """The shipped prism on round feet, in which a point mass hangs between two bars."""
     tree = load_scenario("prism").robot.model_dump()
+    tree["struts"]["bar"]["contact_radius"] = 0.008
     ends = [node for pair in tree["struts"]["bar"]["pairs"][1:] for node in pair]
     middle = np.mean([tree["nodes"][node] for node in ends], axis=0).tolist()
     line = {"stiffness": 30.0, "damping": 0.3, "free_length": 0.02}

@@ -136,7 +136,8 @@ def test_the_deflection_of_a_foot_that_rolls_and_pivots_is_how_far_it_slid():
 
 
 def test_drake_reads_feet_and_struts_of_the_sdf_as_collision_shapes():
-    robot, builder = Robot.of(load_scenario("prism")), DiagramBuilder()
+    feet = {"robot.struts.bar.contact_radius": "8 mm"}
+    robot, builder = Robot.of(load_scenario("prism").with_changes(feet)), DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     text = make_sdf(robot.structure, robot.structure.initial_state, name="prism")
     Parser(plant).AddModelsFromString(text, "sdf")

@@ -85,7 +85,8 @@ class StrutGroup(Section):
     contact_radius: Length | None = Field(default=None, ge=0)
     """Radius of the sphere about each end that touches the ground; by default the sphere's radius,
     else the strut's. 0 for a ground that acts on the centres of nodes. The default is 0 for nodes
-    that anchors hold along z."""
+    that anchors hold along z. A bar with round ends rolls about its axis, if no cable is off the
+    axis."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load a strut
     is as long as its nodes are apart in the file. The axial force in equilibrium shortens it, and
