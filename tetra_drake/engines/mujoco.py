@@ -3,7 +3,7 @@
 Bodies, cables, actuation and gravity are the same as in the other engines. The ground differs: it
 is MuJoCo's soft contact with a friction cone.
 
-- Actuators with drives (winches and tension motors), and damped cables that go slack: each cable's
+- Actuators with drives, and damped or driven cables that go slack: each cable's
   tension is computed by the law of the other engines, from MuJoCo's lengths at the beginning of
   each step. Otherwise cables are MuJoCo's own tendons.
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
