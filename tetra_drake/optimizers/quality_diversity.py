@@ -111,10 +111,9 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
     def _check_measures(self, measures: Matrix) -> None:
         """Raises InputError for a measure that no gait has. `measures` (gaits, 2) are of the gaits
         whose simulation was completed."""
-        exist = np.isfinite(measures).any(axis=0)
-        for name, exists in zip(self.settings.measures, exist, strict=True):
-            if len(measures) and not exists:
-                found = f"is infinite or undefined for all of {len(measures)} gaits"
+        for name, values in zip(self.settings.measures, measures.T, strict=True):
+            if values.size and not np.isfinite(values).any():
+                found = f"is infinite or undefined for all of {values.size} gaits"
                 problem = f"{found} ({METRICS[name].note}); the map would stay empty"
                 raise InputError("scenario", f"optimizer.measures.{name}", problem)
 
