@@ -112,7 +112,9 @@ def evolve(
         progress.say(_introduction(out, record.manifest, cores, report=report))
         _warn_of_versions(record.manifest, progress)
         if not resume:
-            _warn_of_robot(Robot.of(scenario), progress)
+            robot = Robot.of(scenario)
+            for remark in filter(None, [robot.gain_remark(), robot.sinking_remark()]):
+                progress.warn(remark)
         trials = open_trials(record, optimizer=optimizer)
         progress.show([trial.status for trial in trials])
         unfinished = any(trial.unevaluated for trial in trials)
@@ -265,11 +267,6 @@ def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
             f"the run was begun with {', '.join(others)}; with other versions its record may "
             "differ from the record of an uninterrupted run"
         )
-
-
-def _warn_of_robot(robot: Robot, progress: Progress) -> None:
-    for remark in filter(None, [robot.gain_remark(), robot.sinking_remark()]):
-        progress.warn(remark)
 
 
 def _report(directory: Path, progress: Progress) -> None:
