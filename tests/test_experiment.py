@@ -192,17 +192,18 @@ def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeyp
         tetra_drake.evolve(None, tmp_path / "run", resume=True, **QUICK)
 
 
-def test_what_hardly_acts_is_named_when_a_run_begins_and_what_has_no_diagram_at_its_end(
+def test_what_hardly_acts_or_sinks_is_named_at_the_start_and_what_has_no_diagram_at_the_end(
     tiny, tmp_path, reports, monkeypatch
 ):
     monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
     progress, out = MagicMock(spec=Progress), tmp_path / "run"
-    odd = tiny.with_changes({"simulation.duration": "3000 s", "cpg.gain": "0.1 N"})
+    changes = {"simulation.duration": "3000 s", "cpg.gain": "0.1 N", "ground.stiffness": "20 N/m"}
+    odd = tiny.with_changes(changes)
     run = tetra_drake.evolve(odd, out, progress=progress)
     assert reports == [out] and run.reevaluations.empty
     tetra_drake.evolve(None, out, resume=True, progress=progress, **QUICK)
-    weak, compiled_alone = (call.args[0] for call in progress.warn.mock_calls)
-    assert "cpg.gain 0.1 N" in weak
+    weak, sinks, compiled_alone = (call.args[0] for call in progress.warn.mock_calls)
+    assert "cpg.gain 0.1 N" in weak and "ground.stiffness" in sinks
     assert "Drake diagram" in compiled_alone and "cpg.listing_step" in compiled_alone
 
 

@@ -111,8 +111,10 @@ def evolve(
         cores = getattr(executor, "workers", None) or workers or available_cores()
         progress.say(_introduction(out, record.manifest, cores, report=report))
         _warn_of_versions(record.manifest, progress)
-        if not resume and (remark := Robot.of(scenario).gain_remark()):
-            progress.warn(remark)
+        if not resume:
+            robot = Robot.of(scenario)
+            for remark in filter(None, [robot.gain_remark(), robot.sinking_remark()]):
+                progress.warn(remark)
         trials = open_trials(record, optimizer=optimizer)
         progress.show([trial.status for trial in trials])
         unfinished = any(trial.unevaluated for trial in trials)

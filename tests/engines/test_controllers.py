@@ -9,7 +9,6 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.command import controlled_robot
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
@@ -58,15 +57,6 @@ def test_a_controller_walks_alike_on_all_engines(walking, controller, engine):
     assert "<iframe" in found.show()._repr_html_()
 
 
-def test_a_controller_excludes_a_gait(walking, controller, refused):
-    with refused("simulate", "controller", "excludes a gait"):
-        simulate(walking, seeded_gait(walking), controller=controller)
-    with refused("simulate", "gait", "or a controller"):
-        simulate(walking)
-    with refused("MakeTensegrityDiagram", "gait", "or a controller"):
-        MakeTensegrityDiagram(controlled_robot(walking), None)
-
-
 def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
     """The function is called at the same times, and its forces are held."""
     accurate = Drake(accuracy=1e-5, max_step=1e-3)
@@ -108,9 +98,11 @@ class Springs(LeafSystem):
         output.SetFromVector(sums[: output.size()])
 
 
-def test_a_controller_makes_no_algebraic_loop_and_may_have_further_outputs(walking):
+def test_a_controller_makes_no_algebraic_loop_and_may_have_further_outputs(walking, refused):
     robot = controlled_robot(walking)
     springs = Springs(robot, {"lengths": 24, "rates": 24}, {"errors": 2, "signals": 8})
+    with refused("MakeTensegrityDiagram", "gait", "or a controller"):
+        MakeTensegrityDiagram(robot, None)
     diagram = MakeTensegrityDiagram(robot, None, controller=springs)
     found = diagram.GetOutputPort("signals").Eval(diagram.CreateDefaultContext())
     np.testing.assert_allclose(found, robot.starting_cables().length, rtol=1e-12)

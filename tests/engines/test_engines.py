@@ -82,23 +82,18 @@ def test_recording_and_watching_change_nothing(walk, engine):
     assert wound.any() == (walk == "winch")
 
 
-@pytest.mark.parametrize("engine", ["drake", "compiled"])
-def test_a_command_acts_from_the_start_and_is_held(engine):
-    # The scenario's start-up is the network's.
-    short = shortly(load_scenario("coulomb"), engine, duration="0.3 s", steady_from="0.1 s")
-    command = Command("steps", 0.1, np.array([[1.0], [2.0]]) * np.ones(8))
-    signal = simulate(short, command=command, record=True).trajectory.signal
-    signal = signal.sel(oscillator="T1-T2 outer bottom_left")
-    assert signal.sel(time=[0.0, 0.05, 0.1], method="nearest").values == pytest.approx(1.0)
-    assert signal.sel(time=[0.11, 0.2, 0.3], method="nearest").values == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize(
     ("what", "key"),
-    [([], "gait"), (["gait", "command"], "command"), (["command", "steering"], "command")],
+    [
+        ([], "gait"),
+        (["gait", "command"], "command"),
+        (["command", "steering"], "command"),
+        (["gait", "controller"], "controller"),
+    ],
 )
 def test_a_robot_follows_a_gait_or_a_command(scenario, what, key, refused):
     chosen = {"gait": seeded_gait(scenario), "command": WAVES, "steering": 0.5}
+    chosen["controller"] = lambda time, readings: np.zeros(8)
     with refused("simulate", key, ""):
         simulate(scenario, **{name: chosen[name] for name in what})
 

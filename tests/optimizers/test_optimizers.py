@@ -258,6 +258,14 @@ def test_nothing_is_learnt_from_a_batch_without_a_measure(measure):
     assert 0 < elites[0] == elites[1] < elites[2]
 
 
+def test_a_measure_that_no_gait_has_ends_the_search(refused):
+    optimizer = make(DIVERSE)
+    evaluations = [failing(vector) for vector in optimizer.ask()]  # without metrics
+    evaluations[0] = Evaluation(1.0, {"travelling_index": 0.5, "lifted": None})
+    with refused("scenario", "optimizer.measures.lifted", "1 gaits"):
+        optimizer.tell(evaluations)
+
+
 def test_the_map_is_fuller_and_fitter_than_that_of_random_search():
     runs = (run(kind, walker, budget=4000) for kind in (DIVERSE, RandomSearch()))
     ours, theirs = (cells(batches) for batches, _ in runs)

@@ -1,11 +1,16 @@
 """What `structure` says of heavy robots and of turned ones."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.report.structure_page import robot_of_file, structure_text
+from tetra_drake.report.summary import result_text
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.terrain_kinds import Nothing
 from tetra_drake.scenario.units import units_for
 
 TRIPOD = """
@@ -29,7 +34,7 @@ def test_a_heavy_structure_stands_on_a_ground_that_bears_it(tmp_path):
     assert 0.0 < -study_equilibrium(robot).nodes["z"].min() < 0.01
 
 
-def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path):
+def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path, result):
     file = tmp_path / "soft.yaml"
     file.write_text("{base: prism, name: soft, ground: {stiffness: 20 N/m, damping: 0 N*s/m^2}}")
     study = study_equilibrium(robot_of_file(str(file)))
@@ -38,6 +43,12 @@ def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path):
     told = study.robot.scenario.units.shown(20.0 * depth / (0.01 * height), "N/m")
     assert f"a ground.stiffness of {told} would bear it" in structure_text(study)
     assert "would bear it" not in structure_text(study_equilibrium(robot_of_file("prism")))
+    assert told in result_text(dataclasses.replace(result, robot=study.robot))
+    assert "would bear it" not in result_text(result)
+    floating = (
+        load_scenario(file).with_sections(terrain=Nothing()).with_numbers({"robot.gravity": 0.0})
+    )
+    assert not Robot.of(floating).sinking_remark()
 
 
 def test_lengths_that_are_round_in_no_unit_are_shown_in_metric_units():

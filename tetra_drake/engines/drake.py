@@ -47,13 +47,14 @@ class DrakeEngine(Engine):
     can_be_watched = True
 
     def simulate(self, simulation: GaitSimulation) -> SimulationResult:
-        settings = simulation.robot.scenario.simulation
+        if len(simulation.robot.commanded):
+            return _play(simulation)
         diagram = MakeTensegrityDiagram(
             simulation.robot, simulation.gait, steering=simulation.steering
         )
         walk = _DiagramWalk(simulation, diagram)
-        for instant in (0.0, settings.steady_from, settings.duration):
-            walk.advance_to(instant)
+        for mark in simulation.marks.tolist():
+            walk.advance_to(mark)
         return walk.result()
 
     def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> SerialStepper:
@@ -143,12 +144,22 @@ class _ControlledWalk(_DiagramWalk):
         )
 
     def hold(self, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N from now on."""
+        """Sets the signals (m,) in N, from now on."""
         self._held.Hold(self._context, signals)
 
     def readings(self) -> Readings:
         """The readings of the robot now."""
         return self._held.Read(self._context)
+
+
+def _play(simulation: GaitSimulation) -> SimulationResult:
+    """Simulates a command: its changes are held, as actions are."""
+    walk, changes = _ControlledWalk(simulation), simulation.changes
+    for mark in simulation.marks.tolist():
+        walk.advance_to(mark)
+        if mark in changes:
+            walk.hold(changes[mark])
+    return walk.result()
 
 
 def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:

@@ -15,6 +15,7 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics.actuator import has_drive
+from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import NormalForce
 from tetra_drake.physics.inertia import XX
 from tetra_drake.robot.robot import Robot
@@ -91,17 +92,17 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None, pulled: bool = False) 
 
 def is_pulled(robot: Robot) -> bool:
     """True if MuJoCo's tendons lack the law of the cables: where actuators have drives, and where
-    damped cables go slack."""
-    structure = robot.structure
-    is_damped = structure.cables["damping"].any()
-    return has_drive(robot.model.actuator) or bool(structure.slack and is_damped)
+    damped or driven cables go slack."""
+    cables, can_slacken = robot.structure.cables, robot.structure.slack
+    is_more = (cables["damping"] != 0.0) | (cables["signal"] != PASSIVE)
+    return has_drive(robot.model.actuator) or bool(can_slacken and is_more.any())
 
 
 def loose_remark(robot: Robot) -> str:
     """What tendons do otherwise than the robot's cables, if these are damped and can go slack."""
-    if has_drive(robot.model.actuator) or not is_pulled(robot):
-        return ""
     damped = np.flatnonzero(robot.structure.cables["damping"])
+    if has_drive(robot.model.actuator) or not (robot.structure.slack and damped.size):
+        return ""
     names = [robot.structure.cable_names[i] for i in damped[:3].tolist()]
     some = ", ".join(names) + (f" and {damped.size - 3} more" if damped.size > 3 else "")
     return f"the dampers of MuJoCo's tendons also act where a cable is slack: {some}"

@@ -3,7 +3,7 @@
 Bodies, cables, actuation and gravity are the same as in the other engines. The ground differs: it
 is MuJoCo's soft contact with a friction cone.
 
-- Actuators with drives (winches and tension motors), and damped cables that go slack: each cable's
+- Actuators with drives, and damped or driven cables that go slack: each cable's
   tension is computed by the law of the other engines, from MuJoCo's lengths at the beginning of
   each step. Otherwise cables are MuJoCo's own tendons.
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
@@ -81,8 +81,7 @@ class MujocoEngine(Engine):
         robot, gait, steering = simulation.robot, simulation.gait, simulation.steering
         self.check(robot.scenario)
         walk = _MujocoWalk(simulation)
-        signals = signals_at(robot, gait, walk.step * np.arange(walk.steps), steering=steering)
-        walk.run(signals)
+        walk.run(signals_at(robot, gait, walk.times_of_steps(0, walk.steps), steering=steering))
         walk.signals[:] = signals_at(robot, gait, walk.times, steering=steering)
         return walk.result()
 
@@ -284,30 +283,41 @@ class _MujocoWalk:
         self._kept = np.tile(self._state, (len(self.times), 1))
         self._drives = robot.starting_drives()
         self._drives_kept = np.tile(self._drives, (len(self.times), 1))
-        self._done, self._held, self._wall_time = 0, self.signals[0], 0.0
+        self._done, self._wall_time = 0, 0.0
+        self._change = robot.scenario.cpg.listing_step
+        self._before = self._held = robot.commanded[0] if len(robot.commanded) else self.signals[0]
+        self._began = self._paused = 0.0
+
+    def times_of_steps(self, first: int, last: int) -> Array:
+        """Times (s) from the beginning of step `first` to the beginning of step `last`."""
+        return self.step * np.arange(first, last + 1)
 
     def hold(self, signals: Array) -> None:
-        """Sets the signals (m,) in N from now on."""
-        self._held = signals.copy()
+        """Sets the signals (m,) in N, from now on."""
+        self._before, self._held, self._began = self._held, signals.copy(), self._paused
 
     def advance_to(self, time: float) -> None:
-        """Simulates to the step that is nearest to a time (s). Raises Diverged."""
-        steps = round(time / self.step) - self._done
-        self.run(np.tile(self._held, (max(0, steps), 1)))
+        """Simulates the steps that begin before a time (s). Raises Diverged."""
+        last = min(self.steps, math.ceil(time / self.step - 1e-6))
+        since = self.times_of_steps(self._done, last) - self._began
+        left = 1.0 - np.clip(since / self._change, 0.0, 1.0)[:, np.newaxis]
+        self._paused = time
+        self.run(self._held - left * (self._held - self._before))
 
     def run(self, signals: Array) -> None:
-        """Simulates a step for each row of signals (steps, m). Raises Diverged."""
+        """Simulates steps with signals (steps + 1, m) in N at their beginnings and at the end of
+        the last. Raises Diverged."""
         from mujoco.rollout import Rollout
 
         started, simulator = time.perf_counter(), self._simulator
-        if self._done == 0 and len(signals):
+        if self._done == 0 and len(signals) > 1:
             self.signals[0] = signals[0]
             start = simulator.body_states(self._kept[:1])[0]
             self._observer.add(0.0, start, signals[0], self._drives)
         with Rollout(nthread=0) as rollout:
-            for first in range(0, len(signals), _STRETCH):
+            for first in range(0, len(signals) - 1, _STRETCH):
                 check_time()
-                some = signals[first : first + _STRETCH]
+                some, after = signals[first:-1][:_STRETCH], signals[first + 1 :][:_STRETCH]
                 if simulator.pulled:
                     states, drives = simulator.step_through(self._state, some, self._drives)
                 else:
@@ -316,10 +326,9 @@ class _MujocoWalk:
                 self._state, self._drives, done = states[-1], drives[-1], self._done
                 here = (done < self._steps_kept) & (self._steps_kept <= done + len(states))
                 rows = self._steps_kept[here] - done - 1
-                self._kept[here], self.signals[here] = states[rows], some[rows]
+                self._kept[here], self.signals[here] = states[rows], after[rows]
                 self._drives_kept[here] = drives[rows]
-                following = np.minimum(first + 1 + np.arange(len(some)), len(signals) - 1)
-                simulator.observe(self._observer, states, signals[following], drives, first=done)
+                simulator.observe(self._observer, states, after, drives, first=done)
                 simulator.check(states, done)
                 self._done += len(states)
         self._wall_time += time.perf_counter() - started

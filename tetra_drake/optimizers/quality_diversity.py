@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tetra_drake.errors import InputError
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import Generational, Matrix
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
+from tetra_drake.scenario.metrics import METRICS
 
 FLOOR = 0.0
 """Fitness that a gait must exceed to enter the map; the initial threshold of every cell."""
@@ -36,7 +38,8 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
     Each emitter draws a part of the batch. The archive (the map) rates a vector by the difference
     between its fitness and the threshold of its cell. A vector that failed or lacks a measure never
     enters the archive; it is rated below all others. A batch of such vectors teaches nothing. The
-    report also has `elites`: the number of cells with a gait.
+    report also has `elites`: the number of cells with a gait. A measure that is infinite or NaN for
+    all gaits of a batch raises InputError, unless the map has gaits.
     """
 
     def __post_init__(self) -> None:
@@ -87,6 +90,8 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
         rows = [[e.metrics.get(name) for name in self.settings.measures] for e in evaluations]
         measures = np.array(rows, dtype=float)  # None becomes NaN
         status, value = np.zeros(count, np.int32), np.zeros(count)
+        if self._archive.empty:
+            self._check_measures(measures[[bool(e.metrics) for e in evaluations]])
         enters = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
         self._told = {}
         if enters.any():
@@ -102,6 +107,15 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
             self._told = {"solution": self._roots, "objective": objective, "measures": measures}
             self._added = {"status": status, "value": value}
         return super().tell(evaluations)
+
+    def _check_measures(self, measures: Matrix) -> None:
+        """Raises InputError for a measure that no gait has. `measures` (gaits, 2) are of the gaits
+        whose simulation was completed."""
+        for name, values in zip(self.settings.measures, measures.T, strict=True):
+            if values.size and not np.isfinite(values).any():
+                found = f"is infinite or undefined for all of {values.size} gaits"
+                problem = f"{found} ({METRICS[name].note}); the map would stay empty"
+                raise InputError("scenario", f"optimizer.measures.{name}", problem)
 
     def _learn(self, fitnesses: Vector) -> None:
         if self._archive.empty or not self._told:

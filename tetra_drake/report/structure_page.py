@@ -16,7 +16,7 @@ from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.ground import START_DEPTH
-from tetra_drake.robot.robot import Robot, overlaps, undisturbed_structure
+from tetra_drake.robot.robot import BEARS, Robot, overlaps, undisturbed_structure
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
@@ -37,9 +37,6 @@ _NOISE = 1e-9
 
 _SURROUNDINGS = "prism"
 """Shipped scenario with the ground and friction for structure files."""
-_SINKS, _RESTS = 0.03, 0.01
-"""Depths of the feet in the ground, as shares of the robot's height: too deep, and as deep as on a
-ground that bears the robot."""
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
@@ -75,7 +72,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
 def _on_firm_ground(robot: Robot) -> Robot:
     """The robot on a ground that is stiff enough to bear its weight at a single node."""
     scenario, p_WN = robot.scenario, node_positions(robot.structure, robot.structure.initial_state)
-    least = robot.weight / (_RESTS * float(np.ptp(p_WN, axis=0).max()))
+    least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
     ground = scenario.ground
     if least <= ground.stiffness:
         return robot
@@ -121,8 +118,8 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     and the struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     lines, allowed = [], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
-    if sinking := _sinking(study):
-        lines.append(sinking)
+    if sinking := robot.sinking_remark():
+        lines.append(f"{sinking[0].upper()}{sinking[1:]}.")
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
         depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]
@@ -132,19 +129,6 @@ def _faults(study: EquilibriumStudy) -> list[str]:
         pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), (depth, _) in through.items()]
         lines.append(f"Struts that pass through each other: {listed(pairs)}.")
     return lines
-
-
-def _sinking(study: EquilibriumStudy) -> str:
-    """Sentence with the stiffness of the ground that would bear the robot, if it sinks in; empty if
-    it does not."""
-    robot, units = study.robot, study.robot.scenario.units
-    z = study.nodes["z"].to_numpy()
-    depth, height = -z[robot.structure.contacts].min(initial=0.0), np.ptp(z)
-    if depth <= _SINKS * height:
-        return ""
-    stiffness = robot.scenario.ground.stiffness * depth / (_RESTS * height)
-    needed = f"a ground.stiffness of {units.shown(stiffness, 'N/m')} would bear it"
-    return f"Sinks into the ground by {units.shown(depth, 'm')}: {needed}."
 
 
 def _bodies_table(study: EquilibriumStudy) -> Table:

@@ -36,6 +36,9 @@ AMPLITUDE = 0.5
 """Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""
 LEAST_MOTION = 0.01
 """Least change of a cable's length that signals should cause, as a share of the length."""
+SINKS, BEARS = 0.03, 0.01
+"""Depths of a robot in its ground, as shares of its height: too deep, and as deep as in a ground
+that bears it."""
 DEEPEST = 1e-3
 """Largest depth of a node in the ground at the start, as a share of the structure's height."""
 MOST_CORRECTIONS = 100
@@ -168,6 +171,23 @@ class Robot:
             least = np.min(driven["free_length"] - moved)
             problem = self.scenario.actuation.excess(signal, free_length=least)
         return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
+
+    def sinking_remark(self) -> str:
+        """Warning if the robot at rest is in its ground by more than SINKS of its height, with a
+        stiffness that would bear it; empty if it is not, or if it has no equilibrium."""
+        units, ground = self.scenario.units, self.scenario.ground
+        if not self.structure.contacts.size:
+            return ""
+        try:
+            z = node_positions(self.structure, self.equilibrium.state)[:, 2]
+        except InputError:
+            return ""
+        depth, height = -z[self.structure.contacts].min(), np.ptp(z)
+        if depth <= SINKS * height:
+            return ""
+        needed = units.shown(ground.stiffness * depth / (BEARS * height), "N/m")
+        sinks = f"the robot sinks into its ground by {units.shown(depth, 'm')}"
+        return f"{sinks}; a ground.stiffness of {needed} would bear it"
 
     def starting_drives(self) -> np.ndarray:
         """States of the actuators at t = 0 (drives,); see physics.actuator and

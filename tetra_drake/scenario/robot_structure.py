@@ -90,7 +90,10 @@ class StrutGroup(Section):
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
     """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load a strut
     is as long as its nodes are apart in the file. The axial force in equilibrium shortens it, and
-    natural frequencies know its stiffness; in motion it keeps its length."""
+    natural frequencies know its stiffness; in motion it keeps its length. Frequencies leave out
+    the inertia of its elongation. Where it is 17, 3.3 or 1 times as stiff as its cable, the first
+    frequency is 0.25, 1.2 or 4 % higher than with finite-element rods, the second 0.75, 3.7 or
+    12 %."""
 
 
 class SphereGroup(Section):

@@ -33,8 +33,11 @@ class HeldSignals(LeafSystem):
     | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
     | signals       | (m,)          | N    | signals of the cables                                 |
 
-    The discrete state is the signals; at the start, the first sample of the robot's command. The
-    output depends on the state alone, so there is no algebraic loop.
+    The signals change as the actions of engines.simulation.Simulation do: linearly, within one
+    `cpg.listing_step`. Only at t = 0 they are set at once. The discrete state is the signals before
+    the change (m,) and after it (m,), and the time (s) of its beginning. At the start both are the
+    first sample of the robot's command. The output depends on state and time alone, so there is no
+    algebraic loop.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -46,8 +49,10 @@ class HeldSignals(LeafSystem):
         self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
         self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
         first = robot.commanded[0] if len(robot.commanded) else np.zeros(signals)
-        self.DeclareDiscreteState(first)
-        self.DeclareVectorOutputPort("signals", signals, self._calc_signals, {self.xd_ticket()})
+        self._change = robot.scenario.cpg.listing_step
+        self.DeclareDiscreteState(np.concatenate([first, first, [0.0]]))
+        tickets = {self.xd_ticket(), self.time_ticket()}
+        self.DeclareVectorOutputPort("signals", signals, self._calc_signals, tickets)
 
     def Read(self, context: Context) -> Readings:
         """The readings of the robot."""
@@ -60,17 +65,31 @@ class HeldSignals(LeafSystem):
         )
 
     def Hold(self, context: Context, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N."""
-        context.SetDiscreteState(signals)
+        """Sets the signals (m,) in N, from now on."""
+        context.SetDiscreteState(self._state_from_now(context, signals))
+
+    def _state_from_now(self, context: Context, signals: np.ndarray) -> np.ndarray:
+        """The discrete state with signals (m,) in N from now on."""
+        now = context.get_time()
+        before = self._signals(context) if now > 0.0 else signals
+        return np.concatenate([before, signals, [now]])
+
+    def _signals(self, context: Context) -> np.ndarray:
+        """The signals (m,) in N now."""
+        state, signals = context.get_discrete_state_vector().value(), self._structure.signals
+        before, after = state[:signals], state[signals:-1]
+        left = 1.0 - (context.get_time() - state[-1]) / self._change
+        return after - left * (after - before) if left > 0.0 else after
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(context.get_discrete_state_vector().value())
+        output.SetFromVector(self._signals(context))
 
 
 class SampledController(HeldSignals):
     """Controller of a robot: a function that sets the held signals in each control period.
 
     It has the ports of HeldSignals. The state is updated at multiples of the period, from t = 0 on.
+    Steps of the simulation also end where a change of the signals ends.
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
@@ -78,7 +97,9 @@ class SampledController(HeldSignals):
         super().__init__(robot)
         self._law = law
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        self.DeclarePeriodicPublishEvent(period, self._change, lambda _: None)  # ends a step
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
-        values.set_value(np.asarray(self._law(context.get_time(), self.Read(context)), dtype=float))
+        signals = self._law(context.get_time(), self.Read(context))
+        values.set_value(self._state_from_now(context, np.asarray(signals, dtype=float)))
         return EventStatus.Succeeded()

@@ -12,7 +12,7 @@ import numpy as np
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.lane_tables import shared
 from tetra_drake.engines.compiled.loop import Constants, LaneState
-from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation
+from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
@@ -50,18 +50,13 @@ class Prepared:
     def of(cls, simulation: GaitSimulation) -> Prepared:
         """Prepares a simulation. Raises InputError if gait or steering do not fit the scenario."""
         robot, gait, record = simulation.robot, simulation.gait, simulation.record
-        settings, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        duration = settings.duration
-        instants = np.concatenate([[0.0, settings.steady_from, start_up], _jumps(robot)])
-        marks = np.unique(instants.round(MARK_DECIMALS))
-        before = marks[marks < duration - 0.5 * 10.0**-MARK_DECIMALS]
         turns, solver = robot.turns(gait, simulation.steering), Solver.of(robot.model)
         return cls(
             robot=robot,
             gait=gait,
             record=record,
-            times=motion_times(settings, record=record),
-            marks=np.append(before, duration),
+            times=motion_times(robot.scenario.simulation, record=record),
+            marks=simulation.marks,
             turns=turns,
             constants=_constants(robot, gait, solver),
             start=_start(robot, turns, solver),
@@ -135,13 +130,6 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         look_ahead=np.array([engine.look_ahead]),
         max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
     )
-
-
-def _jumps(robot: Robot) -> np.ndarray:
-    """Times (s) at which a change of the command begins or ends."""
-    changes = (np.diff(robot.commanded, axis=0) != 0.0).any(axis=1)
-    ends = np.append(changes, False) | np.append(False, changes)
-    return robot.scenario.cpg.listing_step * np.flatnonzero(ends)
 
 
 def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
