@@ -182,7 +182,9 @@ class Robot:
             z = node_positions(self.structure, self.equilibrium.state)[:, 2]
         except InputError:
             return ""
-        depth, height = -z[self.structure.contacts].min(), np.ptp(z)
+        radius, contacts = self.structure.contact_radius, self.structure.contacts
+        depth = (radius - z)[contacts].max()
+        height = (z + radius).max() - (z - radius).min() or 2.0 * self.structure.strut_radius.max()
         if depth <= SINKS * height:
             return ""
         needed = units.shown(ground.stiffness * depth / (BEARS * height), "N/m")
