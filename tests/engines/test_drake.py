@@ -34,8 +34,9 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 def test_settles_where_the_independent_simulation_does(scenario, structure, gait, data):
     still = scenario.with_changes({"cpg.start_up": "100.0 s", "engine.max_step": "1e-3 s"})
-    diagram = MakeTensegrityDiagram(Robot.of(still), gait)
-    simulator = MakeSimulator(diagram, still.engine)
+    robot = Robot.of(still)
+    diagram = MakeTensegrityDiagram(robot, gait)
+    simulator = MakeSimulator(diagram, robot, still.engine)
     simulator.AdvanceTo(4.0)
     context = simulator.get_context()
     p_WN = node_positions(structure, diagram.GetOutputPort("state").Eval(context))
@@ -67,7 +68,7 @@ def test_a_live_network_walks_as_the_listing_with_short_steps_does(scenario, gai
 
 def test_a_step_ends_at_the_start_up_jump(scenario, robot, gait):
     diagram = MakeTensegrityDiagram(robot, gait)
-    simulator = MakeSimulator(diagram, scenario.engine)
+    simulator = MakeSimulator(diagram, robot, scenario.engine)
     ends: list[float] = []
     simulator.set_monitor(lambda context: ends.append(context.get_time()))
     simulator.AdvanceTo(1.5)
@@ -93,7 +94,7 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
     )
     diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
     engine, there = robot.scenario.engine, []
-    simulator = MakeSimulator(diagram, engine)
+    simulator = MakeSimulator(diagram, robot, engine)
     sampler = Sampler(diagram, np.array([0.05, 0.1]), max_step=engine.max_step)
 
     def after_step(context: Context) -> None:

@@ -107,7 +107,7 @@ def test_where_mujoco_starts_again_the_simulation_has_failed_when_it_did(short):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_many_gaits_walk_or_fail_as_each_alone(short, workers, monkeypatch):
     monkeypatch.setattr(engine, "_STRETCH", 1000)
-    monkeypatch.setattr(engine, "MAX_SPEED", 0.07)  # m/s, which two of them exceed
+    short = short.with_changes({"simulation.max_speed": "0.07 m/s"})  # two of them exceed it
     gaits = [seeded_gait(short, seed) for seed in range(5)]
     many = simulate_many(scenario=short, gaits=gaits, record=True, workers=workers)
     assert {type(outcome) for outcome in many} == {Diverged, SimulationResult}

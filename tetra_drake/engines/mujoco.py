@@ -20,7 +20,6 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -45,7 +44,7 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.compiling import compiled
@@ -57,10 +56,6 @@ INSTALL = 'pip install "mujoco>=3.13"'
 _FLOOR = 0  # index of the floor's geom
 _STRETCH = 5000  # steps between two checks of stability
 _OBSERVED = 16  # steps from one observation to the next; 1 ms with the default step
-MAX_SPEED = 1.0
-"""Largest speed of a body (m/s) of a robot that starts on the ground; less than in other engines.
-With too long a step a robot is thrown about, sometimes far forward. A walking robot stays below
-0.2 m/s. A robot that may roll over can be faster by the speed of a fall from its own height."""
 
 
 class MujocoEngine(Engine):
@@ -127,10 +122,7 @@ class _Simulator:
             raise InputError(robot.scenario.name, "robot", problem) from error
         self._data = mujoco.MjData(self._model)
         self._step = robot.scenario.settings_of(Mujoco).step
-        heights = node_positions(robot.structure, robot.structure.initial_state)[:, 2]
-        height = max(0.0, heights.min() if robot.structure.points_ahead else heights.max())
-        fall = math.sqrt(2.0 * robot.scenario.robot.gravity * height)
-        self._max_speed = MAX_SPEED + fall
+        self._speed_limit = speed_limit(robot)
         names = [robot.structure.node_names[node] for node in robot.structure.contacts]
         self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(names)}
         self._contacts = [self._model.site(name).id for name in names]
@@ -209,11 +201,9 @@ class _Simulator:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
         step `first` and the following ones."""
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
-        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
+        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._speed_limit)
         if fast.any():
-            limit = f"the limit of {self._max_speed:.3g} m/s"
-            reason = f"a body's velocity exceeds {limit}; try a shorter engine.step"
-            raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
+            raise Diverged.too_fast(time=float(states[fast.argmax(), 0]), limit=self._speed_limit)
         # An unstable simulation starts again from time 0, or stops.
         times = self._step * (first + 1.0 + np.arange(len(states)))
         warned = np.abs(states[:, 0] - times) > 0.5 * self._step

@@ -21,6 +21,7 @@ from tetra_drake.results.result import motion_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, initial_neurons
 from tetra_drake.robot.signals import sample_count
+from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.allocation import allocate
 
@@ -134,6 +135,7 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         max_step=np.array([max_step]),
         look_ahead=np.array([engine.look_ahead]),
         max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
+        max_speed=np.array([speed_limit(robot)]),
     )
 
 
