@@ -27,6 +27,7 @@ from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed
@@ -40,6 +41,7 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.section import written
 from tetra_drake.simd.packed import Packed
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 G = 9.80665
 ENGINES = {
@@ -356,3 +358,16 @@ def test_an_offset_moves_a_body_only_along_its_free_axes():
     for node, expected in by_bar.items():
         bar = structure.carriers[structure.node_names.index(node)]
         np.testing.assert_allclose(moved.p_WB[bar] - structure.p_WB[bar], expected, atol=1e-15)
+
+
+def test_the_diagram_hardly_damps_what_has_no_dampers():
+    robot = flying("six_bar", strut_contact="!Nothing")
+    diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
+    simulator, start = MakeSimulator(diagram, robot, Drake()), robot.structure.initial_state
+    context = simulator.get_mutable_context()
+    context.SetContinuousState(start)
+    simulator.AdvanceTo(2.0)
+    end, still = diagram.GetOutputPort("state").Eval(context), start.copy()
+    still[7 * len(robot.structure.bodies) :] = 0.0
+    energy, kept, least = (energy_and_momenta(robot, state)[0] for state in (start, end, still))
+    assert kept == pytest.approx(energy, abs=2e-3 * (energy - least))

@@ -120,7 +120,10 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     """Lines with the depth of a robot that sinks in, the nodes that are below the ground at rest,
     and the struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
-    lines, allowed = [], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
+    lines, allowed = (
+        [],
+        START_DEPTH * robot.structure.scale + robot.weight / robot.scenario.ground.stiffness,
+    )
     if sinking := _sinking(study):
         lines.append(sinking)
     low = study.nodes["z"][study.nodes["z"] < -allowed]

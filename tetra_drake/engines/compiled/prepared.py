@@ -130,7 +130,7 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         gain=np.array([cpg.gain]),
         period=np.array([cpg.listing_step]),
         samples=np.array([sample_count(robot)], dtype=float),
-        start_up=np.array([cpg.start_up]),
+        start_up=np.array([cpg.start_up]).round(MARK_DECIMALS),  # as its mark
         tolerance=np.array([engine.tolerance]),
         max_step=np.array([max_step]),
         look_ahead=np.array([engine.look_ahead]),
@@ -148,7 +148,7 @@ def _jumps(robot: Robot) -> np.ndarray:
 
 def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
     start, signals = allocate(LaneState, sizes_in_lanes(robot, solver)), robot.structure.signals
-    start.tally.begins[0] = steady_start(robot.scenario)
+    start.tally.begins[0] = round(steady_start(robot.scenario), MARK_DECIMALS)
     start.step.state[:] = robot.structure.initial_state
     start.modes[:] = robot.starting_modes
     if len(robot.commanded):
