@@ -59,8 +59,8 @@ def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, struc
 @pytest.mark.parametrize("name", ["thesis", "mast"])  # with weak and strong dampers
 def test_dampers_between_bodies_do_not_slow_the_fall_of_a_robot(name):
     scenario = load_scenario(name)
-    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
-    high = {"robot.offsets": [[0.0, 0.0, "1 m"]] * scenario.robot.body_count}
+    times = {"simulation.duration": "1.2 s", "simulation.steady_from": "0.1 s"}  # to 11.8 m/s
+    high = {"robot.offsets": [[0.0, 0.0, "8 m"]] * scenario.robot.body_count}
     changes = {"engine": "!Mujoco", "cpg.start_up": "0.1 s", "friction": Coulomb()}
     falling = scenario.with_changes(times | high | changes)
     trajectory = trajectory_of(falling)

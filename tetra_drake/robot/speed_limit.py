@@ -27,7 +27,7 @@ def speed_limit(robot: Robot) -> float:
         return scenario.simulation.max_speed
     start, slope = node_positions(structure, structure.initial_state), scenario.terrain.plane_slope
     above = start[:, 2] - start[:, 0] * math.tan(slope or 0.0)
-    fall = above.max() - (robot.ground.heights.min() if slope is None else 0.0)
+    fall = max(0.0, above.max() - (robot.ground.heights.min() if slope is None else 0.0))
     speed = math.sqrt(2.0 * (robot.weight * fall + _cable_energy(robot, start)))
     speed /= math.sqrt(structure.mass.min())
     share = math.sin(abs(slope or 0.0)) if structure.contacts.size else 1.0
