@@ -35,11 +35,18 @@ from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator
-from tetra_drake.physics.cable import PASSIVE, Cables
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.physics.cable import PASSIVE, TENSION, Cables
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.physics.forces import pull_of_cable
+from tetra_drake.physics.kinematics import FORCE
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.equilibrium import (
+    Unactuated,
+    force_at_rest,
+    mass_matrix,
+    stiffness_at_rest,
+)
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
@@ -90,6 +97,31 @@ class MujocoEngine(Engine):
     ) -> list[Outcome]:
         with ThreadPoolExecutor(threads) as pool:
             return list(pool.map(lambda each: self.outcome(*each, record=record), simulations))
+
+
+def is_stable(robot: Robot, step: float) -> bool:
+    """True if MuJoCo's steps (s) are stable for the springs and dampers of a robot at its start.
+
+    They are explicit for positions and cables, and stable if step^2 K + 2 step C < 4 M with the
+    stiffness K, the damping C and the mass M. All cables count as taut. MuJoCo itself holds anchors
+    and struts that touch, so they do not count.
+    """
+    from scipy.linalg import eigvalsh
+
+    model, law = robot.model, robot.model.cables.law
+    free = model.anchors._replace(stiffness=np.zeros_like(model.anchors.stiffness))
+    taut = Unactuated(model._replace(slack=False, anchors=free))
+    force_at_rest(taut, robot.structure.initial_state)
+    forces, mass = taut.forces, mass_matrix(taut)
+    forces.near_struts.count[:] = 0
+    stiffness = stiffness_at_rest(taut)
+    # Springs as stiff as the dampers are strong, without tension and ground.
+    forces.cable_forces[:, TENSION] = forces.ground_forces[:, NORMAL] = 0.0
+    forces.nodes[:, FORCE : FORCE + 3] = 0.0
+    dampers = model.cables._replace(law=law._replace(stiffness=law.damping))
+    taut.model = taut.model._replace(cables=dampers)
+    change = step**2 * stiffness + 2.0 * step * stiffness_at_rest(taut)
+    return bool(eigvalsh(change, mass).max() < 4.0)
 
 
 def installed() -> bool:
@@ -257,7 +289,8 @@ class _MujocoWalk:
     """Simulation of a robot in MuJoCo, in stretches."""
 
     def __init__(self, simulation: GaitSimulation) -> None:
-        """Raises StepBudgetExceeded if the duration has too many steps."""
+        """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
+        long."""
         self._simulation, robot = simulation, simulation.robot
         settings, self.step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
         self.steps = max(1, round(settings.duration / self.step))
@@ -270,6 +303,9 @@ class _MujocoWalk:
         """Signals (times, m) in N of the samples."""
         self._steps_kept = np.rint(self.times / self.step).astype(int)
         self._simulator, self._observer = _Simulator(robot), Observer(robot)
+        if not is_stable(robot, self.step):
+            reason = f"engine.step, {self.step:g} s, is too long for the robot's springs or dampers"
+            raise Diverged(time=0.0, reason=reason)
         self._state = self._simulator.start()
         self._kept = np.tile(self._state, (len(self.times), 1))
         self._drives = robot.starting_drives()

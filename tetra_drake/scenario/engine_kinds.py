@@ -65,7 +65,7 @@ class Mujoco(EngineSettings):
     """MuJoCo with its own contact, on planes."""
 
     step: Time = Field(default=0.0625e-3, ge=1e-7, le=1)
-    """Time step. If it is too long for the dampers of the cables, the robot is thrown about."""
+    """Time step. A simulation fails at once if it is too long for springs and dampers."""
 
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
 
