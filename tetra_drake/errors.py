@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from typing import Any
+from typing import Any, Self
 
 _LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 270, 60, 200, 4096
 """Largest number of characters of key and problem; if they have more, of a key or a quotation, and
@@ -74,12 +74,14 @@ class SimulationFailure(RuntimeError):
         return functools.partial(type(self), time=self.time, reason=self.reason), ()
 
 
-MAX_SPEED = 10.16
-"""Largest speed of a body in m/s (400 in/s). A simulation with a faster body has diverged."""
-
-
 class Diverged(SimulationFailure):
     """A motion beyond physics: not finite, too fast, or too hard for the integrator."""
+
+    @classmethod
+    def too_fast(cls, *, time: float, limit: float) -> Self:
+        """The failure of a robot that has a body beyond the speed limit (m/s)."""
+        reason = f"a body moves faster than simulation.max_speed, {limit:.4g} m/s"
+        return cls(time=time, reason=reason)
 
 
 class StepBudgetExceeded(SimulationFailure):

@@ -71,7 +71,7 @@ def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
     robot = controlled_robot(scenario)
     system = SampledController(robot, law, period=0.02)
     diagram = MakeTensegrityDiagram(robot, None, controller=system)
-    simulator = MakeSimulator(diagram, accurate)
+    simulator = MakeSimulator(diagram, robot, accurate)
     simulator.AdvanceTo(0.3)
     state = diagram.GetOutputPort("state").Eval(simulator.get_context())
     result = simulate(scenario, controller=controller, record=True)

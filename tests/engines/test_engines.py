@@ -114,8 +114,7 @@ def test_the_path_is_that_of_the_trajectory(scenario, engine):
 @pytest.mark.parametrize(
     ("changes", "kind"),
     [
-        # A fall that is too fast after 10 ms, high above the ground.
-        ({"robot.gravity": "1000 m/s^2", "robot.offsets": [[0.0, 0.0, "9 m"]] * 5}, Diverged),
+        ({"simulation.max_speed": "1 cm/s"}, Diverged),
         ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, Diverged),  # steps below the least
         ({"simulation.max_evaluations": 1000}, StepBudgetExceeded),
     ],

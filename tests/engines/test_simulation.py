@@ -78,14 +78,6 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(
     assert found[-1].time.tolist() == pytest.approx([PERIODS * period] * count)
 
 
-def test_rates_are_those_of_the_lengths(short):
-    simulation = Simulation(short, control_period=short.cpg.listing_step)
-    before, now, after = go(simulation, np.full((60, 1, 8), 3.0))[-3:]
-    slope = (after.lengths - before.lengths) / (after.time - before.time)
-    np.testing.assert_allclose(now.rates, slope, atol=2e-3 * np.abs(slope).max())
-    assert np.abs(slope).max() > 0.01
-
-
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
     alone = Simulation(short, count=LANES, workers=1)
     actions = drawn_actions(alone)

@@ -30,7 +30,7 @@ KINDS: list[Terrain] = [
 
 
 def grid_of(terrain: Terrain) -> Grid:
-    return terrain.grid(ahead=AHEAD, source="file")
+    return terrain.grid(ahead=AHEAD, scale=1.0, source="file")
 
 
 def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -38,6 +38,19 @@ def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     axes = zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
     knots = tuple(start + cell * (np.arange(size + 3) - 1.5) for start, cell, size in axes)
     return NdBSpline(knots, grid.heights, k=2)(np.stack(np.broadcast_arrays(x, y), axis=-1))
+
+
+@pytest.mark.parametrize("terrain", KINDS, ids=repr)
+def test_the_ground_of_a_robot_ten_times_as_long_is_ten_times_as_large(terrain):
+    lengths = ("height", "depth", "amplitude", "wavelength", "radius", "spacing")
+    larger = {key: 10.0 * length for key, length in terrain if key in lengths}
+    grid, ours = (
+        terrain.grid(ahead=AHEAD, scale=1.0, source="file"),
+        terrain.model_copy(update=larger),
+    )
+    large = ours.grid(ahead=10.0 * AHEAD, scale=10.0, source="file")
+    np.testing.assert_allclose(large.heights, 10.0 * grid.heights, atol=1e-12)
+    np.testing.assert_allclose(large.corner + large.cell, 10.0 * np.array(grid.corner + grid.cell))
 
 
 @pytest.mark.parametrize("terrain", KINDS, ids=repr)

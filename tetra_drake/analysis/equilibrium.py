@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.physics.kinematics import FORCE
 from tetra_drake.robot.elastic_struts import condensed
-from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, stiffness_at_rest
+from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import Structure, node_positions
@@ -102,19 +101,6 @@ def _frequencies(structure: Structure, unactuated: Unactuated, state: np.ndarray
 
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), structure, unactuated, state)
-    squares = linalg.eigvalsh(stiffness, _mass_matrix(unactuated))  # of M x'' = -K x
+    squares = linalg.eigvalsh(stiffness, mass_matrix(unactuated))  # of M x'' = -K x
     least = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
     return np.sqrt(squares[squares > least]) / (2.0 * math.pi)
-
-
-def _mass_matrix(unactuated: Unactuated) -> np.ndarray:
-    """Mass matrix (6 n, 6 n) at the last computed state. Rotations are scaled by the largest radius
-    of the bodies, so all coordinates are lengths."""
-    model, bodies = unactuated.model, unactuated.model.bodies
-    inertia_W = bodies.inertia if model.isotropic else unactuated.forces.inertia
-    matrix = np.diag(np.repeat(bodies.mass, 6))
-    for body, inertia in enumerate(inertia_W):
-        turning = slice(6 * body, 6 * body + 3)
-        tensor = RotationalInertia(*inertia).CopyToFullMatrix3()
-        matrix[turning, turning] = tensor / bodies.radius.max() ** 2
-    return matrix

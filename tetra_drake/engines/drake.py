@@ -15,9 +15,12 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_of, frame_of
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.speed_limit import speed_limit
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import HeldSignals
@@ -39,6 +42,10 @@ _GROWTH = 3.0
 """Factor by which the longest step grows with each step until the next mode change."""
 _RENEW_FROM = 8e-4
 """Step (s) that needs a new Jacobian after a mode change; shorter ones mostly converge without."""
+
+
+FINEST, COARSEST = 2e-5, 5e-3
+"""Limits of the default of the target accuracy."""
 
 
 class DrakeEngine(Engine):
@@ -67,14 +74,14 @@ class _DiagramWalk:
     def __init__(self, simulation: GaitSimulation, diagram: Diagram) -> None:
         robot, engine = simulation.robot, simulation.robot.scenario.settings_of(Drake)
         self._simulation, self._diagram, self._engine = simulation, diagram, engine
-        self._simulator = MakeSimulator(diagram, engine)
+        self._simulator = MakeSimulator(diagram, robot, engine)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
         self._drives_at, self._observer = drives_of(diagram), Observer(robot)
         self._work = _Work(self._simulator.get_integrator())
         self._aimer = _StepAimer(diagram, self._simulator, engine, self._work)
         times = motion_times(robot.scenario.simulation, record=simulation.record)
         self._sampler = Sampler(diagram, times, max_step=engine.max_step)
-        self._wall_time = 0.0
+        self._wall_time, self._speed_limit = 0.0, speed_limit(robot)
         # A bound method in place of the lambda would keep the diagram alive for ever.
         this = weakref.proxy(self)
         self._simulator.set_monitor(lambda context: this._after_step(context))
@@ -103,7 +110,7 @@ class _DiagramWalk:
             totals=self._observer.totals(),
             work=IntegratorWork(
                 scheme=self._engine.scheme,
-                accuracy=self._engine.accuracy,
+                accuracy=self._simulator.get_integrator().get_target_accuracy(),
                 steps=steps,
                 derivative_evaluations=derivative_evaluations,
                 jacobian_evaluations=jacobian_evaluations,
@@ -118,7 +125,7 @@ class _DiagramWalk:
         robot, viewer = self._simulation.robot, self._simulation.viewer
         bodies, now = self._state.Eval(context), context.get_time()
         velocities = bodies[7 * len(robot.structure.bodies) :]
-        _check(robot.scenario.simulation, now, velocities, self._work)
+        _check(robot.scenario.simulation, now, velocities, self._speed_limit, self._work)
         self._aimer.aim(context, velocities)
         self._sampler.after_step(context)
         drives = self._drives_at(context)
@@ -162,15 +169,29 @@ def _play(simulation: GaitSimulation) -> SimulationResult:
     return walk.result()
 
 
-def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:
-    """Simulator of a diagram with the scenario's integrator settings."""
+def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
+    """Simulator of a robot's diagram with these integrator settings."""
+    accuracy = settings.accuracy or default_accuracy(robot.structure)
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
-    integrator.set_target_accuracy(settings.accuracy)
+    integrator.set_target_accuracy(accuracy)
     if settings.mode_changes == "witness":
-        window = _WITNESS_WINDOW * min(1.0, settings.accuracy / 1e-3)
+        window = _WITNESS_WINDOW * min(1.0, accuracy / 1e-3)
         simulator.get_mutable_context().SetAccuracy(window / _WITNESS_WINDOW_PER_ACCURACY)
     return simulator
+
+
+def default_accuracy(structure: Structure) -> float:
+    """Target accuracy for a structure: half the least damping ratio of a cable, within limits.
+
+    The damping ratio c / (2 sqrt(k m)) of a cable is for the reduced mass m of its two bodies. A
+    structure without cables has the finest accuracy.
+    """
+    cables = structure.cables
+    per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
+    per_reduced_mass = per_mass[structure.carriers[structure.cable_ends]].sum(axis=1)
+    ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
+    return min(COARSEST, max(FINEST, 0.5 * min(ratios, default=0.0)))
 
 
 class _Work:
@@ -203,13 +224,14 @@ class _Work:
         self._before = self.total()
 
 
-def _check(settings: SimulationSection, now: float, velocities: np.ndarray, work: _Work) -> None:
-    """Raises Diverged or StepBudgetExceeded if the simulation has failed."""
+def _check(
+    settings: SimulationSection, now: float, velocities: np.ndarray, limit: float, work: _Work
+) -> None:
+    """Raises Diverged, if a body is beyond the speed limit (m/s), or StepBudgetExceeded."""
     speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
     used = work.derivative_evaluations()
-    if not speed <= MAX_SPEED:
-        reason = f"a body moves at {speed:g} m/s, the limit is {MAX_SPEED:g} m/s"
-        raise Diverged(time=now, reason=reason)
+    if not speed <= limit:
+        raise Diverged.too_fast(time=now, limit=limit)
     if used > settings.max_evaluations:
         reason = f"{used} derivative evaluations, the budget is {settings.max_evaluations}"
         raise StepBudgetExceeded(time=now, reason=reason)

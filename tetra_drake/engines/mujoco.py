@@ -20,7 +20,6 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -36,16 +35,23 @@ from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator
-from tetra_drake.physics.cable import PASSIVE, Cables
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.physics.cable import PASSIVE, TENSION, Cables
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.physics.forces import pull_of_cable
+from tetra_drake.physics.kinematics import FORCE
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.equilibrium import (
+    Unactuated,
+    force_at_rest,
+    mass_matrix,
+    stiffness_at_rest,
+)
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.compiling import compiled
@@ -57,10 +63,6 @@ INSTALL = 'pip install "mujoco>=3.13"'
 _FLOOR = 0  # index of the floor's geom
 _STRETCH = 5000  # steps between two checks of stability
 _OBSERVED = 16  # steps from one observation to the next; 1 ms with the default step
-MAX_SPEED = 1.0
-"""Largest speed of a body (m/s) of a robot that starts on the ground; less than in other engines.
-With too long a step a robot is thrown about, sometimes far forward. A walking robot stays below
-0.2 m/s. A robot that may roll over can be faster by the speed of a fall from its own height."""
 
 
 class MujocoEngine(Engine):
@@ -96,6 +98,31 @@ class MujocoEngine(Engine):
             return list(pool.map(lambda each: self.outcome(*each, record=record), simulations))
 
 
+def is_stable(robot: Robot, step: float) -> bool:
+    """True if MuJoCo's steps (s) are stable for the springs and dampers of a robot at its start.
+
+    They are explicit for positions and cables, and stable if step^2 K + 2 step C < 4 M with the
+    stiffness K, the damping C and the mass M. All cables count as taut. MuJoCo itself holds anchors
+    and struts that touch, so they do not count.
+    """
+    from scipy.linalg import eigvalsh
+
+    model, law = robot.model, robot.model.cables.law
+    free = model.anchors._replace(stiffness=np.zeros_like(model.anchors.stiffness))
+    taut = Unactuated(model._replace(slack=False, anchors=free))
+    force_at_rest(taut, robot.structure.initial_state)
+    forces, mass = taut.forces, mass_matrix(taut)
+    forces.near_struts.count[:] = 0
+    stiffness = stiffness_at_rest(taut)
+    # Springs as stiff as the dampers are strong, without tension and ground.
+    forces.cable_forces[:, TENSION] = forces.ground_forces[:, NORMAL] = 0.0
+    forces.nodes[:, FORCE : FORCE + 3] = 0.0
+    dampers = model.cables._replace(law=law._replace(stiffness=law.damping))
+    taut.model = taut.model._replace(cables=dampers)
+    change = step**2 * stiffness + 2.0 * step * stiffness_at_rest(taut)
+    return bool(eigvalsh(change, mass).max() < 4.0)
+
+
 def installed() -> bool:
     """True if MuJoCo is installed, in a version with rollouts."""
     try:
@@ -126,10 +153,7 @@ class _Simulator:
             raise InputError(robot.scenario.name, "robot", problem) from error
         self._data = mujoco.MjData(self._model)
         self._step = robot.scenario.settings_of(Mujoco).step
-        heights = node_positions(robot.structure, robot.structure.initial_state)[:, 2]
-        height = max(0.0, heights.min() if robot.structure.points_ahead else heights.max())
-        fall = math.sqrt(2.0 * robot.scenario.robot.gravity * height)
-        self._max_speed = MAX_SPEED + fall
+        self._speed_limit = speed_limit(robot)
         names = [robot.structure.node_names[node] for node in robot.structure.contacts]
         self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(names)}
         self._contacts = [self._model.site(name).id for name in names]
@@ -208,11 +232,9 @@ class _Simulator:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
         step `first` and the following ones."""
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
-        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
+        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._speed_limit)
         if fast.any():
-            limit = f"the limit of {self._max_speed:.3g} m/s"
-            reason = f"a body's velocity exceeds {limit}; try a shorter engine.step"
-            raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
+            raise Diverged.too_fast(time=float(states[fast.argmax(), 0]), limit=self._speed_limit)
         # An unstable simulation starts again from time 0, or stops.
         times = self._step * (first + 1.0 + np.arange(len(states)))
         warned = np.abs(states[:, 0] - times) > 0.5 * self._step
@@ -266,7 +288,8 @@ class _MujocoWalk:
     """Simulation of a robot in MuJoCo, in stretches."""
 
     def __init__(self, simulation: GaitSimulation) -> None:
-        """Raises StepBudgetExceeded if the duration has too many steps."""
+        """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
+        long."""
         self._simulation, robot = simulation, simulation.robot
         settings, self.step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
         self.steps = max(1, round(settings.duration / self.step))
@@ -279,6 +302,9 @@ class _MujocoWalk:
         """Signals (times, m) in N of the samples."""
         self._steps_kept = np.rint(self.times / self.step).astype(int)
         self._simulator, self._observer = _Simulator(robot), Observer(robot)
+        if not is_stable(robot, self.step):
+            reason = f"engine.step, {self.step:g} s, is too long for the robot's springs or dampers"
+            raise Diverged(time=0.0, reason=reason)
         self._state = self._simulator.start()
         self._kept = np.tile(self._state, (len(self.times), 1))
         self._drives = robot.starting_drives()

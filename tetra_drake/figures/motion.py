@@ -39,8 +39,8 @@ from tetra_drake.scenario.units import INCH, Units
 
 X, Y, Z = range(3)
 
-_MARGIN = 0.6 * INCH  # m; free space around a robot
-_PROFILE = 0.05 * INCH  # m; distance between points of the ground's profile
+_MARGIN = 0.6 * INCH  # m; free space around a robot of usual size
+_PROFILE = 0.05 * INCH  # m; distance between points of its ground's profile
 _PANEL_NAME, _GAP = 0.27, 0.13  # inches; height of a panel's name, and gap between panels
 _PATHS = 6  # largest number of panels of paths side by side
 _STRAIGHT = 0.05  # a path is straight if it is narrower than this share of its length
@@ -126,7 +126,7 @@ def time_lapse(
     nodes, walked = trajectory.p_WN.values / unit.length, _distance_walked(result, unit)
     centre = structure.node_shares @ nodes
     shown = np.concatenate([nodes[samples].reshape(-1, 3), centre])
-    wide, high = (_range(shown[:, axis], unit) for axis in (X, Y))
+    wide, high = (_range(shown[:, axis], result.robot, unit) for axis in (X, Y))
     columns, height = _fit(instants, wide, high, figure, height_in=6.0)
     page = page_of(figure, height_in=height + 0.9)
     x_label = f"x, forward ({unit.length_name}) →"
@@ -165,7 +165,9 @@ def path_of_the_centre(
     points = path.centre / unit.length
     if np.ptp(points[:, Y]) < _STRAIGHT * np.ptp(points[:, X]):
         return _draw_height(page_of(figure, height_in=2.6), points, result.robot, unit)
-    ratio = np.ptp(points[:, Y]) / max(np.ptp(points[:, X]), _MARGIN / unit.length)
+    ratio = np.ptp(points[:, Y]) / max(
+        np.ptp(points[:, X]), _MARGIN * structure.scale / unit.length
+    )
     page = page_of(figure, height_in=min(rcParams["figure.figsize"][0] * ratio, 5.0) + 1.4)
     panel = page.subplots()
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
@@ -218,7 +220,7 @@ def one_step(
     samples, nodes = _nearest(step, np.linspace(*ends, instants)), step.p_WN.values / unit.length
     grounds = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
     heights = np.concatenate([nodes[..., Z].ravel(), *(ground[:, Z] for ground in grounds)])
-    wide, above, side = (_range(v, unit) for v in (nodes[..., X], nodes[..., Y], heights))
+    wide, above, side = (_range(v, robot, unit) for v in (nodes[..., X], nodes[..., Y], heights))
     shifts = {Y: 0.0, Z: above[0] - side[1]}  # of each view along the page
     high = side[0] + shifts[Z], above[1]
     columns, height = _fit(instants, wide, high, figure, height_in=5.5)
@@ -281,7 +283,9 @@ def _profile(nodes: np.ndarray, sample: int, robot: Robot) -> np.ndarray:
 
     It spans the range of all nodes (samples, nodes, 3); y is their mean in one sample.
     """
-    x = np.arange(nodes[..., X].min() - _MARGIN, nodes[..., X].max() + _MARGIN, _PROFILE)
+    scale, x = robot.structure.scale, nodes[..., X]
+    margin = _MARGIN * scale
+    x = np.arange(x.min() - margin, x.max() + margin, _PROFILE * scale)
     y = np.full_like(x, nodes[sample, ..., Y].mean())
     return np.column_stack([x, y, ground_heights(np.column_stack([x, y]), robot.ground)])
 
@@ -309,7 +313,9 @@ def _draw_paths(
         panel.plot(x, np.where(lifted[:, i], z, np.nan), color=_LIFTED, linewidth=1.6)
         panel.plot(x[0], z[0], "o", color="black")
         panel.margins(0.08)
-        least = _MARGIN / 6 / unit.length  # a range even for a node that does not move
+        least = (
+            _MARGIN * robot.structure.scale / 6 / unit.length
+        )  # a range even for a node that does not move
         panel.update_datalim([(-least, z.min()), (least, z.min() + least)])
         name_panel(panel, name)
     panels[0].set_ylabel(f"height ({unit.length_name})")
@@ -327,9 +333,9 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
-def _range(values: np.ndarray, unit: Units) -> Span:
+def _range(values: np.ndarray, robot: Robot, unit: Units) -> Span:
     """Range of coordinates with a margin."""
-    margin = _MARGIN / unit.length
+    margin = _MARGIN * robot.structure.scale / unit.length
     return float(values.min()) - margin, float(values.max()) + margin
 
 

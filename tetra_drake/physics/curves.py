@@ -10,24 +10,26 @@ _SWAY = 2e-3
 """Size (m) of a path that may be swaying on the spot. Such a path counts as straight."""
 
 
-def curvature(points: np.ndarray) -> float:
+def curvature(points: np.ndarray, *, scale: float = 1.0) -> float:
     """Curvature (1/m) of a path: of the circle fitted to its points (k, 2) in m.
 
     The curvature is positive if the path bends to the left, and 0 on a line. Taubin's fit (IEEE
     Trans. PAMI 13, 1991, 1115), with p relative to the mean of the points: the circle is
     bend / (2 size) (p . p - size^2) + normal . p = 0. The unit vector (bend, normal) minimises the
     mean square of the left side. A term is added that keeps the curvature of a path small if the
-    path is hardly larger than _SWAY. For a path of 10 cm the term has no effect.
+    path is hardly larger than _SWAY times `scale`. At a scale of 1 it has no effect on a path of
+    10 cm.
     """
+    sway = scale * _SWAY
     (x, y), count = points.T, len(points)
     x, y = x - x.sum() / count, y - y.sum() / count
     square = x * x + y * y
     size = math.sqrt(square.sum() / count)
-    if size < 1e-3 * _SWAY:
+    if size < 1e-3 * sway:
         return 0.0
     table = np.array([(square - size * size) / (2.0 * size), x, y])
     moments = table @ table.T / count
-    moments[0, 0] += (_SWAY * _SWAY / size) ** 2
+    moments[0, 0] += (sway * sway / size) ** 2
     # (bend, normal) is the eigenvector with the smallest eigenvalue.
     bend, normal_x, normal_y = np.linalg.eigh(moments)[1][:, 0].tolist()
     bend /= size

@@ -117,7 +117,8 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     """Lines with the depth of a robot that sinks in, the nodes that are below the ground at rest,
     and the struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
-    lines, allowed = [], START_DEPTH + robot.weight / robot.scenario.ground.stiffness
+    allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
+    lines = []
     if sinking := robot.sinking_remark():
         lines.append(f"{sinking[0].upper()}{sinking[1:]}.")
     low = study.nodes["z"][study.nodes["z"] < -allowed]

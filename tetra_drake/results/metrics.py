@@ -40,6 +40,7 @@ def compute_metrics(
         path=path.centre[np.searchsorted(path.times, steady_from) :, :2],
         heading=path.heading,
         signals=signals,
+        scale=structure.scale,
         weight=robot.weight,
         actuators=robot.driven.size,
         tally=totals,

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import LENGTH, PASSIVE
@@ -363,3 +364,16 @@ def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
     matrix = stiffness_matrix(robot.model, robot.forces)
     per_radius = np.tile(np.repeat([1.0 / robot.radius, 1.0], 3), len(matrix) // 6)
     return per_radius[:, np.newaxis] * matrix * per_radius
+
+
+def mass_matrix(unactuated: Unactuated) -> np.ndarray:
+    """Mass matrix (6 n, 6 n) at the last computed state. Rotations are scaled by the largest radius
+    of the bodies, so all coordinates are lengths."""
+    model, bodies = unactuated.model, unactuated.model.bodies
+    inertia_W = bodies.inertia if model.isotropic else unactuated.forces.inertia
+    matrix = np.diag(np.repeat(bodies.mass, 6))
+    for body, inertia in enumerate(inertia_W):
+        turning = slice(6 * body, 6 * body + 3)
+        tensor = RotationalInertia(*inertia).CopyToFullMatrix3()
+        matrix[turning, turning] = tensor / bodies.radius.max() ** 2
+    return matrix

@@ -15,11 +15,10 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Grid, Relief
 from tetra_drake.scenario.units import INCH
 
-STEP_AHEAD = 1.0 * INCH
-"""Distance from the robot's foremost contact node to a terrain that begins in front of it."""
-START_DEPTH = 1e-6
-"""Tolerance (m) for the depth of a node in the ground at the start. A node may also be as deep as
-the robot's weight would press it, because a robot may start in equilibrium."""
+STEP_AHEAD, START_DEPTH = 1.0 * INCH, 1e-6
+"""Distance from the foremost contact node to a terrain that begins in front of the robot, and a
+tolerance (m) for the depth of a node in the ground at the start; see Blueprint.scale. A node may
+also be as deep as the robot's weight would press it, because a robot may start in equilibrium."""
 
 
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:
@@ -29,8 +28,8 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     or with a contact node in the ground.
     """
     start = node_positions(structure, structure.initial_state)[structure.contacts]
-    ahead = start[:, 0].max(initial=-np.inf) + STEP_AHEAD  # not used without contact nodes
-    grid = scenario.terrain.grid(ahead=ahead, source=scenario.name)
+    ahead = start[:, 0].max(initial=-np.inf) + STEP_AHEAD * structure.scale  # not used without feet
+    grid = scenario.terrain.grid(ahead=ahead, scale=structure.scale, source=scenario.name)
     surface = make_surface(scenario.ground, scenario.friction, scenario.terrain, grid)
     made = surface.under(
         structure.contacts,
@@ -51,7 +50,7 @@ def make_surface(
 ) -> Ground:
     """The ground with these laws and this terrain, without contact nodes. `grid` has the terrain's
     heights; by default the terrain begins at the origin."""
-    grid = grid or terrain_kind.grid(ahead=0.0, source="make_surface")
+    grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     return Ground.nowhere()._replace(
         normal=np.array(NormalForce(ground.stiffness, ground.damping)),
         friction=friction.law(),
@@ -91,7 +90,7 @@ def _check_start(
         raise InputError(scenario.name, "terrain", problem)
     gaps = ground_frames(start, ground)[:, terrain.GAP] - ground.radius
     weight = float(structure.mass.sum()) * scenario.robot.gravity
-    if gaps.min() < -START_DEPTH - weight / scenario.ground.stiffness:
+    if gaps.min() < -START_DEPTH * structure.scale - weight / scenario.ground.stiffness:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
         found = f"the robot starts with node {node} {shown(-gaps.min(), 'm')} below the ground"
         raise InputError(scenario.name, "terrain", f"{found}; move what is there, or robot.offsets")

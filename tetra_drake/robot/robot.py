@@ -332,7 +332,7 @@ def overlaps(
     distances of their axes, in m. Depths by which the robot's weight presses touching struts do not
     count."""
     struts, contact = structure.strut_table, scenario.strut_contact.law(structure.strut_search)
-    allowed = START_DEPTH
+    allowed = START_DEPTH * structure.scale
     if contact.acts:
         weight = float(structure.mass.sum()) * scenario.robot.gravity
         allowed += weight / NormalForce(*contact.normal).stiffness

@@ -16,6 +16,10 @@ WORLD = -1
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
 
+USUAL_SIZES = 0.1, 1.0
+"""Least and greatest size (m) of robots for which areas of terrain, margins of figures and other
+lengths are chosen. They grow and shrink with other robots. See Blueprint.scale."""
+
 
 @dataclass(frozen=True)
 class Blueprint:
@@ -114,6 +118,12 @@ class Blueprint:
     def p_WN(self) -> np.ndarray:
         """Positions of the nodes (nodes, 3) in the world frame."""
         return np.vstack([self.p_WF, np.zeros(3)])[self.carriers] + self.p_FN
+
+    @property
+    def scale(self) -> float:
+        """Factor on lengths that suit robots of USUAL_SIZES; 1 for these."""
+        size = float(np.ptp(self.p_WN, axis=0).max())
+        return size / min(max(size, USUAL_SIZES[0]), USUAL_SIZES[1]) or 1.0  # a point has no size
 
     @property
     def signals(self) -> int:

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
-from tetra_drake.scenario.quantities import DampingPerLength, Force, Stiffness, Time
+from tetra_drake.scenario.quantities import DampingPerLength, Force, Speed, Stiffness, Time
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Section, Varied
 
@@ -116,6 +116,9 @@ class SimulationSection(Section):
     """Time between samples of a recorded trajectory."""
     control_period: Time = Field(default=0.02, gt=0)
     """Time between actions of a controller. See td.Simulation."""
+    max_speed: Speed | None = Field(default=None, gt=0)
+    """Speed of a body above which a simulation has diverged. If not given, a speed that the energy
+    of fall, cables and actuators cannot give; at least 10.16 m/s."""
 
     @model_validator(mode="after")
     def _check(self) -> SimulationSection:

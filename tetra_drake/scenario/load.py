@@ -40,7 +40,7 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     if not os.path.exists(file):
         raise InputError(name, "", no_such("scenario file", name, shipped_scenarios()))
     scenario = _load(file)
-    scenario.terrain.grid(ahead=0.0, source=file)
+    scenario.terrain.grid(ahead=0.0, scale=scenario.robot.blueprint().scale, source=file)
     return scenario
 
 

@@ -73,6 +73,8 @@ class Walk(Poses):
     """Heading (k,) of the robot during the whole simulation; see robot.path."""
     signals: np.ndarray
     """Signals (k, m) at evenly spaced times from `simulation.steady_from` on."""
+    scale: float
+    """See Blueprint.scale."""
     weight: float
     actuators: int
     """Number of driven cables."""
@@ -127,7 +129,7 @@ def _metric(unit: str, note: str, compute: Callable[[Walk], float], **more: Any)
 
 def _cost_of_transport(walk: Walk) -> float:
     x, y, _ = walk.steady_centre_way.tolist()
-    carried = walk.weight * max(math.hypot(x, y), LEAST_WAY)
+    carried = walk.weight * max(math.hypot(x, y), LEAST_WAY * walk.scale)
     return float(walk.tally.effort.work[0]) / carried if carried else math.inf
 
 
@@ -194,7 +196,7 @@ class Metrics:
     turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
     velocities best, so a change of shape alone does not count."""
     path_curvature: float = _metric(
-        "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path)
+        "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path, scale=walk.scale)
     )
     """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
     the path bends left as seen along the motion, even if the robot walks backward."""

@@ -75,11 +75,12 @@ class Relief(Section):
     def save(self, folder: Path) -> None:
         """Writes the files of the terrain to the folder of a record, under new names."""
 
-    def grid(self, *, ahead: float, source: object) -> Grid:
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         """The heights of the terrain.
 
-        Steps and obstacles without a start begin at x = `ahead` (m). Raises InputError, naming
-        `source` and the key, for more than MOST_CELLS cells.
+        Steps and obstacles without a start begin at x = `ahead` (m). The generated area grows with
+        the robot's `scale`; see Blueprint.scale. Raises InputError, naming `source` and the key,
+        for more than MOST_CELLS cells.
         """
         raise NotImplementedError
 
@@ -93,8 +94,9 @@ class Flat(Relief):
     def plane_slope(self) -> float:
         return 0.0
 
-    def grid(self, *, ahead: float, source: object) -> Grid:
-        return Grid(np.zeros((3, 3)), (-ASIDE, -ASIDE), (ASIDE, ASIDE))
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
+        aside = scale * ASIDE
+        return Grid(np.zeros((3, 3)), (-aside, -aside), (aside, aside))
 
 
 class Nothing(Flat):
@@ -124,9 +126,9 @@ class Incline(Relief):
     def plane_slope(self) -> float:
         return self.slope
 
-    def grid(self, *, ahead: float, source: object) -> Grid:
-        cell = 2.0 * AHEAD, 2.0 * AHEAD  # three heights make a plane one cell wide
-        x, y = _axes(cell, 0.0)
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
+        cell = 2.0 * scale * AHEAD, 2.0 * scale * AHEAD  # three heights make a plane one cell wide
+        x, y = _axes(cell, 0.0, scale)
         return _grid(x, y, math.tan(self.slope) * x, cell)
 
 
@@ -148,13 +150,13 @@ class Steps(Relief):
     start: Length | None = None
     """Coordinate x of the first step; 1 in ahead of the robot if not given."""
 
-    def grid(self, *, ahead: float, source: object) -> Grid:
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         start = ahead if self.start is None else self.start
         quarter, height = 0.25 * self.depth, abs(self.height)
         key, finest = ("height", height) if 0.0 < height < quarter else ("depth", quarter)
-        _check_size((finest, ASIDE), source, key)
-        cell = self.depth / math.ceil(self.depth / finest), ASIDE
-        x, y = _axes(cell, start + 0.5 * cell[0])  # edges midway between two heights
+        _check_size((finest, scale * ASIDE), scale, source, key)
+        cell = self.depth / math.ceil(self.depth / finest), scale * ASIDE
+        x, y = _axes(cell, start + 0.5 * cell[0], scale)  # edges midway between two heights
         risen = np.clip(np.floor((x - start) / self.depth) + 1.0, 0.0, self.count)
         return _grid(x, y, self.height * risen, cell)
 
@@ -176,10 +178,10 @@ class Rough(Relief):
     seed: int = Field(ge=0, default=0)
     """Seed of the random heights. The same seed gives the same ground."""
 
-    def grid(self, *, ahead: float, source: object) -> Grid:
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         half = 0.5 * self.wavelength
-        _check_size((half, half), source, "wavelength")
-        x, y = _axes((half, half), 0.0)
+        _check_size((half, half), scale, source, "wavelength")
+        x, y = _axes((half, half), 0.0, scale)
         generator = np.random.default_rng(self.seed)
         heights = generator.uniform(-2.0 * self.amplitude, 0.0, (len(x), len(y)))
         return _grid(x, y, heights, (half, half))
@@ -205,14 +207,15 @@ class Obstacles(Relief):
     start: Length | None = None
     """Coordinate x where bumps begin; 1 in ahead of the robot if not given."""
 
-    def grid(self, *, ahead: float, source: object) -> Grid:
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         cell, spacing = 0.5 * self.radius, self.spacing
-        _check_size((cell, cell), source, "radius")
-        _check_size((spacing, spacing), source, "spacing")
-        x, y = _axes((cell, cell), 0.0)
+        _check_size((cell, cell), scale, source, "radius")
+        _check_size((spacing, spacing), scale, source, "spacing")
+        x, y = _axes((cell, cell), 0.0, scale)
         start = ahead if self.start is None else self.start
-        first = max(-BEHIND, start + self.radius + 1.5 * cell)  # and its control points
-        squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
+        behind, far, aside = scale * BEHIND, scale * AHEAD, scale * ASIDE
+        first = max(-behind, start + self.radius + 1.5 * cell)  # and its control points
+        squares = np.arange(first, far, spacing), np.arange(-aside, aside, spacing)
         corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
         generator = np.random.default_rng(self.seed)
         centres = corners + spacing * generator.uniform(size=corners.shape)
@@ -249,7 +252,7 @@ class HeightField(Relief):
     def save(self, folder: Path) -> None:
         self.file.save(folder)
 
-    def grid(self, *, ahead: float, source: object) -> Grid:
+    def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         heights = self.file.heights
         x, y = (-0.5 * (size - 1) * self.cell for size in heights.shape)
         return Grid(heights, (x, y), (self.cell, self.cell))
@@ -258,18 +261,19 @@ class HeightField(Relief):
 Terrain = Annotated[Flat | Nothing | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
 
 
-def _check_size(cell: tuple[float, float], source: object, key: str) -> None:
+def _check_size(cell: tuple[float, float], scale: float, source: object, key: str) -> None:
     """Raises InputError that names `key` if cells of this size are too many."""
-    if MOST_CELLS * cell[0] * cell[1] < (BEHIND + AHEAD) * 2.0 * ASIDE:
+    if MOST_CELLS * cell[0] * cell[1] < scale**2 * (BEHIND + AHEAD) * 2.0 * ASIDE:
         problem = f"is too small: cells of {min(cell):.3g} m would be more than {MOST_CELLS}"
         raise InputError(source, f"terrain.{key}", problem)
 
 
-def _axes(cell: tuple[float, float], origin: float) -> tuple[np.ndarray, np.ndarray]:
+def _axes(cell: tuple[float, float], origin: float, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates x and y of a grid that covers the generated area, with a spare cell at each side.
     One x is `origin`."""
-    first, last = math.floor((-BEHIND - origin) / cell[0]), math.ceil((AHEAD - origin) / cell[0])
-    aside = math.ceil(ASIDE / cell[1]) + 1
+    first = math.floor((-scale * BEHIND - origin) / cell[0])
+    last = math.ceil((scale * AHEAD - origin) / cell[0])
+    aside = math.ceil(scale * ASIDE / cell[1]) + 1
     return (
         origin + cell[0] * np.arange(first - 1, last + 2),
         cell[1] * np.arange(-aside, aside + 1.0),

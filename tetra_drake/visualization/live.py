@@ -46,7 +46,7 @@ class LiveView:
         self._due = 0.0
         structure = self._robot.structure
         p_WN = node_positions(structure, structure.initial_state)
-        free = np.array([FREE_FLOOR, 0.0, 0.0])
+        free = np.array([FREE_FLOOR * structure.scale, 0.0, 0.0])
         # The greatest tension is not known yet. The greatest at the start has half of full size.
         cables = structure.cables
         lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)

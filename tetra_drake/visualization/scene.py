@@ -188,9 +188,9 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
     sunk = drawn_radii(robot.structure)[1][contacts] - robot.structure.contact_radius[contacts]
     floor[..., 2] -= max(0.0, sunk.min())
     if ground.flat:
-        _add_slab(meshcat, floor)
+        _add_slab(meshcat, floor, scale=robot.structure.scale)
     else:
-        _add_relief(meshcat, floor)
+        _add_relief(meshcat, floor, scale=robot.structure.scale)
     _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
 
 
@@ -281,25 +281,25 @@ def _mixed(first: str, second: str, share: np.ndarray) -> np.ndarray:
     return _rgb(first) + share[..., np.newaxis] * (_rgb(second) - _rgb(first))
 
 
-def _add_slab(meshcat: Meshcat, floor: np.ndarray) -> None:
+def _add_slab(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
     """Adds a slab; its top is the flat floor (rows, columns, 3), in m."""
-    thickness = 0.002
+    thickness = 0.002 * scale
     width, depth, _ = floor[-1, -1] - floor[0, 0]
     middle = (floor[-1, -1] + floor[0, 0]) / 2
     meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
     meshcat.SetTransform("/floor/slab", RigidTransform(middle - [0.0, 0.0, thickness / 2]))
 
 
-def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
+def _add_relief(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
     """Adds the surface through the points of the floor (rows, columns, 3), with walls around it.
     Higher points are lighter."""
     z = floor[..., 2]
-    share = (z - z.min()) / max(np.ptp(z), 0.1 * INCH)
+    share = (z - z.min()) / max(np.ptp(z), 0.1 * INCH * scale)
     colours = _mixed("low", "high", share)
     around = ((1, 1), (1, 1), (0, 0))
     walls = np.pad(np.ones_like(z), 1) == 0.0
     vertices, colours = np.pad(floor, around, "edge"), np.pad(colours, around, "edge")
-    vertices[walls, 2] = z.min() - _WALL
+    vertices[walls, 2] = z.min() - _WALL * scale
     colours[walls] *= 0.5
     index = np.arange(walls.size, dtype=np.int32).reshape(walls.shape)
     a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()

@@ -13,14 +13,13 @@ from tetra_drake.engines.compiled import loop
 from tetra_drake.engines.compiled.lane_tables import in_lanes, numbers_of, views
 from tetra_drake.engines.compiled.places import LAST, NEXT, ROUND, Memory, Places, advance
 from tetra_drake.engines.compiled.prepared import Prepared
-from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE
 from tetra_drake.physics.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.lanes import FieldArray
@@ -181,7 +180,7 @@ class LaneEngine:
         if prepared is None or status <= loop.DONE:
             return None
         ended = float(self._places.states[place, loop.TIME])
-        failure = _failure(status, time=ended, scenario=prepared.robot.scenario)
+        failure = _failure(status, time=ended, prepared=prepared)
         failure.wall_time = float(self._wall_times[place])
         return failure
 
@@ -222,17 +221,15 @@ class LaneEngine:
         )
 
 
-def _failure(status: int, *, time: float, scenario: Scenario) -> SimulationFailure:
+def _failure(status: int, *, time: float, prepared: Prepared) -> SimulationFailure:
     """The failure of a simulation that ended at a time (s) with this status."""
-    budget = scenario.simulation.max_evaluations
     if status == loop.TOO_MANY_EVALUATIONS:
+        budget = prepared.robot.scenario.simulation.max_evaluations
         reason = f"force evaluations exceed the budget of {budget}"
         return StepBudgetExceeded(time=time, reason=reason)
-    reasons = {
-        loop.TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
-        loop.STEP_TOO_SMALL: "no step is small enough for the tolerance",
-    }
-    return Diverged(time=time, reason=reasons[status])
+    if status == loop.TOO_FAST:
+        return Diverged.too_fast(time=time, limit=float(prepared.constants.max_speed[0]))
+    return Diverged(time=time, reason="no step is small enough for the tolerance")
 
 
 def processor_lanes() -> int:

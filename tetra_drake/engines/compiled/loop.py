@@ -20,7 +20,6 @@ import numpy as np
 from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
-from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics import actuator, contact, oscillator
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
@@ -87,6 +86,8 @@ class Constants(NamedTuple):
     max_step: Table
     look_ahead: Table
     max_evaluations: Table
+    max_speed: Table
+    """Speed limit of the bodies."""
 
 
 class LaneState(NamedTuple):
@@ -287,7 +288,7 @@ def fate(constants: Constants, lanes: LaneState) -> Real:
     for body in range(bodies):
         for k in range(3):
             speed = larger(speed, abs(state[7 * bodies + BLOCK * body + 3 + k]))
-    too_fast = (speed > MAX_SPEED) | (speed != speed)
+    too_fast = (speed > constants.max_speed[0]) | (speed != speed)
     too_many = EVALUATIONS * lanes.clock[TRIED] > constants.max_evaluations[0]
     status = select(too_fast, 1.0 * TOO_FAST, 1.0 * RUNNING)
     status = select(lanes.clock[PLANNED] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)

@@ -21,6 +21,7 @@ from tetra_drake.results.result import motion_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, initial_neurons
 from tetra_drake.robot.signals import sample_count
+from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.allocation import allocate
 
@@ -124,17 +125,18 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         gain=np.array([cpg.gain]),
         period=np.array([cpg.listing_step]),
         samples=np.array([sample_count(robot)], dtype=float),
-        start_up=np.array([cpg.start_up]),
+        start_up=np.array([cpg.start_up]).round(MARK_DECIMALS),  # as its mark
         tolerance=np.array([engine.tolerance]),
         max_step=np.array([max_step]),
         look_ahead=np.array([engine.look_ahead]),
         max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
+        max_speed=np.array([speed_limit(robot)]),
     )
 
 
 def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
     start, signals = allocate(LaneState, sizes_in_lanes(robot, solver)), robot.structure.signals
-    start.tally.begins[0] = steady_start(robot.scenario)
+    start.tally.begins[0] = round(steady_start(robot.scenario), MARK_DECIMALS)
     start.step.state[:] = robot.structure.initial_state
     start.modes[:] = robot.starting_modes
     if len(robot.commanded):
