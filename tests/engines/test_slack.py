@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.command import Command
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.scenario import Scenario
 
 DROP, G = 0.5, 9.80665  # m until the tether of 1 m is taut, m/s^2

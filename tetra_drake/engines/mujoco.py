@@ -20,6 +20,7 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -12,7 +12,7 @@ import numpy as np
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.lane_tables import shared
 from tetra_drake.engines.compiled.loop import Constants, LaneState
-from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation
 from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
