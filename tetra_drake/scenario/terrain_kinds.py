@@ -21,6 +21,8 @@ from tetra_drake.scenario.units import INCH
 
 BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
 """Least reach of generated grids from the origin: backward, forward, sideways; in m."""
+FAR = 1000.0
+"""Reach of an incline, on which a robot may roll, in every direction; in m."""
 MOST_CELLS = 4_000_000
 STEEPEST = math.radians(60.0)
 
@@ -127,7 +129,7 @@ class Incline(Relief):
         return self.slope
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
-        cell = 2.0 * scale * AHEAD, 2.0 * scale * AHEAD  # three heights make a plane one cell wide
+        cell = scale * FAR, scale * FAR  # three heights make a plane one cell wide
         x, y = _axes(cell, 0.0, scale)
         return _grid(x, y, math.tan(self.slope) * x, cell)
 
