@@ -227,12 +227,25 @@ def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
     if not law.acts:
         return
     search = named(capsules.Search, law.search)
-    if capsules.have_moved(nodes, near, search.drift):
+    if any_lane(capsules.largest_move(nodes, near) > search.drift):
         capsules.find_near_struts(robot.struts, law, robot.bodies.radius, state, nodes, near)
     normal = named(contact.NormalForce, law.normal)
     for k in range(near.count[0]):
         i, j = near.pairs[k, 0], near.pairs[k, 1]
         capsules.add_contact_force(robot.struts, normal, nodes, i, j)
+
+
+@inlined
+def time_to_pass(robot: Model, forces: Forces, horizon: Real) -> Real:
+    """Time (s), at most `horizon`, in which no strut can pass through another unseen.
+
+    `forces` must have been computed for the same state.
+    """
+    law = robot.strut_contact
+    if not law.acts:
+        return horizon
+    search = named(capsules.Search, law.search)
+    return capsules.time_to_pass(robot.struts, search, forces.nodes, forces.near_struts, horizon)
 
 
 @compiled
@@ -270,6 +283,18 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_state_forces(robot, state, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+
+
+@compiled
+def longest_step(parts: Parts, state: Table, horizon: float) -> float:
+    """Longest step (s), at most `horizon`, in which no strut can pass through another unseen.
+
+    Also writes nodes.
+    """
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_strut_forces(robot, state, forces)
+    return time_to_pass(robot, forces, horizon)
 
 
 def forces_of_motion(
