@@ -95,8 +95,8 @@ class NearStruts(NamedTuple):
 
     p_WN: Annotated[Table, "strut_nodes", 3, math.inf]
     """Positions (nodes, 3) in m of the nodes at the latest search; infinite before the first."""
-    pairs: Annotated[Table, "strut_pairs", 2, int]
-    """Indices of the two struts of each near pair (pairs, 2)."""
+    pairs: Annotated[Table, "strut_pairs", 4, int]
+    """Indices of the two struts of each near pair, then of their bodies (pairs, 4)."""
     count: Annotated[Table, 1, int]
     """Number of near pairs."""
 
@@ -140,6 +140,7 @@ def find_near_struts(
                 for j in range(struts.first_strut[second], struts.first_strut[second + 1]):
                     if are_near(struts, nodes, i, j, limit):
                         near.pairs[count, 0], near.pairs[count, 1] = i, j
+                        near.pairs[count, 2], near.pairs[count, 3] = first, second
                         count += 1
     near.count[0] = count
     for node in range(near.p_WN.shape[0]):
@@ -182,29 +183,30 @@ def largest_move(nodes: Table, near: NearStruts) -> Real:
 
 @inlined
 def time_to_pass(
-    struts: Struts, search: Search, nodes: Table, near: NearStruts, horizon: Real
+    struts: Struts, search: Search, nodes: Table, near: NearStruts, brief: Real, horizon: Real
 ) -> Real:
-    """Time (s), at most `horizon`, in which no strut can pass through another unseen.
+    """Time (s), at most `horizon`, in which no strut can pass through another unseen, and after
+    which a collision has begun `brief` (s) before at most.
 
-    The nodes' velocities bound the rate at which struts approach. Two struts of a near pair may
-    move by their gap, and by the search's `passage`. Those of other pairs are apart by at least
-    what the nodes may still move before the next search.
+    Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
+    pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
+    least what the nodes may still move before the next search.
     """
-    square = 0.0
+    square, beyond, passed = 0.0, 2.0 * (search.drift - largest_move(nodes, near)), search.passage
     for axis in range(kinematics.V_WN, kinematics.V_WN + 3):
         least = most = nodes[0, axis]
         for node in range(1, near.p_WN.shape[0]):
             least, most = minimum(nodes[node, axis], least), maximum(nodes[node, axis], most)
         square += (most - least) * (most - least)
-    speed = math.sqrt(square)
-    if not any_lane(speed * horizon > search.passage):
-        return horizon
-    gap = 2.0 * (search.drift - largest_move(nodes, near))
+    per_speed = inverse_sqrt(maximum(square, LEAST_SQUARE))
+    time, gap = minimum(horizon, maximum(beyond, 0.0) * per_speed + brief), beyond
     for k in range(near.count[0]):
-        touch = find_touch(struts, nodes, near.pairs[k, 0], near.pairs[k, 1])
+        i, j = near.pairs[k, 0], near.pairs[k, 1]
+        touch = find_touch(struts, nodes, i, j)
+        rate = maximum(depth_rate(struts, nodes, i, j, touch), LEAST_SQUARE)
+        time = minimum(time, abs(touch.depth) / rate + brief)
         gap = minimum(-touch.depth, gap)
-    time = (maximum(gap, 0.0) + search.passage) / maximum(speed, LEAST_SQUARE)
-    return minimum(time, horizon)
+    return minimum(time, (maximum(gap, 0.0) + passed) * per_speed)
 
 
 @inlined

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
@@ -22,7 +23,16 @@ from tetra_drake.physics.vectors import (
 )
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
+from tetra_drake.simd.lanes import (
+    Real,
+    Table,
+    any_lane,
+    inverse_sqrt,
+    maximum,
+    minimum,
+    named,
+    select,
+)
 from tetra_drake.simd.packed import Packed, unpacked
 
 
@@ -53,8 +63,10 @@ def sizes_of(robot: Model) -> dict[str, int]:
     near = capsules.near_sizes(robot.struts)
     if not robot.strut_contact.acts:
         near = dict.fromkeys(near, 0)
+    bodies = len(robot.bodies.mass)
     return near | {
-        "bodies": len(robot.bodies.mass),
+        "touches": min(near["strut_pairs"], 3 * bodies),
+        "bodies": bodies,
         "nodes": len(robot.p_BN),
         "contacts": robot.ground.contacts.size,
         "cables": drivers.size,
@@ -241,11 +253,18 @@ def time_to_pass(robot: Model, forces: Forces, horizon: Real) -> Real:
 
     `forces` must have been computed for the same state.
     """
-    law = robot.strut_contact
+    law, lightest = robot.strut_contact, robot.bodies.mass[0]
     if not law.acts:
         return horizon
+    for body in range(1, robot.bodies.mass.size):
+        lightest = minimum(robot.bodies.mass[body], lightest)
+    normal = named(contact.NormalForce, law.normal)
+    # A bar that is hit at its end gives way like a quarter of its mass.
+    brief = math.sqrt(0.125 * lightest / normal.stiffness)
     search = named(capsules.Search, law.search)
-    return capsules.time_to_pass(robot.struts, search, forces.nodes, forces.near_struts, horizon)
+    return capsules.time_to_pass(
+        robot.struts, search, forces.nodes, forces.near_struts, brief, horizon
+    )
 
 
 @compiled
