@@ -185,8 +185,8 @@ def largest_move(nodes: Table, near: NearStruts) -> Real:
 def time_to_pass(
     struts: Struts, search: Search, nodes: Table, near: NearStruts, brief: Real, horizon: Real
 ) -> Real:
-    """Time (s), at most `horizon`, in which no strut can pass through another unseen, and after
-    which a collision has begun `brief` (s) before at most.
+    """Time (s), at most `horizon`, in which no strut can pass through another unseen, and in which
+    no collision begins, unless it is at most `brief` (s).
 
     Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
     pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
@@ -199,12 +199,12 @@ def time_to_pass(
             least, most = minimum(nodes[node, axis], least), maximum(nodes[node, axis], most)
         square += (most - least) * (most - least)
     per_speed = inverse_sqrt(maximum(square, LEAST_SQUARE))
-    time, gap = minimum(horizon, maximum(beyond, 0.0) * per_speed + brief), beyond
+    time, gap = minimum(horizon, maximum(beyond * per_speed, brief)), beyond
     for k in range(near.count[0]):
         i, j = near.pairs[k, 0], near.pairs[k, 1]
         touch = find_touch(struts, nodes, i, j)
         rate = maximum(depth_rate(struts, nodes, i, j, touch), LEAST_SQUARE)
-        time = minimum(time, abs(touch.depth) / rate + brief)
+        time = minimum(time, maximum(abs(touch.depth) / rate, brief))
         gap = minimum(-touch.depth, gap)
     return minimum(time, (maximum(gap, 0.0) + passed) * per_speed)
 
