@@ -69,7 +69,7 @@ LEAST_SQUARE = 1e-30
 
 
 class Search(NamedTuple):
-    """Distances (m) of the search for near struts."""
+    """Distances (m) of the search for near struts, and what else limits steps near contacts."""
 
     near: Real
     """Distance of the axes of two struts below which the pair is near."""
@@ -77,6 +77,8 @@ class Search(NamedTuple):
     """Distance that a node may move before the next search."""
     passage: Real
     """Distance by which a step may carry a strut into another; see time_to_pass()."""
+    lightest: Real
+    """Least mass (kg) of a body."""
 
 
 class StrutContactLaw(NamedTuple):
@@ -95,8 +97,8 @@ class NearStruts(NamedTuple):
 
     p_WN: Annotated[Table, "strut_nodes", 3, math.inf]
     """Positions (nodes, 3) in m of the nodes at the latest search; infinite before the first."""
-    pairs: Annotated[Table, "strut_pairs", 4, int]
-    """Indices of the two struts of each near pair, then of their bodies (pairs, 4)."""
+    pairs: Annotated[Table, "strut_pairs", 2, int]
+    """Indices of the two struts of each near pair (pairs, 2)."""
     count: Annotated[Table, 1, int]
     """Number of near pairs."""
 
@@ -140,7 +142,6 @@ def find_near_struts(
                 for j in range(struts.first_strut[second], struts.first_strut[second + 1]):
                     if are_near(struts, nodes, i, j, limit):
                         near.pairs[count, 0], near.pairs[count, 1] = i, j
-                        near.pairs[count, 2], near.pairs[count, 3] = first, second
                         count += 1
     near.count[0] = count
     for node in range(near.p_WN.shape[0]):
@@ -183,16 +184,22 @@ def largest_move(nodes: Table, near: NearStruts) -> Real:
 
 @inlined
 def time_to_pass(
-    struts: Struts, search: Search, nodes: Table, near: NearStruts, brief: Real, horizon: Real
+    struts: Struts, law: StrutContactLaw, nodes: Table, near: NearStruts, horizon: Real
 ) -> Real:
     """Time (s), at most `horizon`, in which no strut can pass through another unseen, and in which
-    no collision begins, unless it is at most `brief` (s).
+    no collision begins, unless it is brief against the collision. A force must have been computed
+    for the same `nodes`.
 
     Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
     pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
     least what the nodes may still move before the next search.
     """
-    square, beyond, passed = 0.0, 2.0 * (search.drift - largest_move(nodes, near)), search.passage
+    if not law.acts:
+        return horizon
+    search, normal = named(Search, law.search), named(NormalForce, law.normal)
+    # A bar that is hit at its end gives way like a quarter of its mass, two bars like an eighth.
+    brief = math.sqrt(0.125 * search.lightest / normal.stiffness)
+    square, beyond = 0.0, 2.0 * (search.drift - largest_move(nodes, near))
     for axis in range(kinematics.V_WN, kinematics.V_WN + 3):
         least = most = nodes[0, axis]
         for node in range(1, near.p_WN.shape[0]):
@@ -206,7 +213,7 @@ def time_to_pass(
         rate = maximum(depth_rate(struts, nodes, i, j, touch), LEAST_SQUARE)
         time = minimum(time, maximum(abs(touch.depth) / rate, brief))
         gap = minimum(-touch.depth, gap)
-    return minimum(time, (maximum(gap, 0.0) + passed) * per_speed)
+    return minimum(time, (maximum(gap, 0.0) + search.passage) * per_speed)
 
 
 @inlined
@@ -254,6 +261,12 @@ def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j:
     if not any_lane(touch.depth > 0.0):
         return
     force = normal_force(touch.depth, depth_rate(struts, nodes, i, j, touch), law)
+    push_ends(struts, nodes, i, j, touch, force)
+
+
+@inlined
+def push_ends(struts: Struts, nodes: Table, i: int, j: int, touch: Touch, force: Real) -> None:
+    """Adds a force (N) that pushes struts i and j apart to the forces on their nodes."""
     start_i, end_i, start_j, end_j = touch.gradient
     add_vector(scaled(force, start_i), struts.node_a[i], kinematics.FORCE, nodes)
     add_vector(scaled(force, end_i), struts.node_b[i], kinematics.FORCE, nodes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
@@ -29,7 +28,6 @@ from tetra_drake.simd.lanes import (
     any_lane,
     inverse_sqrt,
     maximum,
-    minimum,
     named,
     select,
 )
@@ -247,26 +245,6 @@ def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
         capsules.add_contact_force(robot.struts, normal, nodes, i, j)
 
 
-@inlined
-def time_to_pass(robot: Model, forces: Forces, horizon: Real) -> Real:
-    """Time (s), at most `horizon`, in which no strut can pass through another unseen.
-
-    `forces` must have been computed for the same state.
-    """
-    law, lightest = robot.strut_contact, robot.bodies.mass[0]
-    if not law.acts:
-        return horizon
-    for body in range(1, robot.bodies.mass.size):
-        lightest = minimum(robot.bodies.mass[body], lightest)
-    normal = named(contact.NormalForce, law.normal)
-    # A bar that is hit at its end gives way like a quarter of its mass.
-    brief = math.sqrt(0.125 * lightest / normal.stiffness)
-    search = named(capsules.Search, law.search)
-    return capsules.time_to_pass(
-        robot.struts, search, forces.nodes, forces.near_struts, brief, horizon
-    )
-
-
 @compiled
 def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> None:
     """Writes the generalized force of all cables (6 bodies,): [t_W; f_W] at each body's origin.
@@ -313,7 +291,8 @@ def longest_step(parts: Parts, state: Table, horizon: float) -> float:
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_strut_forces(robot, state, forces)
-    return time_to_pass(robot, forces, horizon)
+    law, near = robot.strut_contact, forces.near_struts
+    return capsules.time_to_pass(robot.struts, law, forces.nodes, near, horizon)
 
 
 def forces_of_motion(

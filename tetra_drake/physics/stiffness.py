@@ -92,7 +92,7 @@ def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Spri
     near, struts, nodes = forces.near_struts, robot.struts, forces.nodes
     law = contact.NormalForce(*robot.strut_contact.normal)
     ends, stiffness = [], []
-    for i, j in near.pairs[: near.count[0], :2].tolist():
+    for i, j in near.pairs[: near.count[0]].tolist():
         touch = capsules.find_touch(struts, nodes, i, j)
         if touch.depth > 0.0:
             axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]

@@ -310,7 +310,7 @@ def overlaps(
     near, nodes = NearStruts.of(struts), moved_nodes(structure, state)
     find_near_struts(struts, contact, structure.radius, state, nodes, near)
     found = {}
-    for i, j in near.pairs[: near.count[0], :2].tolist():
+    for i, j in near.pairs[: near.count[0]].tolist():
         depth = find_touch(struts, nodes, i, j).depth
         if depth > allowed:
             names = structure.strut_name(i), structure.strut_name(j)

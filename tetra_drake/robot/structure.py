@@ -107,8 +107,12 @@ class Structure(Blueprint):
     def strut_search(self) -> Search:
         """Distances of the search for struts that may touch."""
         skin = SKIN * self.strut_table.length.min()
-        least, most = self.strut_radius.min(), self.strut_radius.max()
-        return Search(near=2.0 * most + skin, drift=0.5 * skin, passage=PASSAGE * least)
+        return Search(
+            near=2.0 * self.strut_radius.max() + skin,
+            drift=0.5 * skin,
+            passage=PASSAGE * self.strut_radius.min(),
+            lightest=self.mass.min(),
+        )
 
     @property
     def radius(self) -> np.ndarray:

@@ -22,8 +22,9 @@ from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics import actuator, contact, oscillator
+from tetra_drake.physics.capsules import time_to_pass
 from tetra_drake.physics.feedback import Senses, sense
-from tetra_drake.physics.forces import Forces, compute_forces, move_robot, time_to_pass
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.model import Model
@@ -266,7 +267,8 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
         robot, lanes.step.state, lanes.acceleration, lanes.modes, lanes.forces, planned
     )
     step = minimum(planned, AIM_FACTOR * change + constants.look_ahead[0])
-    step = time_to_pass(robot, lanes.forces, step)
+    law, nodes, near = robot.strut_contact, lanes.forces.nodes, lanes.forces.near_struts
+    step = time_to_pass(robot.struts, law, nodes, near, step)
     remaining = clock[MARK] - clock[TIME]
     halved = select(2.0 * step > remaining, 0.5 * remaining, step)
     return select(step > remaining - LEAST_STEP, remaining, halved)

@@ -107,7 +107,7 @@ def take_step(
     first = state.size - size
     dynamics.implicit_matrix(robot, solver, modes, forces, scaled, work.lines, work.blocks)
     factorise(work.blocks, solver.schedule)
-    add_touching(robot, solver.schedule, forces, scaled, work.blocks, work.touching, k1)
+    add_touching(robot, solver.schedule, forces, scaled, work.blocks, work.touching)
     if not robot.isotropic:
         for body in range(bodies):
             for c in range(INERTIA_COLUMNS):
