@@ -22,7 +22,6 @@ from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import HeldSignals
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
-from tetra_drake.systems.state_forces import StateForces
 
 _WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies of 1e-3 and above
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; Drake's isolation window is this times the accuracy
@@ -238,9 +237,9 @@ class _StepAimer:
             and settings.look_ahead > 0.0
             and settings.scheme == "radau3"  # other schemes take short steps anyway
         )
-        self._struts: StateForces | None = None
-        if diagram.HasSubsystemNamed("state_forces"):
-            self._struts = diagram.GetSubsystemByName("state_forces")
+        name = "state_forces"
+        touches = diagram.HasSubsystemNamed(name)
+        self._struts = diagram.GetSubsystemByName(name) if touches else None
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
         self._last_velocities = self._acceleration = np.zeros(size)

@@ -202,8 +202,7 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
     takes as much energy from a weakly damped impact at _IMPACT_SPEED, between the middles of
     struts, as the damping that grows with depth."""
     normal = NormalForce(*robot.model.strut_contact.normal)
-    remark = f"the damping of struts is right for impacts at {_IMPACT_SPEED:g} m/s in their middles"
-    model.append(Comment(f" {remark} "))
+    model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
     bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
     pairs = add_element(model, "contact")
     for i, j in itertools.combinations(range(len(bodies)), 2):

@@ -39,7 +39,7 @@ from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator
 from tetra_drake.physics.cable import PASSIVE, Cables
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
-from tetra_drake.physics.forces import Forces, compute_state_forces, pull_of_cable
+from tetra_drake.physics.forces import Forces, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.ground import ground_axes
@@ -124,8 +124,7 @@ class _Simulator:
         self._touches = robot.model.strut_contact.acts
         self.stepped = self.pulled or self._touches
         """True if a law of the other engines computes forces at each step."""
-        struts = robot.model.of_struts
-        self._struts = Packed((struts, Forces.of(struts)))
+        self._struts = Packed((robot.model, Forces.of(robot.model)))
         try:
             text = make_mjcf(robot, pulled=self.pulled, struts_touch=False)
             self._model = mujoco.MjModel.from_xml_string(text)
@@ -181,7 +180,7 @@ class _Simulator:
             velocity, force = data.qvel.reshape(-1, 6), np.empty(data.qvel.size)
             poses, turns = np.hstack([data.xquat, data.xpos])[1:], data.cvel[1:, :3]
             state = np.concatenate([poses.ravel(), np.hstack([turns, velocity[:, :3]]).ravel()])
-            compute_state_forces(self._struts, state, force)
+            compute_strut_forces(self._struts, state, 0.0, force)
             data.xfrc_applied[1:] = np.roll(force.reshape(-1, 6), 3, axis=1)
         if not self.pulled:
             data.ctrl[:] = self._controls(signals[np.newaxis])[0]

@@ -186,9 +186,10 @@ def largest_move(nodes: Table, near: NearStruts) -> Real:
 def time_to_pass(
     struts: Struts, law: StrutContactLaw, nodes: Table, near: NearStruts, horizon: Real
 ) -> Real:
-    """Time (s), at most `horizon`, in which no strut can pass through another unseen, and in which
-    no collision begins, unless it is brief against the collision. A force must have been computed
-    for the same `nodes`.
+    """Time (s), at most `horizon`, within which no strut can pass through another unseen. No
+    collision begins before its end, unless the time is short against the collision.
+
+    The forces must have been computed for the same `nodes`.
 
     Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
     pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
@@ -217,15 +218,17 @@ def time_to_pass(
 
 
 @inlined
-def barrel(axes: Axes, reach: Real) -> tuple[Real, Real]:
-    """Weight w (m²) of the distances of a contact from the middles of both struts, and dw/d(uv).
+def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
+    """Weight w (m²) of the distances of a contact from the middles of both struts, and its first
+    and second derivative by the product uv of the axes.
 
     `reach` (m) is the sum of the radii.
     """
     most = (PARALLEL * BARREL * reach) * (PARALLEL * BARREL * reach)
-    uu_vv = axes.uu * axes.vv
-    square = uu_vv - (1.0 - PARALLEL * PARALLEL) * axes.uv * axes.uv
-    return most * axes.uv * axes.uv / square, 2.0 * most * uu_vv * axes.uv / (square * square)
+    uu_vv, flat = axes.uu * axes.vv, (1.0 - PARALLEL * PARALLEL) * axes.uv * axes.uv
+    square = uu_vv - flat
+    slope = 2.0 * most * uu_vv / (square * square)
+    return most * axes.uv * axes.uv / square, slope * axes.uv, slope * (1.0 + 4.0 * flat / square)
 
 
 @inlined
@@ -240,7 +243,7 @@ def contact_places(axes: Axes, weight: Real) -> tuple[Real, Real]:
 def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
     """Contact of struts i and j."""
     axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]
-    weight, weight_rate = barrel(axes, reach)
+    weight, weight_rate, _ = barrel(axes, reach)
     s, t = contact_places(axes, weight)
     between = vector_between(axes, s, t)
     off_middle = (s - 0.5) * (s - 0.5) + (t - 0.5) * (t - 0.5)

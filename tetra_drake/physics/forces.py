@@ -283,14 +283,16 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
 
 
 @compiled
-def longest_step(parts: Parts, state: Table, horizon: float) -> float:
-    """Longest step (s), at most `horizon`, in which no strut can pass through another unseen.
+def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized: Table) -> float:
+    """Writes the generalized force of touching struts (6 bodies,): [t_W; f_W] at each body's
+    origin. Returns the longest step (s), at most `horizon`; see capsules.time_to_pass().
 
     Also writes nodes.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_strut_forces(robot, state, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
     law, near = robot.strut_contact, forces.near_struts
     return capsules.time_to_pass(robot.struts, law, forces.nodes, near, horizon)
 

@@ -96,10 +96,3 @@ class Model(NamedTuple):
             isotropic=True,
             slack=slack,
         )
-
-    @property
-    def of_struts(self) -> Self:
-        """The model with nothing but bodies and struts that may touch."""
-        return self.of_nodes(self.p_BN, self.first_node)._replace(
-            bodies=self.bodies, struts=self.struts, strut_contact=self.strut_contact
-        )

@@ -123,11 +123,7 @@ def _stiffness_of_touch(
     they move. A place at an end does not move.
     """
     s, t, gradient = touch.s, touch.t, np.concatenate(touch.gradient)
-    weight, by_product = capsules.barrel(axes, reach)
-    uv, flat = axes.uv, 1.0 - capsules.PARALLEL**2
-    square = axes.uu * axes.vv - flat * uv**2
-    most = (capsules.PARALLEL * capsules.BARREL * reach) ** 2
-    second_by_product = 2.0 * most * (axes.uu * axes.vv) * (square + 4.0 * flat * uv**2) / square**3
+    weight, by_product, second_by_product = capsules.barrel(axes, reach)
     u, v, between = np.array(axes.u), np.array(axes.v), np.array(vector_between(axes, s, t))
     to_u, to_v = (np.kron(ends, np.eye(3)) for ends in ([-1, 1, 0, 0], [0, 0, -1, 1]))
     to_between = np.kron([1.0 - s, s, t - 1.0, -t], np.eye(3))
@@ -135,12 +131,9 @@ def _stiffness_of_touch(
     bend = second_by_product * np.outer(product, product)
     bend += by_product * (to_u.T @ to_v + to_v.T @ to_u)
     second = to_between.T @ to_between + 0.5 * ((s - 0.5) ** 2 + (t - 0.5) ** 2) * bend
-    by_place = np.array(
-        [
-            u @ to_between + between @ to_u + by_product * (s - 0.5) * product,
-            -v @ to_between - between @ to_v + by_product * (t - 0.5) * product,
-        ]
-    )
+    by_s = u @ to_between + between @ to_u + by_product * (s - 0.5) * product
+    by_t = -v @ to_between - between @ to_v + by_product * (t - 0.5) * product
+    by_place, uv = np.array([by_s, by_t]), axes.uv
     curvature = np.array([[axes.uu + weight, -uv], [-uv, axes.vv + weight]])
     moves = [0.0 < place < 1.0 for place in (s, t)]
     if any(moves):

@@ -107,12 +107,8 @@ class Structure(Blueprint):
     def strut_search(self) -> Search:
         """Distances of the search for struts that may touch."""
         skin = SKIN * self.strut_table.length.min()
-        return Search(
-            near=2.0 * self.strut_radius.max() + skin,
-            drift=0.5 * skin,
-            passage=PASSAGE * self.strut_radius.min(),
-            lightest=self.mass.min(),
-        )
+        near, passage = 2.0 * self.strut_radius.max() + skin, PASSAGE * self.strut_radius.min()
+        return Search(near, drift=0.5 * skin, passage=passage, lightest=self.mass.min())
 
     @property
     def radius(self) -> np.ndarray:
