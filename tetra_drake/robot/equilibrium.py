@@ -178,8 +178,8 @@ class _Descent:
         self._least = LEAST_STIFFNESS * max(hardest, steepest, np.finfo(float).eps)
         self._doubt = self._least
         if self._robot.forces.near_struts.count.any():
-            # The place where parallel struts touch is rounded more, by their slenderness squared. It
-            # is not quite the nearest one, so that a push has a little stiffness sideways.
+            # The place where parallel struts touch is rounded more, by their slenderness squared.
+            # It is not quite the nearest one, so that a push has a little stiffness sideways.
             struts = self._robot.model.struts
             slenderness = struts.length.max() / (2.0 * BARREL * struts.radius.min())
             pushes = np.abs(self._robot.forces.nodes[:, FORCE : FORCE + 3]).max()

@@ -27,10 +27,10 @@ from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
 class Touching(NamedTuple):
     """Contacts of struts in the implicit matrix; further ones are explicit if these are full."""
 
-    along: Annotated[Table, "touches", "6 * bodies"]
-    """The vectors g."""
-    solved: Annotated[Table, "touches", "6 * bodies"]
-    """The vectors z."""
+    along: Annotated[Table, "6 * touches * bodies"]
+    """The vectors g, one after the other."""
+    solved: Annotated[Table, "6 * touches * bodies"]
+    """The vectors z, one after the other."""
     factor: Annotated[Table, "touches"]
     """The factors w / (1 + w gᵀ z)."""
     spring: Annotated[Table, "touches"]
@@ -66,21 +66,21 @@ def add_touching(
         capsules.push_ends(robot.struts, nodes, i, j, touch, 1.0)
         gather_forces(nodes, robot.first_node, vector)
         for n in range(vector.size):
-            touching.along[last, n] = vector[n]
+            touching.along[last * vector.size + n] = vector[n]
         solve_touching(blocks, schedule, touching, vector)
         for n in range(vector.size):
-            touching.solved[last, n] = vector[n]
+            touching.solved[last * vector.size + n] = vector[n]
         touching.spring[last] = spring
         touching.factor[last] = weight / (1.0 + weight * product(touching.along, last, vector))
         touching.count[0] = last + 1
 
 
 @inlined
-def product(rows: Table, k: int, x: Table) -> Real:
-    """Scalar product of row k and x."""
+def product(vectors: Table, k: int, x: Table) -> Real:
+    """Scalar product of vector k and x."""
     total = 0.0
     for n in range(x.size):
-        total += rows[k, n] * x[n]
+        total += vectors[k * x.size + n] * x[n]
     return total
 
 
@@ -91,7 +91,7 @@ def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Tab
     for k in range(touching.count[0]):
         scale = touching.factor[k] * product(touching.along, k, x)
         for n in range(x.size):
-            x[n] -= scale * touching.solved[k, n]
+            x[n] -= scale * touching.solved[k * x.size + n]
 
 
 @inlined
@@ -100,4 +100,4 @@ def subtract_springs(touching: Touching, factor: Real, k1: Table, k2: Table) -> 
     for k in range(touching.count[0]):
         scale = factor * touching.spring[k] * product(touching.along, k, k1)
         for n in range(k2.size):
-            k2[n] -= scale * touching.along[k, n]
+            k2[n] -= scale * touching.along[k * k2.size + n]
