@@ -210,6 +210,14 @@ def tumbling(dissipation: float) -> Robot:
     return thrown(loose_bars(ACROSS, dissipation=dissipation, duration=0.5), np.array(v_WB))
 
 
+def nearly_parallel(angle: float) -> Robot:
+    """Two bars at an angle, of which one falls on the other, half beyond its end."""
+    x, y = 0.1 * np.cos(angle), 0.1 * np.sin(angle)
+    ends = ((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0)), ((0.1 - x, -y, 0.012), (0.1 + x, y, 0.012))
+    robot = loose_bars(ends, dissipation=0.0, duration=0.2)
+    return thrown(robot, np.array([[0.0] * 6, [0.0, 0.0, 0.0, 0.0, 0.0, -0.5]]))
+
+
 def energy_and_momenta(robot: Robot, state: np.ndarray) -> np.ndarray:
     """(7,): energy of bodies and cables; momentum, and angular momentum about the origin."""
     structure, poses = robot.structure, poses_of(state[np.newaxis])[0]
@@ -225,10 +233,13 @@ def energy_and_momenta(robot: Robot, state: np.ndarray) -> np.ndarray:
 
 DAMPED = {f"robot.cables.{group}.damping": "1 N*s/m" for group in ("bottom", "side", "top")}
 FLYING: dict[str, tuple[Callable[[], Robot], float]] = {
-    "prism": (lambda: flying("prism"), 1e-8),
     "six-bar": (lambda: flying("six_bar"), 1e-8),
     "prism whose cables are damped": (lambda: flying("prism", **DAMPED), np.inf),
-    "bars that touch": (lambda: tumbling(0.0), 1e-3),
+    "bars that touch": (lambda: tumbling(0.0), 1e-4),
+    **{
+        f"bars at {angle} rad": (lambda angle=angle: nearly_parallel(angle), 1e-4)
+        for angle in (0.0, 1e-4, 1e-3, 3e-3, 1e-2, 0.1)
+    },
 }
 
 
@@ -260,6 +271,17 @@ def test_two_bars_rebound_as_hunt_and_crossley_say(dissipation):
     before, after = ends / c - np.log(1.0 + c * ends) / c**2
     assert after == pytest.approx(before, rel=2e-3) and ends[1] < -0.05
     assert v_WB[:, 5].sum() == pytest.approx(-speed, abs=1e-6), "momentum"
+
+
+def test_fast_bars_do_not_pass_through_each_other():
+    for gap in np.linspace(0.02, 0.08, 20):  # begin at all phases of the steps
+        robot = loose_bars([ACROSS[0], ((0.0, -0.1, gap), (0.0, 0.1, gap))], dissipation=1.0)
+        scenario = robot.scenario.with_changes(
+            {"engine": "!Compiled", "simulation.duration": "20 ms"}
+        )
+        v_WB = [[0.0, 0.0, 0.0, 0.0, 0.0, v] for v in (10.0, -10.0)]
+        fast = thrown(dataclasses.replace(robot, scenario=scenario), np.array(v_WB))
+        assert np.diff(poses_of(simulated(fast)[1].states)[-1, :, 6]) > 2.0 * RADIUS
 
 
 def with_drakes_contact(robot: Robot, dissipation: float, duration: float) -> np.ndarray:

@@ -253,6 +253,9 @@ class _StepAimer:
     A mode change also changes the Jacobian. The integrator would keep the old one as long as
     Newton's iterations converge, slowly and with an error of one sign. So we renew the Jacobian,
     unless the next step is shorter than _RENEW_FROM.
+
+    With any scheme, struts that approach limit the step, so that they cannot pass through each
+    other.
     """
 
     def __init__(
@@ -267,6 +270,9 @@ class _StepAimer:
             and settings.look_ahead > 0.0
             and settings.scheme == "radau3"  # other schemes take short steps anyway
         )
+        name = "state_forces"
+        touches = diagram.HasSubsystemNamed(name)
+        self._struts = diagram.GetSubsystemByName(name) if touches else None
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
         self._last_velocities = self._acceleration = np.zeros(size)
@@ -275,6 +281,11 @@ class _StepAimer:
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the length of the next step. Call it after each step."""
+        longest = self._settings.max_step
+        if self._struts is not None:
+            here = self._struts.GetMyContextFromRoot(context)
+            longest = self._struts.LongestStep(here, horizon=longest)
+            self._integrator.set_maximum_step_size(longest)
         if not self._aims:
             return
         step_taken = context.get_time() - self._last_time
@@ -289,7 +300,7 @@ class _StepAimer:
             self._longest, self._jacobian_is_old = _FIRST_STEP, True
         elif self._longest < self._settings.max_step:
             self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
-        step = min(self._settings.max_step, self._longest, self._step_towards(time_to_change))
+        step = min(longest, self._longest, self._step_towards(time_to_change))
         if self._jacobian_is_old and step >= _RENEW_FROM:
             self._renew_jacobian()
         self._integrator.set_maximum_step_size(step)

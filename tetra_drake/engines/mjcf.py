@@ -39,6 +39,7 @@ default 1, nodes are thrown up and chatter."""
 _IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
 """Impedance of contacts. It adds inertia to a contact: the body's mass along the ground, which
 keeps friction stable in long steps, and 1 / _IMPRATIO of the mass along the normal."""
+_IMPACT_SPEED = 1.0  # m/s
 _POINT = 1e-8
 """Radius (m) of the spheres that touch the floor in place of points. Radii of feet are larger by
 it, and the floor is lower."""
@@ -54,10 +55,12 @@ def check_mjcf(scenario: Scenario) -> None:
     scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
 
-def make_mjcf(robot: Robot, *, rest: Array | None = None, pulled: bool = False) -> str:
+def make_mjcf(
+    robot: Robot, *, rest: Array | None = None, pulled: bool = False, struts_touch: bool = True
+) -> str:
     """Model of a robot with a tendon for each cable and a motor for each driven one. If the
     actuators have drives, or if `pulled`, tendons have no law, and a motor for each cable exerts
-    its tension.
+    its tension. Without `struts_touch`, struts pass through each other.
 
     Motors are in the order of their cables; for their names see motor_names(). With a state
     (13 bodies,) at `rest`, there is a key frame of this name. Raises InputError if MuJoCo does not
@@ -83,7 +86,7 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None, pulled: bool = False) 
     _add_bodies(model, world, robot)
     if rest is not None:
         _add_key_frame(model, robot.structure, rest)
-    if robot.model.strut_contact.acts:
+    if robot.model.strut_contact.acts and struts_touch:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
     _add_pushes(model, world, robot.structure)
@@ -200,19 +203,22 @@ def _contact(robot: Robot, mass: float) -> dict:
 
 
 def _add_strut_contacts(model: Element, robot: Robot) -> None:
-    """Adds the contact of all struts of different bodies, without friction."""
+    """Adds the contact of all struts of different bodies, without friction. Its constant damping
+    takes as much energy from a weakly damped impact at _IMPACT_SPEED, between the middles of
+    struts, as the damping that grows with depth."""
     normal = NormalForce(*robot.model.strut_contact.normal)
-    rest_damping = normal.damping * robot.weight / normal.stiffness
+    model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
     bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
     pairs = add_element(model, "contact")
     for i, j in itertools.combinations(range(len(bodies)), 2):
         if bodies[i] == bodies[j]:
             continue
         per_mass = (1.0 / robot.structure.mass[bodies[[i, j]]]).sum()
+        depth = 4.0 / (3.0 * math.pi) * _IMPACT_SPEED / math.sqrt(normal.stiffness * per_mass)
         scale = -(1.0 - _IMPEDANCE) * per_mass
         contact = {
             "condim": "1",
-            "solref": [normal.stiffness * scale, rest_damping * scale],
+            "solref": [normal.stiffness * scale, normal.damping * depth * scale],
             "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
         }
         add_element(pairs, "pair", geom1=f"strut {i}", geom2=f"strut {j}", **contact)

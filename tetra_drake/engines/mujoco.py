@@ -8,7 +8,8 @@ is MuJoCo's soft contact with a friction cone.
   each step. Otherwise cables are MuJoCo's own tendons.
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
   grows with depth. Both agree at the depth of a robot in equilibrium.
-- Contact of struts: capsules with the scenario's stiffness. The damping is constant, too.
+- Contact of struts: the forces are computed by the law of the other engines, from MuJoCo's state
+  at the beginning of each step.
 - Coulomb friction without bristle stiffness is the same law. Robots walk as far as on the other
   engines.
 - The reset integrator does not exist in MuJoCo. A sticking node is held by the scenario's stiction
@@ -38,7 +39,7 @@ from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator
 from tetra_drake.physics.cable import PASSIVE, TENSION, Cables
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NORMAL
-from tetra_drake.physics.forces import pull_of_cable
+from tetra_drake.physics.forces import Forces, compute_strut_forces, pull_of_cable
 from tetra_drake.physics.kinematics import FORCE
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
@@ -56,12 +57,12 @@ from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.packed import Packed
 
 Array = np.ndarray
 
 INSTALL = 'pip install "mujoco>=3.13"'
 
-_FLOOR = 0  # index of the floor's geom
 _STRETCH = 5000  # steps between two checks of stability
 _OBSERVED = 16  # steps from one observation to the next; 1 ms with the default step
 
@@ -147,8 +148,13 @@ class _Simulator:
         self._robot = robot
         self.pulled = is_pulled(robot)
         """True if the law of the other engines computes the tensions at each step."""
+        self._touches = robot.model.strut_contact.acts
+        self.stepped = self.pulled or self._touches
+        """True if a law of the other engines computes forces at each step."""
+        self._struts = Packed((robot.model, Forces.of(robot.model)))
         try:
-            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot, pulled=self.pulled))
+            text = make_mjcf(robot, pulled=self.pulled, struts_touch=False)
+            self._model = mujoco.MjModel.from_xml_string(text)
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
@@ -184,16 +190,25 @@ class _Simulator:
         mujoco.mj_setState(model, data, state, kind)
         for k, row in enumerate(signals):
             mujoco.mj_step1(model, data)
-            self._pull(data, row, drives, self._step)
+            self._push(data, row, drives, self._step)
             mujoco.mj_step2(model, data)
             mujoco.mj_getState(model, data, states[k], kind)
             all_drives[k] = drives
         return states, all_drives
 
-    def _pull(self, data: Any, signals: Array, drives: Array, step: float) -> None:
-        """Sets the tensions of all cables for signals (n,), and advances the drives by a step
-        (s)."""
+    def _push(self, data: Any, signals: Array, drives: Array, step: float) -> None:
+        """Sets the forces between struts and the controls for signals (n,), and advances the drives
+        by a step (s)."""
         robot = self._robot.model
+        if self._touches:
+            velocity, force = data.qvel.reshape(-1, 6), np.empty(data.qvel.size)
+            poses, turns = np.hstack([data.xquat, data.xpos])[1:], data.cvel[1:, :3]
+            state = np.concatenate([poses.ravel(), np.hstack([turns, velocity[:, :3]]).ravel()])
+            compute_strut_forces(self._struts, state, 0.0, force)
+            data.xfrc_applied[1:] = np.roll(force.reshape(-1, 6), 3, axis=1)
+        if not self.pulled:
+            data.ctrl[:] = self._controls(signals[np.newaxis])[0]
+            return
         tensions = data.ctrl[: robot.cables.signal.size]
         pull_cables(
             robot.cables,
@@ -268,18 +283,14 @@ class _Simulator:
         """MuJoCo's contact forces on the nodes along t1, t2 and n (contacts, 3), in N."""
         mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        if self.pulled:
-            mujoco.mj_step1(model, data)
-            self._pull(data, signals, drives.copy(), 0.0)
-        else:
-            data.ctrl[:] = self._controls(signals[np.newaxis])[0]
+        mujoco.mj_step1(model, data)
+        self._push(data, signals, drives.copy(), 0.0)
         mujoco.mj_forward(model, data)
         forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)
-            if contact.geom[0] == _FLOOR:
-                node = self._contact_of_geom[contact.geom[1]]
-                forces[node] += contact.frame.reshape(3, 3).T @ wrench[:3]
+            node = self._contact_of_geom[contact.geom[1]]  # geom 0 is the floor
+            forces[node] += contact.frame.reshape(3, 3).T @ wrench[:3]
         nodes = data.site_xpos[self._contacts]
         axes = ground_axes(nodes, self._robot.ground)
         return (axes @ forces[:, :, None])[:, :, 0]
@@ -345,7 +356,7 @@ class _MujocoWalk:
             for first in range(0, len(signals) - 1, _STRETCH):
                 check_time()
                 some, after = signals[first:-1][:_STRETCH], signals[first + 1 :][:_STRETCH]
-                if simulator.pulled:
+                if simulator.stepped:
                     states, drives = simulator.step_through(self._state, some, self._drives)
                 else:
                     states = simulator.roll_out(rollout, self._state, some)

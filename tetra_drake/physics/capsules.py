@@ -6,10 +6,21 @@ friction. The law is the one of the ground, Hunt and Crossley's; see contact.nor
 
 The nearest points of two axes jump from end to end as the axes become parallel. Real struts touch
 along a line then, and the pressure moves along it within a small angle. So does the contact here:
-below the angle PARALLEL it moves to the middle of the stretch where the struts are side by side.
+nearly parallel struts count as slightly thicker in the middle. The distance D of two struts is
+
+    D² = min |r + s u - t v|² + w ((s - 1/2)² + (t - 1/2)²)
+
+over the places s and t, 0 to 1, on the axes u and v, whose starts are r apart. The weight w is
+(BARREL reach)² at the angle 0, with the sum of the radii as reach; half of it at the angle
+PARALLEL; and 0 if the struts are perpendicular:
+
+    w = (BARREL reach)² / (1 + tan² / PARALLEL²)
+
+So D differs from the distance of the axes by at most 1 % of the reach. The force is the gradient of
+an energy, k (reach - D)² / 2: without dissipation, struts keep the energy at any angle.
 
 Most struts are far from each other. Pairs that are near are found anew when a node has moved by
-half the difference between `near` and the largest distance of axes that touch. The forces do not
+a quarter of the difference between `near` and the largest distance of axes that touch. The forces do not
 depend on when that was, because other pairs exert none.
 """
 
@@ -29,9 +40,10 @@ from tetra_drake.physics.struts import (
     axes_of,
     may_be_nearer,
     midpoint,
+    nearest_on_line,
     nearest_on_struts,
     origin,
-    share,
+    strut_distance,
     vector_between,
 )
 from tetra_drake.physics.vectors import (
@@ -40,28 +52,33 @@ from tetra_drake.physics.vectors import (
     difference,
     dot,
     scaled,
-    subtract_vector,
     sum_of,
     vector_at,
 )
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named
+from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum, minimum, named
 
 PARALLEL = 0.01
-"""Angle (rad) of two struts at which their contact is halfway between the nearest points and the
-middle. A strut of 0.5 m that is pressed by 0.4 mm touches along its length up to this angle."""
+"""Angle (rad) of two struts below which they count as thicker in the middle."""
+BARREL = 0.2
+"""Weight of the distances of a contact from the middles of parallel struts, as a share of the sum
+of the radii. At the ends of both struts this sum is smaller by BARREL² / 4, that is 1 %."""
 LEAST_SQUARE = 1e-30
 """Lower limit (m²) of squared distances, for axes that meet. The force is zero there."""
 
 
 class Search(NamedTuple):
-    """Distances (m) of the search for near struts."""
+    """Distances (m) of the search for near struts, and what else limits steps near contacts."""
 
     near: Real
     """Distance of the axes of two struts below which the pair is near."""
     drift: Real
     """Distance that a node may move before the next search."""
+    passage: Real
+    """Distance by which a step may carry a strut into another; see time_to_pass()."""
+    lightest: Real
+    """Least mass (kg) of a body."""
 
 
 class StrutContactLaw(NamedTuple):
@@ -139,10 +156,11 @@ class Touch(NamedTuple):
     """Place on the first axis, 0 at its start, 1 at its end."""
     t: Real
     """Place on the second axis."""
-    direction: Vector
-    """Unit vector from the second place to the first."""
     depth: Real
     """Depth (m) of the overlap; negative if the struts are apart."""
+    gradient: tuple[Vector, Vector, Vector, Vector]
+    """Derivatives of the distance by the positions of the ends: start and end of the first axis,
+    then of the second."""
 
 
 @inlined
@@ -151,8 +169,7 @@ def are_near(struts: Struts, nodes: Table, i: int, j: int, limit: Real) -> bool:
     offset = difference(midpoint(struts, nodes, i), midpoint(struts, nodes, j))
     if not may_be_nearer(offset, 0.5 * (struts.length[i] + struts.length[j]), limit):
         return False
-    reach = struts.radius[i] + struts.radius[j]
-    return any_lane(reach - find_touch(struts, nodes, i, j).depth <= limit)
+    return any_lane(strut_distance(struts, nodes, i, j) <= limit)
 
 
 @inlined
@@ -166,53 +183,107 @@ def have_moved(nodes: Table, near: NearStruts, drift: Real) -> bool:
 
 
 @inlined
-def contact_places(axes: Axes) -> tuple[Real, Real]:
-    """Places on both axes, 0 to 1, between which two struts touch.
+def time_to_pass(
+    struts: Struts, law: StrutContactLaw, nodes: Table, near: NearStruts, horizon: Real
+) -> Real:
+    """Time (s), at most `horizon`, within which no strut can pass through another unseen. No
+    collision begins before its end, unless the time is short against the collision.
 
-    They are the nearest ones, unless the struts are nearly parallel.
+    The forces must have been computed for the same `nodes`.
+
+    Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
+    pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
+    least half of the difference of `near` and the largest distance that touches, whenever the
+    latest search was: so a robot moves alike, whatever others move in the lanes beside it.
     """
-    uu_vv = axes.uu * axes.vv
-    begin = share(-axes.ur / axes.uu)
-    end = share((axes.uv - axes.ur) / axes.uu)
-    smoothing = PARALLEL * PARALLEL * uu_vv
-    nearest = axes.uv * axes.vr - axes.ur * axes.vv
-    square_of_sine = uu_vv - axes.uv * axes.uv
-    s = (nearest + smoothing * 0.5 * (begin + end)) / (square_of_sine + smoothing)
-    return nearest_on_struts(axes, s)
+    if not law.acts:
+        return horizon
+    search, normal = named(Search, law.search), named(NormalForce, law.normal)
+    # A bar that is hit at its end gives way like a quarter of its mass, two bars like an eighth.
+    brief = math.sqrt(0.125 * search.lightest / normal.stiffness)
+    square, beyond = 0.0, 2.0 * search.drift
+    for axis in range(kinematics.V_WN, kinematics.V_WN + 3):
+        least = most = nodes[0, axis]
+        for node in range(1, near.p_WN.shape[0]):
+            least, most = minimum(nodes[node, axis], least), maximum(nodes[node, axis], most)
+        square += (most - least) * (most - least)
+    per_speed = inverse_sqrt(maximum(square, LEAST_SQUARE))
+    time, gap = minimum(horizon, maximum(beyond * per_speed, brief)), beyond
+    for k in range(near.count[0]):
+        i, j = near.pairs[k, 0], near.pairs[k, 1]
+        touch = find_touch(struts, nodes, i, j)
+        rate = maximum(depth_rate(struts, nodes, i, j, touch), LEAST_SQUARE)
+        time = minimum(time, maximum(abs(touch.depth) / rate, brief))
+        gap = minimum(-touch.depth, gap)
+    return minimum(time, (maximum(gap, 0.0) + search.passage) * per_speed)
 
 
 @inlined
-def place_on(nodes: Table, a: int, b: int, column: int, s: Real) -> Vector:
-    """Vector in three columns of the table `nodes`, at the place s, 0 to 1, from node a to b."""
-    at_a, at_b = vector_at(nodes, a, column), vector_at(nodes, b, column)
-    return sum_of(at_a, scaled(s, difference(at_b, at_a)))
+def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
+    """Weight w (m²) of the distances of a contact from the middles of both struts, and its first
+    and second derivative by the product uv of the axes.
+
+    `reach` (m) is the sum of the radii.
+    """
+    most = (PARALLEL * BARREL * reach) * (PARALLEL * BARREL * reach)
+    uu_vv, flat = axes.uu * axes.vv, (1.0 - PARALLEL * PARALLEL) * axes.uv * axes.uv
+    square = uu_vv - flat
+    slope = 2.0 * most * uu_vv / (square * square)
+    return most * axes.uv * axes.uv / square, slope * axes.uv, slope * (1.0 + 4.0 * flat / square)
+
+
+@inlined
+def contact_places(axes: Axes, weight: Real) -> tuple[Real, Real]:
+    """Places on both axes, 0 to 1, between which two struts touch, by the weight of barrel()."""
+    half, uu, vv = 0.5 * weight, axes.uu + weight, axes.vv + weight
+    thicker = Axes(axes.u, axes.v, axes.r, uu, vv, axes.uv, axes.ur - half, axes.vr + half)
+    return nearest_on_struts(thicker, nearest_on_line(thicker))
 
 
 @inlined
 def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
-    """Place, direction and depth of the contact of struts i and j."""
-    axes = axes_of(struts, nodes, i, j)
-    s, t = contact_places(axes)
+    """Contact of struts i and j."""
+    axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]
+    weight, weight_rate, _ = barrel(axes, reach)
+    s, t = contact_places(axes, weight)
     between = vector_between(axes, s, t)
-    square = dot(between, between)
+    off_middle = (s - 0.5) * (s - 0.5) + (t - 0.5) * (t - 0.5)
+    square = dot(between, between) + weight * off_middle
     per_distance = inverse_sqrt(maximum(square, LEAST_SQUARE))
-    depth = struts.radius[i] + struts.radius[j] - square * per_distance
-    return Touch(s, t, scaled(per_distance, between), depth)
+    direction = scaled(per_distance, between)
+    turn = 0.5 * off_middle * weight_rate * per_distance
+    by_u = sum_of(scaled(s, direction), scaled(turn, axes.v))
+    by_v = difference(scaled(turn, axes.u), scaled(t, direction))
+    starts = difference(direction, by_u), scaled(-1.0, sum_of(direction, by_v))
+    return Touch(s, t, reach - square * per_distance, (starts[0], by_u, starts[1], by_v))
 
 
 @inlined
 def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j: int) -> None:
     """Adds the force between two struts to the forces on their nodes."""
-    s, t, direction, depth = find_touch(struts, nodes, i, j)
-    if not any_lane(depth > 0.0):
+    touch = find_touch(struts, nodes, i, j)
+    if not any_lane(touch.depth > 0.0):
         return
-    a_i, b_i, a_j, b_j = struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]
-    v_i = place_on(nodes, a_i, b_i, kinematics.V_WN, s)
-    v_j = place_on(nodes, a_j, b_j, kinematics.V_WN, t)
-    depth_rate = dot(difference(v_j, v_i), direction)
-    force = scaled(normal_force(depth, depth_rate, law), direction)
-    # A force on a rigid strut, between its nodes, has the effect of its shares on the nodes.
-    add_vector(scaled(1.0 - s, force), a_i, kinematics.FORCE, nodes)
-    add_vector(scaled(s, force), b_i, kinematics.FORCE, nodes)
-    subtract_vector(scaled(1.0 - t, force), a_j, kinematics.FORCE, nodes)
-    subtract_vector(scaled(t, force), b_j, kinematics.FORCE, nodes)
+    force = normal_force(touch.depth, depth_rate(struts, nodes, i, j, touch), law)
+    push_ends(struts, nodes, i, j, touch, force)
+
+
+@inlined
+def push_ends(struts: Struts, nodes: Table, i: int, j: int, touch: Touch, force: Real) -> None:
+    """Adds a force (N) that pushes struts i and j apart to the forces on their nodes."""
+    start_i, end_i, start_j, end_j = touch.gradient
+    add_vector(scaled(force, start_i), struts.node_a[i], kinematics.FORCE, nodes)
+    add_vector(scaled(force, end_i), struts.node_b[i], kinematics.FORCE, nodes)
+    add_vector(scaled(force, start_j), struts.node_a[j], kinematics.FORCE, nodes)
+    add_vector(scaled(force, end_j), struts.node_b[j], kinematics.FORCE, nodes)
+
+
+@inlined
+def depth_rate(struts: Struts, nodes: Table, i: int, j: int, touch: Touch) -> Real:
+    """Rate (m/s) of the depth of the contact of struts i and j."""
+    start_i, end_i, start_j, end_j = touch.gradient
+    rate_i = dot(start_i, vector_at(nodes, struts.node_a[i], kinematics.V_WN))
+    rate_i += dot(end_i, vector_at(nodes, struts.node_b[i], kinematics.V_WN))
+    rate_j = dot(start_j, vector_at(nodes, struts.node_a[j], kinematics.V_WN))
+    rate_j += dot(end_j, vector_at(nodes, struts.node_b[j], kinematics.V_WN))
+    return -(rate_i + rate_j)

@@ -8,13 +8,10 @@ from tetra_drake.physics.kinematics import P_WN
 from tetra_drake.physics.struts import (
     MARGIN,
     Struts,
-    axes_of,
     may_be_nearer,
     midpoint,
-    nearest_on_line,
-    nearest_on_struts,
     origin,
-    vector_between,
+    strut_distance,
 )
 from tetra_drake.physics.vectors import Vector, difference, dot, vector_at
 from tetra_drake.simd.compiling import inlined
@@ -74,12 +71,3 @@ def nearest_strut(struts: Struts, nodes: Table, a: int, body: int, least: Real) 
         if may_be_nearer(offset, 0.5 * (struts.length[a] + struts.length[b]), least):
             least = minimum(least, strut_distance(struts, nodes, a, b))
     return least
-
-
-@inlined
-def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
-    """Distance (m) between the axes of two struts."""
-    axes = axes_of(struts, nodes, i, j)
-    s, t = nearest_on_struts(axes, nearest_on_line(axes))
-    between = vector_between(axes, s, t)
-    return math.sqrt(dot(between, between))

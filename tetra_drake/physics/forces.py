@@ -22,7 +22,15 @@ from tetra_drake.physics.vectors import (
 )
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
+from tetra_drake.simd.lanes import (
+    Real,
+    Table,
+    any_lane,
+    inverse_sqrt,
+    maximum,
+    named,
+    select,
+)
 from tetra_drake.simd.packed import Packed, unpacked
 
 
@@ -53,8 +61,10 @@ def sizes_of(robot: Model) -> dict[str, int]:
     near = capsules.near_sizes(robot.struts)
     if not robot.strut_contact.acts:
         near = dict.fromkeys(near, 0)
+    bodies = len(robot.bodies.mass)
     return near | {
-        "bodies": len(robot.bodies.mass),
+        "touches": min(near["strut_pairs"], 3 * bodies),
+        "bodies": bodies,
         "nodes": len(robot.p_BN) + robot.ground.rows,
         "contacts": robot.ground.contacts.size,
         "cables": drivers.size,
@@ -280,6 +290,21 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_state_forces(robot, state, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+
+
+@compiled
+def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized: Table) -> float:
+    """Writes the generalized force of touching struts (6 bodies,): [t_W; f_W] at each body's
+    origin. Returns the longest step (s), at most `horizon`; see capsules.time_to_pass().
+
+    Also writes nodes.
+    """
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_strut_forces(robot, state, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+    law, near = robot.strut_contact, forces.near_struts
+    return capsules.time_to_pass(robot.struts, law, forces.nodes, near, horizon)
 
 
 def forces_of_motion(

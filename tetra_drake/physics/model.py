@@ -92,7 +92,7 @@ class Model(NamedTuple):
             loads=NodeLoads(no_index, no_vectors),
             bodies=Bodies(np.zeros(bodies), np.zeros((bodies, 6)), *np.zeros((2, bodies))),
             struts=Struts(no_index, no_index, first, none, none),
-            strut_contact=StrutContactLaw(acts=False, normal=np.zeros(2), search=np.zeros(2)),
+            strut_contact=StrutContactLaw(acts=False, normal=np.zeros(2), search=np.zeros(4)),
             isotropic=True,
             slack=slack,
         )

@@ -1,13 +1,11 @@
 """Stiffness matrix of a robot at rest: second derivatives of its potential energy.
 
-They are exact, except where nearly parallel struts touch. Finite differences of forces lose half of
-the digits, which hides the softest motions of a robot that is a billion times as stiff in other
-directions.
+They are exact. Finite differences of forces lose half of the digits, which hides the softest
+motions of a robot that is a billion times as stiff in other directions.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +14,7 @@ from tetra_drake.physics import cable, capsules, contact, kinematics
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.rigid_motions import rigid_motions
+from tetra_drake.physics.struts import Axes, axes_of, vector_between
 
 WORLD = -1
 """Index of the world among the bodies."""
@@ -96,10 +95,8 @@ def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Spri
     for i, j in near.pairs[: near.count[0]].tolist():
         touch = capsules.find_touch(struts, nodes, i, j)
         if touch.depth > 0.0:
-            axes = capsules.axes_of(struts, nodes, i, j)
-            distance = struts.radius[i] + struts.radius[j] - touch.depth
-            distance = max(distance, math.sqrt(capsules.LEAST_SQUARE))  # as in find_touch()
-            stiffness.append(_stiffness_of_touch(touch, axes, distance, law.stiffness))
+            axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]
+            stiffness.append(_stiffness_of_touch(touch, axes, reach, law.stiffness))
             ends.append([struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]])
     of_touch = np.array(ends, dtype=int).reshape(-1, 4)
     p_BN_W = nodes[of_touch, kinematics.P_BN_W : kinematics.P_BN_W + 3]
@@ -116,25 +113,36 @@ def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Spri
 
 
 def _stiffness_of_touch(
-    touch: capsules.Touch, axes: capsules.Axes, distance: float, stiffness: float
+    touch: capsules.Touch, axes: Axes, reach: float, stiffness: float
 ) -> np.ndarray:
     """Second derivatives (12, 12) of the energy of a contact of struts, with respect to the
-    displacements of their ends. The contact moves along the struts, unless it is at an end."""
-    n, u, v = np.array(touch.direction), np.array(axes.u), np.array(axes.v)
-    shares = np.array([1.0 - touch.s, touch.s, touch.t - 1.0, -touch.t])
-    sideways = (np.eye(3) - np.outer(n, n)) / distance
-    bend = np.kron(np.outer(shares, shares), sideways)
-    moves = [0.0 < place < 1.0 for place in (touch.s, touch.t)]
+    displacements of their ends. `reach` (m) is the sum of the radii.
+
+    Half the squared distance, D² / 2, is the minimum of a function of the places s and t; see
+    physics.capsules. Its second derivatives are those at fixed places, less what the places gain as
+    they move. A place at an end does not move.
+    """
+    s, t, gradient = touch.s, touch.t, np.concatenate(touch.gradient)
+    weight, by_product, second_by_product = capsules.barrel(axes, reach)
+    u, v, between = np.array(axes.u), np.array(axes.v), np.array(vector_between(axes, s, t))
+    to_u, to_v = (np.kron(ends, np.eye(3)) for ends in ([-1, 1, 0, 0], [0, 0, -1, 1]))
+    to_between = np.kron([1.0 - s, s, t - 1.0, -t], np.eye(3))
+    product = v @ to_u + u @ to_v  # the change of uv
+    bend = second_by_product * np.outer(product, product)
+    bend += by_product * (to_u.T @ to_v + to_v.T @ to_u)
+    second = to_between.T @ to_between + 0.5 * ((s - 0.5) ** 2 + (t - 0.5) ** 2) * bend
+    by_s = u @ to_between + between @ to_u + by_product * (s - 0.5) * product
+    by_t = -v @ to_between - between @ to_v + by_product * (t - 0.5) * product
+    by_place, uv = np.array([by_s, by_t]), axes.uv
+    curvature = np.array([[axes.uu + weight, -uv], [-uv, axes.vv + weight]])
+    moves = [0.0 < place < 1.0 for place in (s, t)]
     if any(moves):
-        along = np.array([u, -v])
-        by_place = np.kron(shares, along @ sideways)
-        by_place += np.kron([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]], n)
-        curvature = along @ sideways @ along.T
-        curvature[0, 0] += capsules.PARALLEL**2 * axes.uu / distance
         by_place, curvature = by_place[moves], curvature[moves][:, moves]
-        bend -= by_place.T @ np.linalg.solve(curvature, by_place)
-    nearer = np.kron(shares, n)
-    return stiffness * (np.outer(nearer, nearer) - touch.depth * bend)
+        second -= by_place.T @ np.linalg.solve(curvature, by_place)
+    # The energy is k d² / 2 with the depth d = reach - D.
+    steep = np.outer(gradient, gradient)
+    distance = max(reach - touch.depth, capsules.LEAST_SQUARE**0.5)  # as in find_touch()
+    return stiffness * (steep - touch.depth / distance * (second - steep))
 
 
 def _add_springs(springs: Springs, blocks: np.ndarray) -> None:

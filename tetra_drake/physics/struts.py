@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from tetra_drake.physics.kinematics import P_WN
@@ -81,6 +82,15 @@ def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
 def vector_between(axes: Axes, s: Real, t: Real) -> Vector:
     """Vector (m) from the place t on the second axis to the place s on the first."""
     return difference(sum_of(axes.r, scaled(s, axes.u)), scaled(t, axes.v))
+
+
+@inlined
+def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
+    """Distance (m) between the axes of two struts."""
+    axes = axes_of(struts, nodes, i, j)
+    s, t = nearest_on_struts(axes, nearest_on_line(axes))
+    between = vector_between(axes, s, t)
+    return math.sqrt(dot(between, between))
 
 
 @inlined

@@ -13,7 +13,7 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import LENGTH, PASSIVE
-from tetra_drake.physics.capsules import PARALLEL
+from tetra_drake.physics.capsules import BARREL, PARALLEL
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.forces import Forces, Parts, compute_forces, move_robot
 from tetra_drake.physics.kinematics import FORCE, P_WN, move_bodies
@@ -179,11 +179,13 @@ class _Descent:
         self._least = LEAST_STIFFNESS * max(hardest, steepest, np.finfo(float).eps)
         self._doubt = self._least
         if self._robot.forces.near_struts.count.any():
-            # The place where nearly parallel struts touch is rounded 1 / PARALLEL² times as much.
+            # The place where parallel struts touch is rounded more, by their slenderness squared.
             # It is not quite the nearest one, so that a push has a little stiffness sideways.
+            struts = self._robot.model.struts
+            slenderness = struts.length.max() / (2.0 * BARREL * struts.radius.min())
             pushes = np.abs(self._robot.forces.nodes[:, FORCE : FORCE + 3]).max()
-            self._rounding += ROUNDING / PARALLEL**2 * pushes
-            self._doubt += 10.0 * PARALLEL**2 * pushes / self._robot.model.struts.radius.min()
+            self._rounding += ROUNDING * slenderness**2 * pushes
+            self._doubt += 10.0 * PARALLEL**2 * pushes / struts.radius.min()
 
     def is_balanced(self) -> bool:
         """True if no force is left, except for rounding errors."""

@@ -37,6 +37,9 @@ PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0
 SKIN = 0.05
 """Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
 pairs are near; with a smaller one, near pairs are searched more often."""
+PASSAGE = 0.5
+"""Distance that a step may carry a strut into another, as a share of the least radius. Struts pass
+through each other at four times this distance."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,8 @@ class Structure(Blueprint):
     def strut_search(self) -> Search:
         """Distances of the search for struts that may touch."""
         skin = SKIN * self.strut_table.length.min()
-        return Search(near=2.0 * self.strut_radius.max() + skin, drift=0.5 * skin)
+        near, passage = 2.0 * self.strut_radius.max() + skin, PASSAGE * self.strut_radius.min()
+        return Search(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
 
     @property
     def radius(self) -> np.ndarray:

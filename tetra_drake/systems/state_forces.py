@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics.forces import Forces, compute_state_forces
+from tetra_drake.physics.forces import Forces, compute_state_forces, compute_strut_forces
 from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
@@ -20,18 +20,28 @@ class StateForces(LeafSystem):
     | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin        |
 
     See `physics.capsules` and `physics.node_forces`. The forces are continuous, so no step has to
-    end where struts begin to touch.
+    end where struts begin to touch. But long steps could carry struts through each other.
     """
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         bodies = len(robot.structure.bodies)
         self._parts = Packed((robot.model, Forces.of(robot.model)))
-        state, force = np.empty(13 * bodies), np.empty(6 * bodies)
-        self._compute = machine_code(compute_state_forces, self._parts, state, force)
+        state, self._force = np.empty(13 * bodies), np.empty(6 * bodies)
+        self._compute = machine_code(compute_state_forces, self._parts, state, self._force)
+        self._touch = machine_code(compute_strut_forces, self._parts, state, 0.0, self._force)
         self._state = self.DeclareVectorInputPort("state", state.size)
         sources = {self._state.ticket()}
-        self.DeclareVectorOutputPort("generalized_force", force.size, self._calc_force, sources)
+        self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
+
+    def LongestStep(self, context: Context, *, horizon: float) -> float:
+        """Longest step (s), at most `horizon`, that cannot carry a strut through another.
+
+        Args:
+            context: the system's context.
+            horizon: upper limit (s).
+        """
+        return self._touch(self._parts, self._state.Eval(context), horizon, self._force)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._compute(self._parts, self._state.Eval(context), output.get_mutable_value())

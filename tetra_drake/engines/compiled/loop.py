@@ -21,6 +21,7 @@ from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics import actuator, contact, oscillator
+from tetra_drake.physics.capsules import time_to_pass
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
@@ -258,7 +259,8 @@ def move_on(lanes: LaneState, is_running: Truth, accepted: Truth) -> None:
 @merged
 def aim(constants: Constants, lanes: LaneState) -> Real:
     """Length (s) of the step to try: the planned one, or less. A near mode change or mark shortens
-    it: the step ends just after the mode change, at the mark, or halfway to the mark."""
+    it: the step ends just after the mode change, at the mark, or halfway to the mark. Near struts
+    that approach shorten it so that they cannot pass through each other."""
     robot, clock = constants.robot, lanes.clock
     accelerate(robot, lanes.forces.inertia, lanes.step.force, lanes.acceleration)
     planned = clock[PLANNED]
@@ -266,6 +268,8 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
         robot, lanes.step.state, lanes.acceleration, lanes.modes, lanes.forces, planned
     )
     step = minimum(planned, AIM_FACTOR * change + constants.look_ahead[0])
+    law, nodes, near = robot.strut_contact, lanes.forces.nodes, lanes.forces.near_struts
+    step = time_to_pass(robot.struts, law, nodes, near, step)
     remaining = clock[MARK] - clock[TIME]
     halved = select(2.0 * step > remaining, 0.5 * remaining, step)
     return select(step > remaining - LEAST_STEP, remaining, halved)

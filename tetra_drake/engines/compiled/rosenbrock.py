@@ -15,8 +15,12 @@ are the rates of the velocities v. The rates of the positions are explicit:
     q2 = v + h k1 - 2 q1 + γ h k2
 
 A contains the stiff terms: dampings (a symmetric matrix with a block for each pair of bodies joined
-by cables) and the stiffness of contacts and anchors. A new law with stiffness needs no Jacobian; a
-new law with damping must return dT/d(dl/dt).
+by cables) and the stiffness of contacts, also of struts, and of anchors. A new law with stiffness
+needs no Jacobian; a new law with damping must return dT/d(dl/dt).
+
+In stage 2, the stiffness K of struts that touch adds -γ h² (1 - 2 γ) K k1 on the right-hand side,
+the rest of γ h A k2 beside its part in the matrix. Without it, stiff contacts that hardly dissipate
+would never come to rest.
 
 The term df/dt is a difference of forces along the motion. It contains the effect of signals, and of
 positions as far as A lacks it. Without df/dt, the method would be of order 1 where damping
@@ -33,7 +37,13 @@ import math
 from typing import Annotated, NamedTuple
 
 from tetra_drake.engines.compiled import dynamics
-from tetra_drake.engines.compiled.block_sparse import BLOCK, factorise, solve
+from tetra_drake.engines.compiled.block_sparse import BLOCK, factorise
+from tetra_drake.engines.compiled.touching import (
+    Touching,
+    add_touching,
+    solve_touching,
+    subtract_springs,
+)
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.inertia import INERTIA_COLUMNS
 from tetra_drake.physics.kinematics import P_BN_W, move_bodies
@@ -64,6 +74,8 @@ class Step(NamedTuple):
     """Mean rate of the positions, 3/2 q1 + 1/2 q2."""
     blocks: Annotated[Table, "blocks", BLOCK, BLOCK]
     """Implicit matrix; see block_sparse."""
+    touching: Touching
+    """Contacts of struts in the implicit matrix."""
     lines: Annotated[Table, dynamics.CABLES_AT_ONCE, dynamics.LINE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Inertia at the beginning of the step."""
@@ -95,6 +107,7 @@ def take_step(
     first = state.size - size
     dynamics.implicit_matrix(robot, solver, state, modes, forces, scaled, work.lines, work.blocks)
     factorise(work.blocks, solver.schedule)
+    add_touching(robot, solver.schedule, forces, scaled, work.blocks, work.touching)
     if not robot.isotropic:
         for body in range(bodies):
             for c in range(INERTIA_COLUMNS):
@@ -107,7 +120,7 @@ def take_step(
     for i in range(size):
         work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
         k1[i] = work.force[i] + work.change[i]
-    solve(work.blocks, solver.schedule, k1)
+    solve_touching(work.blocks, solver.schedule, work.touching, k1)
 
     for i in range(size):
         q1[i] = velocity[i] + scaled * k1[i]
@@ -119,7 +132,8 @@ def take_step(
         for j in range(BLOCK):
             i = BLOCK * body + j
             k2[i] = work.end_force[i] - 2.0 * gained[j] - work.change[i]
-    solve(work.blocks, solver.schedule, k2)
+    subtract_springs(work.touching, (1.0 - 2.0 * GAMMA) / GAMMA, k1, k2)
+    solve_touching(work.blocks, solver.schedule, work.touching, k2)
 
     for i in range(size):
         q2 = velocity[i] + step * k1[i] - 2.0 * q1[i] + scaled * k2[i]
