@@ -19,9 +19,9 @@ PARALLEL; and 0 if the struts are perpendicular:
 So D differs from the distance of the axes by at most 1 % of the reach. The force is the gradient of
 an energy, k (reach - D)² / 2: without dissipation, struts keep the energy at any angle.
 
-Most struts are far from each other. Pairs that are near are found anew when a node has moved by
-a quarter of the difference between `near` and the largest distance of axes that touch. The forces do not
-depend on when that was, because other pairs exert none.
+Most struts are far from each other. Pairs that are near are found anew when a node has moved by a
+quarter of the difference between `near` and the largest distance of axes that touch. The forces do
+not depend on when that was, because other pairs exert none.
 """
 
 from __future__ import annotations
