@@ -21,7 +21,7 @@ from tetra_drake.physics.kinematics import FORCE, gather_forces
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.vectors import put_vector
 from tetra_drake.simd.compiling import inlined, merged
-from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
+from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, named, select
 
 
 class Touching(NamedTuple):
@@ -32,7 +32,7 @@ class Touching(NamedTuple):
     solved: Annotated[Table, "6 * touches * bodies"]
     """The vectors z, one after the other."""
     factor: Annotated[Table, "touches"]
-    """The factors w / (1 + w gᵀ z)."""
+    """The factors w / (1 + w gᵀ z); the weights w at first."""
     spring: Annotated[Table, "touches"]
     """Parts time² * stiffness of w."""
     vector: Annotated[Table, "6 * bodies"]
@@ -48,31 +48,58 @@ def add_touching(
     """Writes `touching` for the contacts of struts in the state of `forces`.
 
     `blocks` is the factorised matrix without them, `time` is in s. Forces on nodes are overwritten.
+    Each lane has places for its own contacts, so that it does not depend on the other lanes.
     """
-    touching.count[0] = 0
     near, nodes, vector = forces.near_struts, forces.nodes, touching.vector
     law = named(contact.NormalForce, robot.strut_contact.normal)
+    touching.count[0], found = 0, 0.0 * time
     for k in range(near.count[0]):
-        i, j, last = near.pairs[k, 0], near.pairs[k, 1], touching.count[0]
+        i, j = near.pairs[k, 0], near.pairs[k, 1]
         touch = capsules.find_touch(robot.struts, nodes, i, j)
-        if last == touching.factor.size or not any_lane(touch.depth > 0.0):
+        if not any_lane(touch.depth > 0.0):
             continue
         rate = capsules.depth_rate(robot.struts, nodes, i, j, touch)
         presses = contact.normal_force(touch.depth, rate, law) > 0.0
-        spring = select(presses, time * time * law.stiffness, 0.0)
-        weight = spring + select(presses, time * law.damping * touch.depth, 0.0)
+        takes_place = presses & (found < touching.factor.size)
         for node in range(nodes.shape[0]):
             put_vector((0.0, 0.0, 0.0), node, FORCE, nodes)
         capsules.push_ends(robot.struts, nodes, i, j, touch, 1.0)
         gather_forces(nodes, robot.first_node, vector)
+        damping = time * law.damping * touch.depth
+        put_contact(touching, takes_place, found, time * time * law.stiffness, damping)
+        found += select(takes_place, 1.0, 0.0)
+    for place in range(touching.count[0]):
+        first = place * vector.size
         for n in range(vector.size):
-            touching.along[last * vector.size + n] = vector[n]
+            vector[n] = touching.along[first + n]
+        touching.count[0], weight = place, touching.factor[place]
         solve_touching(blocks, schedule, touching, vector)
         for n in range(vector.size):
-            touching.solved[last * vector.size + n] = vector[n]
-        touching.spring[last] = spring
-        touching.factor[last] = weight / (1.0 + weight * product(touching.along, last, vector))
-        touching.count[0] = last + 1
+            touching.solved[first + n] = vector[n]
+        touching.factor[place] = weight / (1.0 + weight * product(touching.along, place, vector))
+        touching.count[0] = place + 1
+
+
+@inlined
+def put_contact(
+    touching: Touching, takes_place: Truth, place: Real, spring: Real, damping: Real
+) -> None:
+    """Puts the contact along `touching.vector` into a place of its own in each lane that takes it.
+    Its weight w is `spring` + `damping`."""
+    size = touching.vector.size
+    count = touching.count[0]
+    if any_lane(takes_place & (place == count)):
+        touching.spring[count] = touching.factor[count] = 0.0 * spring
+        for n in range(size):
+            touching.along[count * size + n] = 0.0 * spring
+        touching.count[0] = count + 1
+    for k in range(touching.count[0]):
+        here = takes_place & (place == k)
+        touching.spring[k] = select(here, spring, touching.spring[k])
+        touching.factor[k] = select(here, spring + damping, touching.factor[k])
+        for n in range(size):
+            old = touching.along[k * size + n]
+            touching.along[k * size + n] = select(here, touching.vector[n], old)
 
 
 @inlined
