@@ -161,19 +161,22 @@ def set_surroundings(
 ) -> None:
     """Adds floor and light and sets the camera. Without ground there is no floor.
 
-    The floor surrounds `points` (..., 3), and the camera sees all of `seen` (..., 3), both in m.
+    The floor surrounds `points` (..., 3), and the camera sees nodes at all of `seen` (..., 3), both
+    in m.
     Where a contact node is drawn larger than its foot, the floor is drawn lower than the ground, by
     the least difference.
     """
-    middle = (seen.reshape(-1, 3).min(axis=0) + seen.reshape(-1, 3).max(axis=0)) / 2
-    reach = float(np.linalg.norm(seen.reshape(-1, 3) - middle, axis=1).max())
+    thick = drawn_radii(robot.structure)[1].max() * np.vstack([np.eye(3), -np.eye(3)])
+    seen = (seen.reshape(-1, 1, 3) + thick).reshape(-1, 3)
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    reach = float(np.linalg.norm(seen - middle, axis=1).max())
     if robot.scenario.terrain.is_ground:
         _add_floor(meshcat, robot, points, reach=reach)
     for unused in ("/Grid", "/Axes"):
         meshcat.SetProperty(unused, "visible", False)
     for part in ("top_color", "bottom_color"):
         meshcat.SetProperty("/Background/<object>", part, _rgb("sky").tolist())
-    position = camera_position(seen.reshape(-1, 3), middle)
+    position = camera_position(seen, middle)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     meshcat.SetCameraPose(position, middle)
     _set_lights(meshcat, reach=reach)
