@@ -13,6 +13,7 @@ window.addEventListener("load", () => {
   const {bodies, cables, colours, contacts, nodes, progress, strut, times} = recording;
   const UP = new Vector3(0, 0, 1);
   const WIDTH_FILLED = 0.7, HEIGHT_FILLED = 0.58;  // shares of the picture
+  const LARGE = 0.1;  // radius of a sphere that the camera heeds, as a share of the robot's size
   const AFAR = 30;  // robots
   const SMOOTHING = 0.6;  // s before and after a time over which the camera's target is averaged
   const duration = times.at(-1) - times[0];
@@ -180,9 +181,16 @@ window.addEventListener("load", () => {
     const distance = camera.position.distanceTo(controls.target);
     Object.assign(viewer.scene.fog, {near: distance, far: 2.6 * distance});
   }
+  // Points around the nodes; a large sphere counts with its ends along the axes.
+  const ends = [-1, 1].flatMap((sign) => [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) =>
+    new Vector3(...axis).multiplyScalar(sign)));
   function around(seconds) {
     seek(seconds);
-    return node_places();
+    return node_places().flatMap((point, node) => {
+      const {radius} = nodes[node];
+      if (radius < LARGE * size) return [point];
+      return ends.map((end) => point.clone().addScaledVector(end, radius));
+    });
   }
   let standing = null;  // times at which a standing camera sees the robot
   function frame_picture() {

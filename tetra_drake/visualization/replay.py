@@ -109,7 +109,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     structure = robot.structure
     bodies, contacts = structure.bodies, structure.contacts
     paths = node_paths(structure)
-    size = drawn_radii(structure)[0].min()
+    strut_radius, node_radius = drawn_radii(structure)
     tension, force = frames["tension"].values, ground_forces(robot, frames)
     greatest = np.percentile(tension, _USUAL) if tension.size else 0.0
     per_newton = radius_per_newton(structure, greatest)
@@ -128,9 +128,14 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "named": len(bodies) <= MOST_NAMES and not any(" " in name for name in bodies),
         "nodes": [
             {"path": _parts(path), "body": int(body), "place": place.round(6).tolist()}
-            | {"colour": COLOURS[colour]}
-            for path, body, place, colour in zip(
-                paths, structure.carriers, structure.p_BN, node_colours(structure), strict=True
+            | {"colour": COLOURS[colour], "radius": round(float(radius), 6)}
+            for path, body, place, colour, radius in zip(
+                paths,
+                structure.carriers,
+                structure.p_BN,
+                node_colours(structure),
+                node_radius,
+                strict=True,
             )
         ],
         "cables": [
@@ -140,7 +145,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "contacts": contacts.tolist(),
         "colours": COLOURS,
         "anchored": bool(structure.held.any()),
-        "strut": float(size),
+        "strut": float(strut_radius.min()),
         "length": {"size": units.length, "name": units.length_name},
         "dark": units.squares * units.square,
         "poses": _steps(poses),
