@@ -6,6 +6,7 @@ from unittest.mock import MagicMock
 
 import pytest
 from helpers.analytic import Bowl, RandomSearch, in_threads, read_record, small_scenario
+from helpers.converged import shortly
 
 import tetra_drake
 from tetra_drake import cli
@@ -22,9 +23,8 @@ from tetra_drake.scenario.terrain_kinds import Steps
 @pytest.fixture
 def tiny():
     """Four gaits and two iterations of 0.3 s on the compiled engine."""
-    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
-    changes = {"engine": "!Compiled", "cpg.start_up": 0.0, **times}
-    return small_scenario(population=4, iterations=2, trials=1).with_changes(changes)
+    small = small_scenario(population=4, iterations=2, trials=1)
+    return shortly(small, 0.3, engine="!Compiled")
 
 
 @pytest.fixture

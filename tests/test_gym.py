@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from helpers.actuations import FORCE, MOTOR, WINCH
+from helpers.converged import shortly
 
 from tetra_drake.engines.compiled.lane_engine import processor_lanes
 from tetra_drake.engines.simulation import Simulation
@@ -22,10 +23,9 @@ LANES = processor_lanes()
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
     """0.2 s of disturbed robots on the compiled engine."""
-    times = {"simulation.duration": "0.2 s", "simulation.steady_from": "0.05 s"}
     disturbances = Disturbances(draws=1, spreads={"robot.cables.outer_stiffness": 0.1}, start=0.01)
-    changed = scenario.with_changes(times | {"engine": "!Compiled"})
-    return changed.with_sections(disturbances=disturbances)
+    changes = {"disturbances": disturbances, "simulation.steady_from": "0.05 s"}
+    return shortly(scenario, 0.2, engine="!Compiled", **changes)
 
 
 def episode(env: gymnasium.Env, *, seed: int) -> tuple[np.ndarray, list[float], bool, bool]:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas
 import pytest
 from helpers.anchored import HUNG, scenario_of, supported_prism
+from helpers.converged import shortly
 
 from tetra_drake.analysis import measurements
 from tetra_drake.analysis.fit import fit_values
@@ -332,13 +333,10 @@ def test_stiffness_damping_and_friction_of_a_sliding_robot_are_within_their_inte
     settings = {
         "engine": "!Compiled {tolerance: 0.01 mm/s}",
         "terrain": "!Incline {slope: -25 deg}",
-        "simulation.duration": "0.8 s",
-        "simulation.steady_from": "0.4 s",
         "friction.static": 0.26,
         "friction.kinetic": 0.26,
-        "cpg.start_up": 0.0,
     }
-    scenario = load_scenario("prism").with_changes(settings)
+    scenario = shortly(load_scenario("prism"), 0.8, **settings)
     file, log = tmp_path / "command.csv", tmp_path / "log.csv"
     write_pulls(file, scenario, period=0.02, share=0.3, rate=6.0 * np.pi)
     truth = np.array([110.0, 0.6, 0.25])

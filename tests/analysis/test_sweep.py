@@ -6,6 +6,7 @@ import math
 
 import pytest
 from helpers.anchored import HUNG, scenario_of
+from helpers.converged import shortly
 
 from tetra_drake.analysis.sweep import sweep
 from tetra_drake.engines.simulate import simulate
@@ -20,8 +21,7 @@ STIFFNESS = "robot.cables.outer_stiffness"
 
 @pytest.fixture(scope="module")
 def short() -> Scenario:
-    times = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.1 s"}
-    return load_scenario("thesis").with_changes({"engine": "!Compiled"} | times)
+    return shortly(load_scenario("thesis"), 0.4, engine="!Compiled")
 
 
 def test_a_load_is_an_axis() -> None:

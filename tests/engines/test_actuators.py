@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 import xarray
 from helpers.actuations import LIMITED
+from helpers.anchored import scenario_of
+from helpers.converged import shortly
 from helpers.quantities import with_unit
 from helpers.states import body_velocities
 from scipy.linalg import expm
@@ -24,10 +26,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import Actuation, TensionMotor, Winch
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.strut_contact_kinds import NoStrutContact
 
 LENGTH, FREE_LENGTH, STIFFNESS, DAMPING = 0.2, 0.1, 100.0, 0.4  # L, l0, k, c in SI units
 
@@ -55,24 +54,21 @@ def swaying(actuation: Actuation, *, damping: float) -> Scenario:
     make = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.016}
     law = {"stiffness": STIFFNESS, "damping": damping, "free_length": FREE_LENGTH}
     along = {"a": 0.0, "b": LENGTH, "c": 2.0 * LENGTH, "d": 3.0 * LENGTH}
-    kind = StructureFile(
-        nodes={name: [x, 0.0, 0.5] for name, x in along.items()},
-        struts={"frame": {"pairs": [["a", "d"]], **make}, "bar": {"pairs": [["b", "c"]], **make}},
-        cables={
-            "passive": {"pairs": [["a", "b"]], **law},
-            "driven": {"pairs": [["c", "d"]], **law},
+    tree = {
+        "nodes": {name: [x, 0.0, 0.5] for name, x in along.items()},
+        "struts": {
+            "frame": {"pairs": [["a", "d"]], **make},
+            "bar": {"pairs": [["b", "c"]], **make},
         },
-        actuated={"one": ["driven c d"]},
-        contacts=["a"],
-        offsets=[[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]],
-        gravity=0.0,
-    )
-    times = {"duration": "80 ms", "steady_from": "40 ms", "sample_period": "1 ms"}
-    changes = {f"simulation.{key}": value for key, value in times.items()}
-    changes |= {"cpg.start_up": 0.0, "cpg.gain": 0.0}
-    parts = {"robot": kind, "actuation": actuation, "strut_contact": NoStrutContact()}
-    scenario = load_scenario("prism").with_sections(**parts)
-    return scenario.with_changes(changes)
+        "cables": {
+            "passive": law | {"pairs": [["a", "b"]]},
+            "driven": law | {"pairs": [["c", "d"]]},
+        },
+        "actuated": {"one": ["driven c d"]},
+        "gravity": 0.0,
+    }
+    still = {"cpg.gain": 0.0, "simulation.sample_period": "1 ms"}
+    return scenario_of(tree, duration=0.08, actuation=actuation, **still)
 
 
 def trajectory_of(robot: Robot) -> xarray.Dataset:
@@ -156,13 +152,10 @@ def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
         "robot.gravity": 0.0,
         "robot.offsets": with_unit(np.random.default_rng(0).normal([0, 0, 1], 0.005, (3, 3)), "m"),
         "robot.cables.damping": 0.0,
-        "simulation.duration": "0.1 s",
-        "simulation.steady_from": "0.05 s",
         "simulation.sample_period": "0.1 ms",
-        "cpg.start_up": 0.0,
         "actuation": LIMITED["winch"],
     }
-    robot = Robot.of(scenario.with_changes({**floating, "engine": engine}))
+    robot = Robot.of(shortly(scenario, 0.1, engine=engine, **floating))
     structure, bodies, motion = robot.structure, robot.model.bodies, trajectory_of(robot)
     v_WB, w_WB = body_velocities(motion, structure)
     kinetic = 0.5 * (bodies.mass[0] * v_WB**2 + bodies.inertia[0, XX] * w_WB**2).sum(axis=(1, 2))

@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.engines.drake import MakeSimulator
@@ -22,9 +23,8 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 @pytest.fixture
 def walking() -> Scenario:
     """A second and a half under a law of friction that all engines have."""
-    times = {"duration": "1.5 s", "steady_from": "0.25 s", "sample_period": "30 ms"}
-    changes = {f"simulation.{key}": time for key, time in times.items()}
-    return load_scenario("coulomb").with_changes(changes | {"friction.stiffness": "0 N/m"})
+    settings = {"friction.stiffness": "0 N/m", "simulation.sample_period": "30 ms"}
+    return shortly(load_scenario("coulomb"), 1.5, **settings)
 
 
 def follow_waves(robot: Robot, time: float, readings: Readings) -> np.ndarray:
@@ -60,8 +60,7 @@ def test_a_controller_walks_alike_on_all_engines(walking, controller, engine):
 def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
     """The function is called at the same times, and its forces are held."""
     accurate = Drake(accuracy=1e-5, max_step=1e-3)
-    scenario = walking.with_sections(engine=accurate)
-    scenario = scenario.with_changes({"simulation.duration": "0.3 s"})
+    scenario = shortly(walking, 0.3, engine=accurate)
     times: list[float] = []
 
     def law(time: float, readings: Readings) -> np.ndarray:

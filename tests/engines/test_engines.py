@@ -1,13 +1,13 @@
 """What holds on every engine: recording and watching change nothing, failures are reported."""
 
 import pickle
-from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 import xarray
 from helpers.actuations import LIMITED
+from helpers.converged import shortly
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
@@ -20,20 +20,11 @@ from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Rough
+from tetra_drake.scenario.terrain_kinds import Rough, Steps
 from tetra_drake.scenario.units import INCH
 
 NEEDS_MUJOCO = pytest.mark.skipif(not installed(), reason=INSTALL)
 MUJOCO = pytest.param("mujoco", marks=NEEDS_MUJOCO)
-
-
-def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
-    """The scenario cut to 1 s on an engine, driven from 0.2 s on."""
-    settings = {"duration": "1 s", "steady_from": "0.5 s", **settings}
-    changes = {f"simulation.{key}": value for key, value in settings.items()}
-    kind = f"!{engine.capitalize()}"
-    return scenario.with_changes({"cpg.start_up": "0.2 s", "engine": kind, **changes})
 
 
 WAVES = Command("waves", 0.1, 1.5 * np.sin(np.arange(10.0)[:, np.newaxis] + np.arange(8)))
@@ -58,8 +49,8 @@ WALKS = {
 )
 def test_recording_and_watching_change_nothing(walk, engine):
     name, changes, _ = WALKS[walk]
-    short = shortly(load_scenario(name), engine, duration="0.4 s", steady_from="0.3 s")
-    short = short.with_changes(changes)
+    changes = {"engine": f"!{engine.capitalize()}"} | changes
+    short = shortly(load_scenario(name), 0.4, **changes)
     drive = {"command": WAVES} if walk == "command" else {"gait": seeded_gait(short)}
     plain = simulate(short, **drive)
     recorded = simulate(short, **drive, record=True)
@@ -101,7 +92,8 @@ def test_a_robot_follows_a_gait_or_a_command(scenario, what, key, refused):
 @pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
 def test_the_path_is_that_of_the_trajectory(scenario, engine):
     beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3, 1, 6)]
-    short = shortly(scenario, engine).with_changes({"robot.offsets": beside})
+    changes = {"robot.offsets": beside, "engine": f"!{engine.capitalize()}"}
+    short = shortly(scenario, 1.0, **changes)
     result = simulate(scenario=short, gait=seeded_gait(short), record=True)
     path, whole = result.path, path_of_centre(result.trajectory, make_structure(short))
     assert path.times.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
@@ -115,12 +107,12 @@ def test_the_path_is_that_of_the_trajectory(scenario, engine):
     ("changes", "kind"),
     [
         ({"simulation.max_speed": "1 cm/s"}, Diverged),
-        ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, Diverged),  # steps below the least
+        ({"cpg.gain": "4e9 N"}, Diverged),  # steps below the least
         ({"simulation.max_evaluations": 1000}, StepBudgetExceeded),
     ],
 )
 def test_a_simulation_that_fails_on_the_diagram_says_when_and_why(scenario, changes, kind):
-    failing = shortly(scenario, "drake").with_changes(changes)
+    failing = shortly(scenario, 1.0, engine="!Drake", **changes)
     with pytest.raises(kind) as caught:
         simulate(scenario=failing, gait=seeded_gait(failing))
     assert 0.0 <= caught.value.time < failing.simulation.duration
@@ -132,3 +124,27 @@ def test_failures_cross_process_borders(kind):
     failure = pickle.loads(pickle.dumps(kind(time=1.5, reason="why")))
     assert type(failure) is kind
     assert (failure.time, failure.reason) == (1.5, "why")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("cpg.feedback", ["load"]),
+        ("friction.static", 0.6),
+        ("friction.stiffness", "1 kN/m"),
+        ("friction.lateral", 2.0),
+        ("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2)),
+    ],
+)
+def test_what_mujoco_cannot_simulate_is_refused(scenario, key, value, monkeypatch, refused):
+    monkeypatch.setattr("tetra_drake.engines.mujoco.installed", lambda: True)
+    level = scenario.with_changes({"engine": "!Mujoco", "friction": Coulomb()})
+    changed = level.with_changes({"cpg.signals": "live", key: value})
+    with refused("thesis", key):
+        simulate(changed, seeded_gait(changed))
+
+
+def test_without_mujoco_its_engine_is_refused(scenario, monkeypatch, refused):
+    monkeypatch.setattr("tetra_drake.engines.mujoco.installed", lambda: False)
+    with refused("thesis", "engine"):
+        simulate(scenario.with_changes({"engine": "!Mujoco"}), seeded_gait(scenario))

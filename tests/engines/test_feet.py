@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 from pydrake.multibody.parsing import Parser
@@ -41,10 +42,7 @@ def wheels(strut: dict[str, Any] | None = None, **changes: object) -> Scenario:
     tree = WHEELS | {"struts": {"axle": AXLE | (strut or {})}}
     scenario = load_scenario("prism").with_sections(robot=StructureFile.model_validate(tree))
     sure = "!Coulomb {static: 0.9, kinetic: 0.9, stiffness: 0 N/m, damping: 2 kN*s/m}"
-    times = {"simulation.duration": "1 s", "simulation.steady_from": "0 s", "cpg.start_up": "0 s"}
-    return scenario.with_changes(
-        {"friction": sure, "ground.stiffness": "100 kN/m"} | times | changes
-    )
+    return shortly(scenario, 1.0, **{"friction": sure, "ground.stiffness": "100 kN/m"} | changes)
 
 
 @pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])

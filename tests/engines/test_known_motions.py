@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from helpers.anchored import HUNG, SWINGING, scenario_of, supported_prism
 from helpers.bars import ACROSS, CROSSED, RADIUS, STIFFNESS, loose_bars
-from helpers.converged import CONVERGED
+from helpers.converged import CONVERGED, shortly
 from helpers.hanging import HANGING, MASS
 from helpers.hanging import STIFFNESS as CABLE_STIFFNESS
-from helpers.states import mass_matrix
+from helpers.states import energy_and_momenta
 from helpers.structures import (
     driven_as_recorded,
     end_on_diagram,
@@ -35,7 +35,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.forces import Forces, compute_state_forces
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import AddBodies, moved_nodes, node_positions
+from tetra_drake.robot.structure import AddBodies, moved_nodes
 from tetra_drake.scenario.engine_kinds import Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -163,10 +163,9 @@ def bent_body_and_bar() -> Robot:
         "cables": {"loose": slack},
         "gravity": 0.0,
     }
-    scenario = scenario_of(tree, duration=0.5)
-    fine = {"engine.tolerance": "1e-7 m/s", "engine.max_step": "1e-3 s"}
+    fine = "!Compiled {tolerance: 1e-7 m/s, max_step: 1 ms}"
     v_WB = [[3.0, 7.0, -5.0, 0.1, 0.0, 0.2], [4.0, -9.0, 6.0, 0.0, -0.3, 0.1]]
-    return thrown(Robot.of(scenario.with_changes({"engine": "!Compiled"} | fine)), np.array(v_WB))
+    return thrown(Robot.of(scenario_of(tree, duration=0.5, engine=fine)), np.array(v_WB))
 
 
 def test_thrown_bodies_turn_by_eulers_equations():
@@ -193,13 +192,12 @@ def test_thrown_bodies_turn_by_eulers_equations():
 
 
 def flying(name: str, **changes: object) -> Robot:
-    """A shipped structure without weight, high up, whose bodies move and turn at random."""
+    """A shipped structure without weight or ground, whose bodies move and turn at random."""
     scenario = load_scenario(name)
-    lifted = {"robot.gravity": 0.0, "robot.offsets": [[0, 0, "1 m"]] * scenario.robot.body_count}
-    lifted |= {f"robot.cables.{group}.damping": 0.0 for group in scenario.robot.cables}
-    times = {"simulation.duration": "0.5 s", "simulation.steady_from": "0.25 s"}
-    fine = {"engine": "!Compiled", "engine.tolerance": "1e-7 m/s", "cpg.gain": 0.0}
-    robot = Robot.of(scenario.with_changes(times | lifted | fine | changes))
+    still = {"robot.gravity": 0.0, "terrain": "!Nothing", "cpg.gain": 0.0}
+    still |= {f"robot.cables.{group}.damping": 0.0 for group in scenario.robot.cables}
+    fine = {"engine": "!Compiled", "engine.tolerance": "1e-7 m/s"}
+    robot = Robot.of(shortly(scenario, 0.5, **still | fine | changes))
     v_WB = np.random.default_rng(0).normal(size=(scenario.robot.body_count, 6))
     return thrown(robot, v_WB * [2.0, 2.0, 2.0, 0.2, 0.2, 0.2])  # rad/s, m/s
 
@@ -216,19 +214,6 @@ def nearly_parallel(angle: float) -> Robot:
     ends = ((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0)), ((0.1 - x, -y, 0.012), (0.1 + x, y, 0.012))
     robot = loose_bars(ends, dissipation=0.0, duration=0.2)
     return thrown(robot, np.array([[0.0] * 6, [0.0, 0.0, 0.0, 0.0, 0.0, -0.5]]))
-
-
-def energy_and_momenta(robot: Robot, state: np.ndarray) -> np.ndarray:
-    """(7,): energy of bodies and cables; momentum, and angular momentum about the origin."""
-    structure, poses = robot.structure, poses_of(state[np.newaxis])[0]
-    velocities, cables = state[poses.size :], structure.cables
-    wrench = (mass_matrix(robot.model, state) @ velocities).reshape(-1, 6)
-    p_WN = node_positions(structure, state)
-    lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
-    stretch = np.maximum(lengths - cables["free_length"], 0.0)
-    energy = 0.5 * (velocities @ wrench.ravel() + cables["stiffness"] @ stretch**2)
-    angular = (wrench[:, :3] + np.cross(poses[:, 4:], wrench[:, 3:])).sum(axis=0)
-    return np.concatenate([[energy], wrench[:, 3:].sum(axis=0), angular])
 
 
 DAMPED = {f"robot.cables.{group}.damping": "1 N*s/m" for group in ("bottom", "side", "top")}
@@ -276,9 +261,7 @@ def test_two_bars_rebound_as_hunt_and_crossley_say(dissipation):
 def test_fast_bars_do_not_pass_through_each_other():
     for gap in np.linspace(0.02, 0.08, 20):  # begin at all phases of the steps
         robot = loose_bars([ACROSS[0], ((0.0, -0.1, gap), (0.0, 0.1, gap))], dissipation=1.0)
-        scenario = robot.scenario.with_changes(
-            {"engine": "!Compiled", "simulation.duration": "20 ms"}
-        )
+        scenario = shortly(robot.scenario, 0.02, engine="!Compiled")
         v_WB = [[0.0, 0.0, 0.0, 0.0, 0.0, v] for v in (10.0, -10.0)]
         fast = thrown(dataclasses.replace(robot, scenario=scenario), np.array(v_WB))
         assert np.diff(poses_of(simulated(fast)[1].states)[-1, :, 6]) > 2.0 * RADIUS

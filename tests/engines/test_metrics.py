@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from helpers.states import strut_clearance
+from helpers.structures import simulated
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.curves import travelling_index
 from tetra_drake.results.measures import off_ground
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import moved_nodes
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -33,9 +33,9 @@ def test_speed_is_of_the_centre_of_mass_of_bodies_with_payloads():
 
 def test_tallied_metrics_are_those_of_the_trajectory():
     short = short_walk()
-    walk = simulate(scenario=short, gait=seeded_gait(short, 3), record=True)
-    robot, metrics = Robot.of(short), walk.metrics
-    structure, model = robot.structure, robot.model
+    robot = Robot.of(short)
+    walk, motion = simulated(robot, seed=3)
+    structure, metrics = robot.structure, walk.metrics
     steady = walk.trajectory.sel(time=slice(0.5, None))
     driven = structure.cables["signal"] != PASSIVE
     driver = structure.cables["signal"][driven]
@@ -61,17 +61,7 @@ def test_tallied_metrics_are_those_of_the_trajectory():
     shares = off.mean("time").sel(contact_body=steady.body.values).values
     assert metrics.lifted_shares == pytest.approx(shares, abs=5e-3)
     assert metrics.tension == pytest.approx(walk.trajectory.tension.values.min(), rel=1e-3)
-    states = np.hstack(
-        [
-            np.concatenate([walk.trajectory.q_WB, walk.trajectory.p_WB], axis=2).reshape(2001, -1),
-            np.zeros((2001, 18)),
-        ]
-    )
-    struts, radius, first_node = model.struts, model.bodies.radius, model.first_node
-    distances = [
-        least_strut_distance(struts, radius, first_node, s, moved_nodes(structure, s), np.inf)
-        for s in states
-    ]
+    distances = [strut_clearance(robot, state) for state in motion.states]
     # Looked at every 40 ms or so.
     assert metrics.clearance == pytest.approx(min(distances), abs=1e-4)
     assert metrics.clearance >= min(distances) - 1e-9

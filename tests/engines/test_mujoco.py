@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray
+from helpers.converged import shortly
 
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.mjcf import loose_remark
@@ -18,11 +19,11 @@ from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Incline, Steps
+from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 NO_BRISTLES = {"friction": Coulomb()}
-needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
+pytestmark = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
 
 
 @pytest.fixture
@@ -37,7 +38,6 @@ def trajectory_of(scenario: Scenario) -> xarray.Dataset:
     return simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
 
 
-@needs_mujoco
 def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, structure, data):
     times = {"simulation.duration": "1.2 s", "simulation.steady_from": "1.0 s"}
     resting = scenario.with_changes({"engine": "!Mujoco", **times})
@@ -56,14 +56,11 @@ def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, struc
     assert tip == pytest.approx(settled["tip5_height_in"], abs=0.05)
 
 
-@needs_mujoco
 @pytest.mark.parametrize("name", ["thesis", "mast"])  # with weak and strong dampers
 def test_dampers_between_bodies_do_not_slow_the_fall_of_a_robot(name):
     scenario = load_scenario(name)
-    times = {"simulation.duration": "1.2 s", "simulation.steady_from": "0.1 s"}  # to 11.8 m/s
     high = {"robot.offsets": [[0.0, 0.0, "8 m"]] * scenario.robot.body_count}
-    changes = {"engine": "!Mujoco", "cpg.start_up": "0.1 s", "friction": Coulomb()}
-    falling = scenario.with_changes(times | high | changes)
+    falling = shortly(scenario, 1.2, engine="!Mujoco", **NO_BRISTLES | high)  # to 11.8 m/s
     trajectory = trajectory_of(falling)
     v_WN = trajectory["v_WN"].values
     velocity = Robot.of(falling).structure.node_shares @ v_WN
@@ -72,7 +69,6 @@ def test_dampers_between_bodies_do_not_slow_the_fall_of_a_robot(name):
     assert np.ptp(v_WN - velocity[:, np.newaxis], axis=0).max() > 0.01, "its cables move bodies"
 
 
-@needs_mujoco
 def test_steps_count_against_the_budget_of_evaluations(short):
     gait, steps = seeded_gait(short), 6400
     short = short.with_changes({"simulation.max_evaluations": steps})
@@ -84,7 +80,6 @@ def test_steps_count_against_the_budget_of_evaluations(short):
         simulate(scenario=short, gait=gait)
 
 
-@needs_mujoco
 @pytest.mark.parametrize(
     ("name", "longest"), [("thesis", 0.26e-3), ("mast", 0.10e-3), ("prism", 2.7e-3)]
 )
@@ -97,7 +92,6 @@ def test_steps_are_too_long_where_robots_are_thrown_about(name, longest):
         simulate(scenario=unstable, gait=seeded_gait(unstable))
 
 
-@needs_mujoco
 def test_where_mujoco_starts_again_the_simulation_has_failed(short, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     thrown = short.with_changes({"cpg.gain": "4e9 N"})
@@ -108,7 +102,6 @@ def test_where_mujoco_starts_again_the_simulation_has_failed(short, tmp_path, mo
     assert list(tmp_path.iterdir()) == [], "no log file"
 
 
-@needs_mujoco
 @pytest.mark.parametrize("workers", [1, 2])
 def test_many_gaits_walk_or_fail_as_each_alone(short, workers, monkeypatch):
     monkeypatch.setattr(engine, "_STRETCH", 1000)
@@ -127,7 +120,6 @@ def test_many_gaits_walk_or_fail_as_each_alone(short, workers, monkeypatch):
         xarray.testing.assert_identical(outcome.trajectory, result.trajectory)
 
 
-@needs_mujoco
 def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure):
     angle, times = math.radians(3.0), {"simulation.duration": "1.2 s", "cpg.start_up": "1.25 s"}
     creeping = {"terrain": Incline(slope=angle), "friction": Coulomb(), **times}
@@ -146,7 +138,6 @@ def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure
     np.testing.assert_allclose(friction[:, 0], expected, atol=5e-3 * expected.max())
 
 
-@needs_mujoco
 def test_cables_that_go_slack_walk_as_tendons_while_they_are_taut(short):
     taut, gait = short.with_changes({"robot.cables.slack": True}), seeded_gait(short)
     ours, tendons = (simulate(scenario, gait).metrics for scenario in (taut, short))
@@ -154,34 +145,8 @@ def test_cables_that_go_slack_walk_as_tendons_while_they_are_taut(short):
     assert "slack" in loose_remark(Robot.of(taut)) and not loose_remark(Robot.of(short))
 
 
-@needs_mujoco
 def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
     tiny = {"robot.strut_length": "5 mm", "robot.spacing": "2.5 mm"}
     light = short.with_changes(tiny | {"robot.density": "1e-4 kg/m^3"})
     with refused("thesis", "robot", "mjMINVAL"):
         simulate(scenario=light, gait=seeded_gait(light))
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("cpg.feedback", ["load"]),
-        ("friction.static", 0.6),
-        ("friction.stiffness", 1e3),
-        ("friction.lateral", 2.0),
-        ("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2)),
-    ],
-)
-def test_what_mujoco_cannot_simulate_is_refused(short, key, value, monkeypatch, refused):
-    monkeypatch.setattr(engine, "installed", lambda: True)
-    section, _, name = key.partition(".")
-    changes = {"friction": Coulomb(**{name: value})} if section == "friction" else {key: value}
-    changes["cpg.signals"] = "live"
-    with refused("thesis", key):
-        simulate(scenario=short.with_changes(changes), gait=seeded_gait(short))
-
-
-def test_without_mujoco_its_engine_is_refused(short, monkeypatch, refused):
-    monkeypatch.setattr(engine, "installed", lambda: False)
-    with refused("thesis", "engine"):
-        simulate(scenario=short, gait=seeded_gait(short))

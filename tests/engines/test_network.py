@@ -97,8 +97,7 @@ def test_each_feedback_changes_the_signals(scenario):
 
 
 def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
-    changes = {"engine": "!Compiled", "simulation.duration": "0.4 s"}
-    short = load_scenario("turning").with_changes(changes | {"simulation.steady_from": "0.2 s"})
+    short = shortly(load_scenario("turning"), 0.4, engine="!Compiled")
     gait = dataclasses.replace(seeded_gait(short), turn=0.0)
     turned = simulate(scenario=short, gait=dataclasses.replace(gait, turn=0.5))
     for turn in (0.5, np.float64(0.5)):

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 from numba.core import event
 
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -12,7 +13,6 @@ from tetra_drake.gym import TensegrityEnv
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.terrain_kinds import Incline
 
@@ -29,18 +29,11 @@ def compiled() -> Iterator[list[str]]:
     assert not names
 
 
-def brief(name: str, engine: str) -> Scenario:
-    """A shipped scenario for a twentieth of a second on an engine."""
-    scenario, times = load_scenario(name), {"duration": "50 ms", "steady_from": "10 ms"}
-    changes = {f"simulation.{key}": time for key, time in times.items()}
-    return scenario.with_changes(changes | {"engine": engine})
-
-
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_no_shipped_scenario_compiles_anything(name):
     for engine in ("!Compiled", "!Drake"):
-        scenario = brief(name, engine)
+        scenario = shortly(load_scenario(name), 0.05, engine=engine)
         result = simulate(scenario, seeded_gait(scenario), record=True)
         assert result.trajectory.tension.size > 0
 
@@ -54,7 +47,7 @@ def test_no_structure_compiles_anything_as_it_rests(name):
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("count", [2, 5, 64])
 def test_no_number_of_robots_compiles_anything(count):
-    scenario = brief("coulomb", "!Compiled")
+    scenario = shortly(load_scenario("coulomb"), 0.05, engine="!Compiled")
     assert len(simulate_many(scenario, [seeded_gait(scenario, i) for i in range(count)])) == count
     robots = Simulation("rover", count=count)
     assert (robots.step(robots.rest).time > 0.0).all()
@@ -66,5 +59,5 @@ def test_no_environment_and_no_other_engine_compiles_anything():
     environment.reset(seed=0)
     environment.step(environment.action_space.sample())
     level = {"friction.stiffness": "0 N/m", "terrain": Incline(slope=0.0)}
-    scenario = brief("motors", "!Mujoco").with_changes(level)
+    scenario = shortly(load_scenario("motors"), 0.05, engine="!Mujoco", **level)
     assert simulate(scenario, seeded_gait(scenario)).metrics.distance_in != 0.0

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
@@ -35,9 +36,8 @@ def similar(scenario: Scenario, length: float) -> Scenario:
 def test_a_robot_of_another_size_moves_as_its_model(engine):
     if engine == "!Mujoco" and not installed():
         pytest.skip(INSTALL)
-    times = {"duration": "2.5 s", "steady_from": "1 s", "sample_period": "0.1 s"}
-    changes = {"engine": engine, "simulation": times, "cpg.start_up": "0.3 s"}
-    prism = load_scenario("prism").with_changes(changes | {"friction.stiffness": "0 N/m"})
+    changes = {"friction.stiffness": "0 N/m", "simulation.sample_period": "0.1 s"}
+    prism = shortly(load_scenario("prism"), 2.5, engine=engine, **changes)
     robots = {length: similar(prism, length) for length in (1.0, 0.01, 10.0)}
     model, *others = (
         simulate(robot, seeded_gait(robot), record=True).trajectory.p_WB.values / length

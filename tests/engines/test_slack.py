@@ -31,15 +31,12 @@ def dropped(engine: str, *, damping: float) -> Scenario:
     tree = {**TETHER, "cables": {"tether": TETHER["cables"]["tether"] | {"damping": damping}}}
     tree["actuated"] = {"motor": ["tether hook ball"]}
     lifted = 0.5 + G / LINE["stiffness"]  # from where it hangs
-    scenario = scenario_of(tree, duration=1.0)
-    return scenario.with_changes(
-        {
-            "robot.offsets": [["0 m", "0 m", "0 m"], ["0 m", "0 m", f"{lifted!r} m"]],
-            "simulation.sample_period": "5 ms",
-            "friction.stiffness": "0 N/m",  # the only one that MuJoCo knows
-            "engine": engine,
-        }
-    )
+    changes = {
+        "robot.offsets": [["0 m", "0 m", "0 m"], ["0 m", "0 m", f"{lifted!r} m"]],
+        "simulation.sample_period": "5 ms",
+        "friction.stiffness": "0 N/m",  # the only one that MuJoCo knows
+    }
+    return scenario_of(tree, duration=1.0, engine=engine, **changes)
 
 
 @pytest.mark.parametrize(
@@ -75,10 +72,9 @@ def test_a_loose_tether_neither_brakes_nor_pushes_a_falling_ball(engine, damping
 
 
 def test_a_ball_on_an_elastic_tether_swings_by_its_equation_on_the_diagram():
-    scenario = scenario_of(TETHER | {"offsets": [[0.0, 0.0, 0.0], [0.2, 0.1, -0.3]]}, duration=5.0)
-    found = simulate(
-        scenario.with_changes({"engine": "!Drake"}), seeded_gait(scenario), record=True
-    )
+    tree = TETHER | {"offsets": [[0.0, 0.0, 0.0], [0.2, 0.1, -0.3]]}
+    scenario = scenario_of(tree, duration=5.0, engine="!Drake")
+    found = simulate(scenario, seeded_gait(scenario), record=True)
     place = found.trajectory.p_WN.sel(node="ball") - [0.0, 0.0, 2.0]
 
     def motion(time: float, y: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from helpers.anchored import floating_prism
+from helpers.anchored import BAR, floating_prism
 from helpers.kernels import Stepper
 from helpers.structures import (
     driven_as_recorded,
@@ -176,13 +176,10 @@ def test_a_structure_walks_as_far_as_its_centre_of_mass():
     assert abs(float(way.mean("body")[0]) - x) > 1e-4, "the mean of the bodies goes another way"
 
 
-# A pyramid of six struts, one rigid body.
-EDGES = {"pairs": [["a", "b"], ["a", "c"], ["a", "d"], ["b", "c"], ["b", "d"], ["c", "d"]]}
-EDGES |= {"diameter": "8 mm", "density": "1.2 g/cm^3", "node_diameter": "10 mm"}
-BODY = {
-    "nodes": {"a": [0, 0, 0], "b": ["0.1 m", 0, 0], "c": [0, "0.1 m", 0], "d": [0, 0, "0.1 m"]},
-    "struts": {"edge": EDGES},
-    "offsets": [["0 m", "0 m", "2 cm"]],
+LIFTED_BAR = {
+    "nodes": {"a": [0.0, 0.0, 0.0], "b": [0.2, 0.0, 0.0]},
+    "struts": {"bar": BAR},
+    "offsets": [[0.0, 0.0, 0.02]],
 }
 
 
@@ -192,7 +189,7 @@ def undriven(request) -> Scenario:
     if request.param == "pair":
         return load_scenario("pair").with_changes(BRIEF | {"robot.actuated": {}})
     prism = load_scenario("prism").with_changes(BRIEF)
-    return prism.with_sections(name="body", robot=StructureFile.from_tree(BODY, "body"))
+    return prism.with_sections(name="body", robot=StructureFile.model_validate(LIFTED_BAR))
 
 
 @pytest.mark.parametrize("signals", ["listing", "live"])

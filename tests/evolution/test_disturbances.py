@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from helpers import analytic
+from helpers.converged import shortly
 from helpers.quantities import with_unit
 from pytest import approx
 
@@ -30,11 +31,9 @@ SEED = (5, 0, 3)
 @pytest.fixture(scope="module")
 def tiny():
     """0.3 s of three tetrahedra, actuated at once, on the compiled engine, among three draws."""
-    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
-    changes = {"engine": "!Compiled", "cpg.start_up": 0.0, **times}
-    changes |= {"disturbances": Disturbances(draws=3, spreads=STIFFNESS, start=0.02)}
+    settings = Disturbances(draws=3, spreads=STIFFNESS, start=0.02)
     small = analytic.small_scenario(oscillators=2, population=4, iterations=2, trials=2)
-    return small.with_changes(changes)
+    return shortly(small, 0.3, engine="!Compiled", disturbances=settings)
 
 
 @pytest.fixture(scope="module")

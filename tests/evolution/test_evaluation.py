@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from helpers.analytic import evaluated, small_scenario, tasks_of
+from helpers.converged import shortly
 
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
@@ -19,8 +20,7 @@ from tetra_drake.robot.gait import ParameterSpace
 @pytest.fixture
 def tiny():
     """0.3 s from a standing start, actuated at once so that gaits differ."""
-    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
-    return small_scenario().with_changes({"cpg.start_up": 0.0, **times})
+    return shortly(small_scenario(), 0.3)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from helpers.converged import shortly
 from helpers.structures import SIDES_ALONE
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -50,12 +51,7 @@ def scenario_of(tree: dict[str, Any], duration: float = 2.0, **changes: object) 
     robot = StructureFile.model_validate(tree)
     parts = {"robot": robot, "terrain": Nothing(), "strut_contact": NoStrutContact()}
     scenario = load_scenario("prism").with_sections(name="anchored", **parts)
-    times = {
-        "simulation.duration": f"{duration} s",
-        "simulation.steady_from": f"{0.5 * duration} s",
-        "cpg.start_up": 0.0,
-    }
-    return scenario.with_changes(times | changes)
+    return shortly(scenario, duration, **changes)
 
 
 def supported_prism(**changes: object) -> Scenario:

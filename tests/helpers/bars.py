@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+from helpers.anchored import BAR
+from helpers.converged import shortly
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.strut_contact_kinds import HuntCrossley
 
-RADIUS = 0.004
+RADIUS = 0.5 * BAR["diameter"]
 """Radius of a bar in m."""
 STIFFNESS = 10_000.0
 """Stiffness of the contact of two bars in N/m."""
@@ -37,15 +39,9 @@ def loose_bars(
     Hunt and Crossley, with a dissipation in s/m. Without gravity they are a metre above the
     ground."""
     height = 1.0 if gravity == 0.0 else 0.0
-    make = {
-        "diameter": 2.0 * RADIUS,
-        "density": 1200.0,
-        "node_diameter": 0.0,
-        "contact_radius": 0.0,
-    }
     nodes = {f"a{i}": list(pair[0]) for i, pair in enumerate(ends)}
     nodes |= {f"b{i}": list(pair[1]) for i, pair in enumerate(ends)}
-    struts = {f"bar{i}": {"pairs": [[f"a{i}", f"b{i}"]], **make} for i in range(len(ends))}
+    struts = {f"bar{i}": BAR | {"pairs": [[f"a{i}", f"b{i}"]]} for i in range(len(ends))}
     pairs = [["a0", f"a{i}"] for i in range(1, len(ends))]
     loose = {"pairs": pairs, "stiffness": 1.0, "damping": 0.0, "free_length": 99.0}
     scenario = load_scenario("prism").with_sections(
@@ -59,7 +55,6 @@ def loose_bars(
         ),
         strut_contact=HuntCrossley(stiffness=STIFFNESS, dissipation=dissipation),
     )
-    times = {"simulation.duration": f"{duration} s", "simulation.steady_from": "0 s"}
-    times["simulation.sample_period"] = "1 ms"
     fine = {"engine.tolerance": "1e-6 m/s", "engine.max_step": "1 ms"}
-    return Robot.of(scenario.with_changes(times | fine))
+    fine["simulation.sample_period"] = "1 ms"
+    return Robot.of(shortly(scenario, duration, **fine))

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from helpers.anchored import BAR, LINE
+
 MASS, STIFFNESS = 0.05, 40.0
 HANGING: dict[str, Any] = {
     "nodes": {"a": [0.0, 0.0, 1.0], "b": [0.2, 0.0, 1.0], "p": [0.1, 0.0, 0.8]},
-    "struts": {
-        "bar": {
-            "pairs": [["a", "b"]],
-            "diameter": 0.008,
-            "density": 1200.0,
-            "node_diameter": 0.0,
-            "contact_radius": 0.0,
-        }
-    },
+    "struts": {"bar": BAR},
     "cables": {
-        "line": {"pairs": [["a", "p"], ["b", "p"]], "stiffness": STIFFNESS, "damping": 0.0}
-        | {"free_length": 0.0}
+        "line": LINE
+        | {"pairs": [["a", "p"], ["b", "p"]], "stiffness": STIFFNESS, "free_length": 0.0}
     },
     "masses": {"p": MASS},
     "anchors": {"a": "xyz", "b": "xyz"},

@@ -1,69 +1,31 @@
-"""A prism of three bars that nine cables tie together, built by hand: no row of tetrahedra."""
+"""The shipped prism before it rests, a robot that is no row of tetrahedra, and a motion of it."""
 
 import dataclasses
 
 import numpy as np
 import xarray
 
-from tetra_drake.physics.cable import PASSIVE
+from helpers.structures import SIDES_ALONE
 from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.structure_files import read_structure
 
 SPEED = 0.01  # m/s
 PERIOD = 2.0  # s, of the signals
 RADII = (0.008, 0.005, 0.008, 0.005, 0.008, 0.005)
 """Of the nodes, in m; upper ones are smaller."""
 
-OSCILLATORS = ("first", "second", "third")
-NODES = ("n0", "n4", "n1", "n5", "n2", "n3")
-"""n0 to n2 are below; a bar has two neighbouring nodes."""
-
-CABLES = {
-    "bottom n0 n1": PASSIVE,
-    "top n4 n5": PASSIVE,
-    "side n4 n1": 0,
-    "bottom n0 n2": PASSIVE,
-    "top n4 n3": PASSIVE,
-    "side n0 n3": 1,
-    "bottom n1 n2": PASSIVE,
-    "top n5 n3": PASSIVE,
-    "side n5 n2": 2,
-}
-"""The oscillator that drives each cable, pair by pair of bars."""
-
-
-BAR = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.0, "contact_radius": 0.0}
-CABLE = {"stiffness": 100.0, "damping": 0.5, "free_length": 0.1}
-
 
 def make_prism() -> Robot:
-    """The prism on flat ground, 0.2 m wide and 0.16 m high, with twisted ends."""
-    lower, upper = np.radians([0.0, 120.0, 240.0]), np.radians([150.0, 270.0, 30.0])
-    p_WN = np.zeros((6, 3))
-    p_WN[::2, :2] = 0.1 * np.column_stack([np.cos(lower), np.sin(lower)])
-    p_WN[1::2, :2] = 0.1 * np.column_stack([np.cos(upper), np.sin(upper)])
-    p_WN[1::2, 2] = 0.16
-    kind = StructureFile.model_validate(
-        {
-            "nodes": dict(zip(NODES, p_WN.tolist(), strict=True)),
-            "struts": {"bar": BAR | {"pairs": [NODES[:2], NODES[2:4], NODES[4:]]}},
-            "cables": {
-                group: CABLE | {"pairs": [name.split()[1:] for name in CABLES if group in name]}
-                for group in ("bottom", "top", "side")
-            },
-            "actuated": {
-                oscillator: [name for name, driver in CABLES.items() if driver == number]
-                for number, oscillator in enumerate(OSCILLATORS)
-            },
-        }
-    )
+    """The prism on flat ground, 0.2 m wide and 0.16 m high, driven at its sides."""
+    tree = read_structure("prism").model_dump() | {"actuated": SIDES_ALONE}
     # Spheres without mass, so that the middle of a bar is its centre of mass.
     spheres = {"node_radius": np.array(RADII), "node_density": np.full(6, 1e-9)}
-    blueprint = dataclasses.replace(kind.blueprint(), **spheres)
+    blueprint = dataclasses.replace(StructureFile.model_validate(tree).blueprint(), **spheres)
     return Robot.of(load_scenario("coulomb"), Structure.of(blueprint))
 
 

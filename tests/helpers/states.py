@@ -6,8 +6,11 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import RotationalInertia
 
+from helpers.structures import poses_of
+from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.model import Model
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 
 
 def body_velocities(walk: xarray.Dataset, structure: Structure) -> tuple[np.ndarray, np.ndarray]:
@@ -42,3 +45,23 @@ def mass_matrix(robot: Model, state: np.ndarray) -> np.ndarray:
         matrix[6 * i : 6 * i + 3, 6 * i : 6 * i + 3] = turned.CopyToFullMatrix3()
         matrix[6 * i + 3 : 6 * i + 6, 6 * i + 3 : 6 * i + 6] = mass * np.eye(3)
     return matrix
+
+
+def energy_and_momenta(robot: Robot, state: np.ndarray) -> np.ndarray:
+    """(7,): energy of bodies and cables; momentum, and angular momentum about the origin."""
+    structure, poses = robot.structure, poses_of(state[np.newaxis])[0]
+    velocities, cables = state[poses.size :], structure.cables
+    wrench = (mass_matrix(robot.model, state) @ velocities).reshape(-1, 6)
+    p_WN = node_positions(structure, state)
+    lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
+    stretch = np.maximum(lengths - cables["free_length"], 0.0)
+    energy = 0.5 * (velocities @ wrench.ravel() + cables["stiffness"] @ stretch**2)
+    angular = (wrench[:, :3] + np.cross(poses[:, 4:], wrench[:, 3:])).sum(axis=0)
+    return np.concatenate([[energy], wrench[:, 3:].sum(axis=0), angular])
+
+
+def strut_clearance(robot: Robot, state: np.ndarray, least: float = np.inf) -> float:
+    """The least distance (m) of struts of different bodies, or `least` if none are that near."""
+    nodes, model = moved_nodes(robot.structure, state), robot.model
+    radius, first_node = model.bodies.radius, model.first_node
+    return least_strut_distance(model.struts, radius, first_node, state, nodes, least)

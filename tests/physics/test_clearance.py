@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.states import disturbed
+from helpers.states import disturbed, strut_clearance
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import (
     Capsule,
@@ -14,22 +14,16 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from tetra_drake.physics.clearance import Struts, least_strut_distance, strut_distance
+from tetra_drake.physics.clearance import Struts, strut_distance
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 
 PAIR = Struts(
     *map(np.array, ([0, 2], [1, 3], [0, 1, 2])), length=np.full(2, 2.0), radius=np.full(2, 0.1)
 )
 """Two struts of length 2, of two bodies."""
-
-
-def nodes_at(p_WN: np.ndarray) -> np.ndarray:
-    nodes = np.zeros((len(p_WN), NODE_COLUMNS))
-    nodes[:, P_WN : P_WN + 3] = p_WN
-    return nodes
 
 
 @pytest.mark.parametrize(
@@ -44,7 +38,8 @@ def nodes_at(p_WN: np.ndarray) -> np.ndarray:
 def test_segments_are_as_far_apart_as_their_nearest_points(first, second, distance):
     for turned in (first, first[::-1]):
         for other in (second, second[::-1]):
-            nodes = nodes_at(np.array([*turned, *other], dtype=float))
+            nodes = np.zeros((4, NODE_COLUMNS))
+            nodes[:, P_WN : P_WN + 3] = [*turned, *other]
             for i, j in ((0, 1), (1, 0)):
                 apart = strut_distance(PAIR, nodes, i, j)
                 assert apart == pytest.approx(distance, abs=1e-12)
@@ -79,12 +74,6 @@ def drake_distance(structure: Structure, poses: list[RigidTransform], radius: fl
     )
 
 
-def distance_of(robot: Robot, state: np.ndarray, least: float = np.inf) -> float:
-    nodes, model = moved_nodes(robot.structure, state), robot.model
-    radius, first_node = model.bodies.radius, model.first_node
-    return least_strut_distance(model.struts, radius, first_node, state, nodes, least)
-
-
 @pytest.mark.parametrize("name", ["thesis", "six_bar", "mast"])
 def test_the_clearance_is_that_of_drakes_geometry(name):
     # The robot as it starts, then bodies that are turned and moved more and more: in the end,
@@ -100,11 +89,11 @@ def test_the_clearance_is_that_of_drakes_geometry(name):
         # Within what Drake's iterations for capsules leave; struts that are nearer than two radii
         # overlap, where it is less sure.
         theirs = drake_distance(structure, poses, 1e-4)
-        assert distance_of(robot, state) == pytest.approx(theirs, abs=1e-5)
+        assert strut_clearance(robot, state) == pytest.approx(theirs, abs=1e-5)
 
 
 def test_what_is_farther_than_the_least_so_far_changes_nothing(robot):
     state = robot.structure.initial_state
-    least = distance_of(robot, state)
-    assert distance_of(robot, state, 0.99 * least) == 0.99 * least
-    assert distance_of(robot, state, 1.01 * least) == least
+    least = strut_clearance(robot, state)
+    assert strut_clearance(robot, state, 0.99 * least) == 0.99 * least
+    assert strut_clearance(robot, state, 1.01 * least) == least

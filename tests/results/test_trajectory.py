@@ -92,7 +92,7 @@ def test_bodies_nodes_and_cables_of_any_structure_have_names() -> None:
     assert motion.body.values.tolist() == ["n0 n4", "n1 n5", "n2 n3"]
     cable = motion.sel(cable="side n0 n3")
     assert (cable.cable_bodies.item(), cable.cable_group.item()) == ("n0 n4-n2 n3", "side")
-    assert cable.cable_signal.item() == "second"
+    assert cable.cable_signal.item() == "first"
 
 
 @pytest.mark.parametrize(

@@ -106,16 +106,11 @@ def test_a_pendulum_swings_down_however_stiff_its_cable(stiffness, monkeypatch):
     assert tensions(robot) == pytest.approx([weight], rel=1e-6)
 
 
-def scaled(size: float, mass: float, stiffness: float, **changes: Any) -> Robot:
-    """The shipped prism with other size, mass and stiffness, as factors."""
+def scaled(mass: float, stiffness: float, **changes: Any) -> Robot:
+    """The shipped prism with other mass and stiffness, as factors."""
     tree = read_structure("prism").model_dump()
-    tree["nodes"] = {node: (size * np.array(p)).tolist() for node, p in tree["nodes"].items()}
-    bar = tree["struts"]["bar"]
-    bar |= {"diameter": size * bar["diameter"], "node_diameter": size * bar["node_diameter"]}
-    bar["contact_radius"] = 0.0
-    bar["density"] *= mass / size**3
+    tree["struts"]["bar"]["density"] *= mass
     for cable in tree["cables"].values():
-        cable["free_length"] *= size
         cable["stiffness"] *= stiffness
     robot = on_ground(tree, **changes)
     ground = {"ground.stiffness": stiffness * robot.scenario.ground.stiffness}
@@ -124,7 +119,7 @@ def scaled(size: float, mass: float, stiffness: float, **changes: Any) -> Robot:
 
 @pytest.mark.parametrize(("mass", "stiffness"), [(1e3, 1.0), (1e5, 1.0), (1.0, 1e6), (1e-6, 1.0)])
 def test_heavy_and_light_structures_rest(mass, stiffness):
-    robot = scaled(1.0, mass, stiffness)
+    robot = scaled(mass, stiffness)
     p_WN = np.array(list(places(robot).values()))
     # Rounding of the farthest coordinate (2e-16), times the stiffness of all springs of a body.
     hardest = max(robot.scenario.ground.stiffness, 100.0 * stiffness)
@@ -137,7 +132,7 @@ def test_heavy_and_light_structures_rest(mass, stiffness):
 
 def test_a_heavy_structure_rests_on_its_own_struts():
     # Its cables cannot hold it, so it lies on the ground, with bars on each other.
-    robot = scaled(1.0, 10.0, 0.1, **TOUCHING)
+    robot = scaled(10.0, 0.1, **TOUCHING)
     heights = np.array([place[2] for place in places(robot).values()])
     load = robot.scenario.ground.stiffness * np.maximum(0.0, -heights).sum()
     assert load == pytest.approx(robot.weight, rel=1e-5)

@@ -1,13 +1,8 @@
 """The benchmark: its tables on short simulations of few gaits."""
 
 import benchmark
+from helpers.converged import shortly
 
-QUICK = {
-    "robot.tetrahedra": 3,
-    "cpg.start_up": "0.05 s",
-    "simulation.duration": "0.1 s",
-    "simulation.steady_from": "0.05 s",
-}
 FEW = {"GAITS": 2, "BATCHES": (1, 2), "GROUND_BATCH": 1, "CONTROLLED": (2,), "ROUNDS": 1}
 
 
@@ -15,7 +10,7 @@ def test_every_engine_and_ground_is_measured(scenario, monkeypatch, capsys):
     only = {"available_cores": lambda: 1, "installed": lambda: False}  # no MuJoCo
     for name, value in (FEW | only).items():
         monkeypatch.setattr(benchmark, name, value)
-    benchmark.main([], scenario.with_changes(QUICK))
+    benchmark.main([], shortly(scenario, 0.1, robot__tetrahedra=3))
     tables = [table.splitlines()[2:] for table in capsys.readouterr().out.strip().split("\n\n")]
     cells = [[line.strip("| ").split("|") for line in table] for table in tables]
     engines, batches, grounds, controlled = cells

@@ -10,9 +10,7 @@ from record import EXPERIMENTS
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.refusals import TAG
-from tetra_drake.scenario.section import Section
 from tetra_drake.scenario.shipped import shipped_scenarios
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 # Exact by definition
 IN = 0.0254
@@ -170,23 +168,6 @@ def test_there_are_no_differences_exactly_between_equal_scenarios():
         assert (one.differences(other) == [], other.differences(one) == []) == (same, same), changes
         seen.add(same)
     assert seen == {True, False}
-
-
-def every_default(section, tree, key=""):
-    """The keys that a tree of a section leaves to defaults."""
-    for name in type(section).model_fields:
-        if name not in tree:
-            yield f"{key}{name}"
-        elif isinstance(getattr(section, name), Section):
-            yield from every_default(getattr(section, name), tree[name], f"{key}{name}.")
-
-
-@pytest.mark.parametrize("file", sorted(RUNS.glob("*/scenario.yaml")), ids=lambda f: f.parent.name)
-def test_a_record_leaves_nothing_to_defaults(file):
-    # Another default of a later version would change what was recorded.
-    recorded = load_scenario(file)
-    for text in (file.read_text(), dump_scenario(recorded)):
-        assert [*every_default(recorded, parse_yaml(text, str(file)))] == []
 
 
 # Bad files: the key at fault, and what was found there or is suggested

@@ -3,7 +3,9 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from helpers.structure_file import FILE
 from pytest import approx
 
 from tetra_drake.scenario.load import load_scenario
@@ -11,18 +13,6 @@ from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure
-
-BAR = """
-unit: cm
-nodes: {a: [0, 0, 0], b: [10, 0, 0], c: [0, 10, 0], d: [10, 10, 0], e: [0, 0, 10], f: [0, 10, 10]}
-struts:
-  bar: {pairs: [[a, b], [c, d], [e, f]], diameter: 8 mm, density: 1.2 g/cm^3, node_diameter: 0 m}
-cables:
-  side: {pairs: [[a, c], [b, d]], stiffness: 2 N/cm, damping: 3 N*s/m, free_length: 20 mm}
-  rise: {pairs: [[a, e], [c, f]], stiffness: 100 N/m, damping: 0 N*s/m, tension: 2 N}
-actuated: {left: [side c a], right: [side b d]}
-masses: {b: 20 g}
-"""
 
 NTRT = """
 nodes: {a: [0, 0, 0], b: [1, 0, 0], c: [0, 0, 1], d: [1, 0, 1]}
@@ -39,15 +29,15 @@ def load(folder: Path, robot: str, *, more: str = "") -> Scenario:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a structure file, bar.yaml, and one of NTRT."""
-    (tmp_path / "bar.yaml").write_text(BAR)
+    """A folder with a structure file, own.yaml, and one of NTRT."""
+    (tmp_path / "own.yaml").write_text(FILE)
     (tmp_path / "ntrt.yaml").write_text(NTRT)
     return tmp_path
 
 
 def test_a_scenario_holds_what_its_file_holds(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: bar.yaml}")
-    assert scenario.robot == read_structure(folder / "bar.yaml")
+    scenario = load(folder, "!Structure {file: own.yaml}")
+    assert scenario.robot == read_structure(folder / "own.yaml")
     assert (scenario.robot.body_count, scenario.oscillators) == (3, 2)
     assert scenario.robot.size == approx(0.1)
     assert scenario.robot.slack
@@ -60,35 +50,35 @@ def test_a_shipped_scenario_has_the_shipped_structure(name: str) -> None:
 
 def test_what_stands_beside_the_file_overrides_it(folder: Path) -> None:
     robot = """!Structure
-      file: bar.yaml
-      nodes: {d: [11, 10, 0]}
-      cables: {side: {stiffness: 50 N/m}, rise: {tension: null, free_length: 5 cm}}
-      actuated: {both: [side a c, side b d]}
+      file: own.yaml
+      nodes: {d: [3, 2, 5]}
+      cables: {side: {stiffness: 50 N/m}, long: {tension: null, free_length: 5 cm}}
+      actuated: {both: [side b d, side c d]}
       contacts: [a]
       offsets: [[0, 0, 1 mm], [0, 0, 0], [0, 0, 0]]
     """
     given = load(folder, robot).robot
     assert isinstance(given, StructureFile)
-    assert given.nodes["d"] == approx([0.11, 0.1, 0.0])
-    side, rise = given.cables["side"], given.cables["rise"]
-    assert (side.stiffness, side.damping, rise.free_length) == (50.0, 3.0, 0.05)
+    assert given.nodes["d"] == approx([0.03, 0.02, 0.05])
+    side, long = given.cables["side"], given.cables["long"]
+    assert (side.stiffness, side.damping, long.free_length) == (50.0, 3.0, 0.05)
     assert given.cables_of_oscillator == {"both": (0, 1)}
     assert (given.contact_nodes, given.offsets[0]) == (("a",), [0.0, 0.0, 0.001])
 
 
 def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
-    text = "base: prism\nname: other\nrobot: {file: mine/bar.yaml, gravity: 0}\n"
+    text = "base: prism\nname: other\nrobot: {file: mine/own.yaml, gravity: 0}\n"
     (folder / "mine").mkdir()
-    (folder / "bar.yaml").rename(folder / "mine" / "bar.yaml")
+    (folder / "own.yaml").rename(folder / "mine" / "own.yaml")
     (folder / "other.yaml").write_text(text)
     given = load_scenario(folder / "other.yaml").robot
-    expected = read_structure(folder / "mine" / "bar.yaml")
+    expected = read_structure(folder / "mine" / "own.yaml")
     assert given == expected.model_copy(update={"gravity": 0.0})
 
 
 def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: bar.yaml}")
-    file = str(folder / "bar.yaml")
+    scenario = load(folder, "!Structure {file: own.yaml}")
+    file = str(folder / "own.yaml")
     changes = {"objective": {"speed": "1 s/m"}, "name": "mine"}
     for robot in ({"robot.file": file}, {"robot": read_structure(file)}):
         assert load_scenario("thesis").with_changes(changes | robot) == scenario
@@ -96,17 +86,18 @@ def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> Non
     assert changed.robot.cables["side"].stiffness == 250.0
     assert changed.with_changes({"robot.cables.side.stiffness": "200 N/m"}) == scenario
     assert changed.differences(scenario) == [("robot.cables.side.stiffness", "250 N/m")]
-    added = scenario.with_changes({"robot.actuated.rise": ["rise a e"]})
-    assert list(added.robot.actuated) == ["left", "right", "rise"]
+    apart = {"robot.actuated.left": ["side b d"], "robot.actuated.top": ["long e f"]}
+    assert list(scenario.with_changes(apart).robot.actuated) == ["left", "right", "top"]
 
 
 def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: bar.yaml}")
-    assert scenario.numbers()["robot.struts.bar.density"] == approx(1200.0)
-    changed = scenario.with_numbers({"robot.cables.rise.tension": 4.0, "robot.masses.b": 1.0})
-    assert changed.robot.free_lengths == approx([0.02, 0.02, 0.06, 0.06])
-    assert changed.robot.masses == {"b": 1.0}
-    assert scenario.robot.free_lengths == approx([0.02, 0.02, 0.08, 0.08])
+    scenario = load(folder, "!Structure {file: own.yaml}")
+    assert scenario.numbers()["robot.struts.arm.density"] == approx(1200.0)
+    changed = scenario.with_numbers({"robot.cables.long.tension": 4.0, "robot.masses.g": 1.0})
+    length = np.hypot(0.07, 0.10)
+    assert changed.robot.free_lengths == approx([0.02, 0.02, length - 4.0 / 100.0])
+    assert changed.robot.masses == {"g": 1.0}
+    assert scenario.robot.free_lengths == approx([0.02, 0.02, length - 2.0 / 100.0])
 
 
 def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
@@ -127,11 +118,11 @@ def test_a_unit_is_that_of_bare_coordinates() -> None:
     ("robot", "key", "fact"),
     [
         ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
-        ("!Tetrahedra {file: bar.yaml}", "robot.file", "unknown"),
+        ("!Tetrahedra {file: own.yaml}", "robot.file", "unknown"),
         ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
-        ("!Structure {file: bar.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
+        ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
         ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.struts", "`base`"),
-        ("!Structure {file: bar.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
+        ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
         ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
     ],
 )
@@ -144,15 +135,15 @@ def test_a_fault_of_the_scenario_names_it(folder, robot, key, fact, refused):
     ("old", "new", "key", "fact"),
     [
         ("stiffness: 2 N/cm, ", "", "cables.side.stiffness", "is missing; give it"),
-        ("[b, d]]", "[b, x]]", "cables.side.pairs[1]", "'x'"),
+        ("[c, d]]", "[c, x]]", "cables.side.pairs[1]", "'x'"),
         ("unit: cm", "unit: [", "", "YAML"),
     ],
 )
 def test_a_fault_of_a_structure_file_names_that(folder, old, new, key, fact, refused):
-    file = folder / "bar.yaml"
-    file.write_text(BAR.replace(old, new))
+    file = folder / "own.yaml"
+    file.write_text(FILE.replace(old, new))
     with refused(file, key, fact):
-        load(folder, "!Structure {file: bar.yaml, cables: {side: {stiffness: 1 N/m}}}")
+        load(folder, "!Structure {file: own.yaml, cables: {side: {stiffness: 1 N/m}}}")
 
 
 def test_a_change_of_a_group_of_another_name_tells_a_similar_one(refused) -> None:
@@ -188,4 +179,4 @@ def test_memory_limits_count_bodies(folder: Path, refused) -> None:
     more = "simulation: {sample_period: 2e-5 s}"
     assert load(folder, "!Tetrahedra {tetrahedra: 2}", more=more)
     with refused(folder / "mine.yaml", "simulation.sample_period", "2.25e-05"):
-        load(folder, "!Structure {file: bar.yaml}", more=more)
+        load(folder, "!Structure {file: own.yaml}", more=more)

@@ -39,8 +39,13 @@ LAW = CableLaw(stiffness=60.0, damping=8.0, free_length=0.0)
 LEFT, RIGHT = np.array([-0.2, 0.0, 0.5]), np.array([0.6, 0.0, 0.3])  # anchors of two tendons
 
 
-def hinged_rod(builder: DiagramBuilder) -> tuple[MultibodyPlant, Frame]:
-    """A plant with a rod along x that turns about y, and the frame at its free end."""
+Arm = tuple[DiagramBuilder, MultibodyPlant, Frame, list[Cable]]
+
+
+def rod_with_tendons(**constants: object) -> Arm:
+    """A rod along x that turns about y, its free end, and two tendons to it from the world, by a
+    law with other constants."""
+    builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
     inertia = SpatialInertia.ThinRodWithMassAboutEnd(MASS, LENGTH, [1.0, 0.0, 0.0])
     rod = plant.AddRigidBody("rod", inertia)
@@ -48,17 +53,6 @@ def hinged_rod(builder: DiagramBuilder) -> tuple[MultibodyPlant, Frame]:
     plant.AddJoint(hinge)
     tip = AddFrame(plant, "tip", rod.body_frame(), [LENGTH, 0.0, 0.0])
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -GRAVITY])
-    return plant, tip
-
-
-Arm = tuple[DiagramBuilder, MultibodyPlant, Frame, list[Cable]]
-
-
-def rod_with_tendons(**constants: object) -> Arm:
-    """The hinged rod, its free end, and two tendons to it from the world, by a law with other
-    constants."""
-    builder = DiagramBuilder()
-    plant, tip = hinged_rod(builder)
     cables, law = [], LAW._replace(**constants)
     for name, place in {"left": LEFT, "right": RIGHT}.items():
         anchor = AddFrame(plant, name, plant.world_frame(), place)

@@ -6,6 +6,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from helpers.converged import shortly
 from helpers.meshcat_page import commands
 from pydrake.geometry import MeshcatParams
 
@@ -37,8 +38,7 @@ class FakeTime:
 
 @pytest.fixture
 def short(scenario):
-    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
-    return scenario.with_changes({"robot.tetrahedra": 2} | times)
+    return shortly(scenario, 0.3, robot__tetrahedra=2)
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from helpers import prism
 from helpers.anchored import HUNG, scenario_of
+from helpers.converged import shortly
 from helpers.made_up_walk import LOAD, make_row, make_walk
 from helpers.meshcat_page import commands, read_page
 
@@ -47,8 +48,7 @@ def recorded(scenario):
 
 @pytest.fixture(scope="module")
 def scenario():
-    times = {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
-    return load_scenario().with_changes(times)
+    return shortly(load_scenario(), 0.2)
 
 
 @pytest.fixture(scope="module")
@@ -77,11 +77,6 @@ def page(file):
 @pytest.fixture(scope="module")
 def film(page):
     return film_of(page)
-
-
-@pytest.fixture(scope="module")
-def structure(scenario):
-    return Robot.of(scenario).structure
 
 
 def film_of(page):

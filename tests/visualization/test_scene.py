@@ -79,7 +79,7 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
         np.testing.assert_allclose(moved[path][:3, 3], ends.mean(axis=0), rtol=0, atol=1e-12)
     radii = scene.drawn_radii(structure)[1]
     assert (radii >= prism.RADII).all()
-    for name, radius, p_BN in zip(prism.NODES, radii, structure.p_BN, strict=True):
+    for name, radius, p_BN in zip(structure.node_names, radii, structure.p_BN, strict=True):
         (path,) = (path for path in shapes if path.endswith(f"/node {name}"))
         assert shapes[path]["radius"] == radius
         np.testing.assert_allclose(moved[path][:3, 3], p_BN, rtol=0, atol=1e-12)

@@ -3,6 +3,7 @@
 import contextlib
 
 import pytest
+from helpers.converged import shortly
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
@@ -28,10 +29,8 @@ def compiled(scenario: Scenario) -> Scenario:
     ],
 )
 def test_extreme_settings_come_to_an_end(compiled, setting, value, failure):
-    changes = {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
-    changes |= {"cpg.start_up": "0.05 s", "robot.tetrahedra": 2}
-    changes |= {f"engine.{setting}": value, "simulation.max_evaluations": 9000}
-    extreme = compiled.with_changes(changes)
+    changes = {"robot.tetrahedra": 2, "simulation.max_evaluations": 9000}
+    extreme = shortly(compiled, 0.2, **changes | {f"engine.{setting}": value})
     with time_limit(30.0), pytest.raises(failure) if failure else contextlib.nullcontext():
         simulate(scenario=extreme, gait=seeded_gait(extreme))
 
@@ -50,7 +49,6 @@ def test_bodies_are_isotropic_but_for_rounding(structure, lengthwise, isotropic)
 
 @pytest.mark.parametrize("duration", [1.0 / 3.0, 2.0 / 3.0])
 def test_a_simulation_ends_at_a_duration_of_any_number_of_decimals(compiled, duration):
-    changes = {"simulation.duration": f"{duration!r} s", "simulation.steady_from": "0.1 s"}
-    short = compiled.with_changes(changes)
+    short = shortly(compiled, duration)
     ended = simulate(short, seeded_gait(short), record=True).trajectory.time[-1]
     assert ended == duration
