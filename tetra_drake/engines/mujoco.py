@@ -146,8 +146,7 @@ class _Simulator:
         """True if a law of the other engines computes forces at each step."""
         self._parts = Packed((robot.model, Forces.of(robot.model)))
         try:
-            text = make_mjcf(robot, pulled=self.pulled, struts_touch=False)
-            self._model = mujoco.MjModel.from_xml_string(text)
+            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot, own_laws=True))
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
@@ -170,7 +169,9 @@ class _Simulator:
     def roll_out(self, rollout: Any, state: Array, signals: Array) -> Array:
         """MuJoCo's states (time, qpos, qvel) after each step from a state, with a row of signals
         (steps, n) for each step."""
-        (states,), _ = rollout.rollout(self._model, [self._data], state, self._controls(signals))
+        controls = np.zeros((len(signals), self._model.nu))  # 0 for anchors and loads
+        controls[:, : self._motors.size] = signals[:, self._motors]
+        (states,), _ = rollout.rollout(self._model, [self._data], state, controls)
         return states
 
     def step_through(self, state: Array, signals: Array, drives: Array) -> tuple[Array, Array]:
@@ -203,13 +204,6 @@ class _Simulator:
             return
         lengths, rates = data.ten_length, data.ten_velocity
         pull_cables(self._parts, lengths, rates, signals, step, drives, data.ctrl[: lengths.size])
-
-    def _controls(self, signals: Array) -> Array:
-        """MuJoCo's controls (steps, actuators) for signals (steps, n). Anchors and loads have the
-        control 0."""
-        controls = np.zeros((len(signals), self._model.nu))
-        controls[:, : self._motors.size] = signals[:, self._motors]
-        return controls
 
     def observe(
         self, observer: Observer, states: Array, signals: Array, drives: Array, *, first: int
