@@ -3,9 +3,9 @@
 Bodies, cables, actuation and gravity are the same as in the other engines. The ground differs: it
 is MuJoCo's soft contact with a friction cone.
 
-- Actuators with drives, and damped or driven cables that go slack: each cable's
-  tension is computed by the law of the other engines, from MuJoCo's lengths at the beginning of
-  each step. Otherwise cables are MuJoCo's own tendons.
+- Cables are MuJoCo's tendons. If actuators have drives, or damped or driven cables can go slack,
+  the law of the other engines computes the tensions, from MuJoCo's lengths at the beginning of each
+  step.
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
   grows with depth. Both agree at the depth of a robot in equilibrium.
 - Contact of struts: the forces are computed by the law of the other engines, from MuJoCo's state
@@ -191,8 +191,8 @@ class _Simulator:
         return states, all_drives
 
     def _push(self, data: Any, signals: Array, drives: Array, step: float) -> None:
-        """Sets the forces between struts and the controls for signals (n,), and advances the drives
-        by a step (s)."""
+        """Sets the forces between struts, and the controls for signals (n,) in N. Advances the
+        drives by a step (s)."""
         if self._touches:
             velocity, force = data.qvel.reshape(-1, 6), np.empty(data.qvel.size)
             poses, turns = np.hstack([data.xquat, data.xpos])[1:], data.cvel[1:, :3]
