@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import shlex
 import sys
@@ -621,15 +622,9 @@ def _prepare() -> None:
     from tetra_drake.engines.preparation import FUNCTIONS, prepare
     from tetra_drake.evolution.progress import Display
 
-    title, done = "compiled functions", 0
-
-    def tell() -> None:
-        nonlocal done
-        done = min(done + 1, FUNCTIONS - 1)
-        display.stage(title, done, FUNCTIONS)
-
+    title, numbers = "compiled functions", itertools.count(1)
     with Display(sys.stdout) as display:
-        prepare(tell)
+        prepare(lambda: display.stage(title, min(next(numbers), FUNCTIONS - 1), FUNCTIONS))
         display.stage(title, FUNCTIONS, FUNCTIONS)
 
 

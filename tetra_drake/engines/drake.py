@@ -21,7 +21,6 @@ from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import HeldSignals
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -54,26 +53,27 @@ class DrakeEngine(Engine):
     can_be_watched = True
 
     def simulate(self, simulation: GaitSimulation) -> SimulationResult:
-        if len(simulation.robot.commanded):
-            return _play(simulation)
-        diagram = MakeTensegrityDiagram(
-            simulation.robot, simulation.gait, steering=simulation.steering
-        )
-        walk = _DiagramWalk(simulation, diagram)
+        walk, changes = _DiagramWalk(simulation), simulation.changes
         for mark in simulation.marks.tolist():
             walk.advance_to(mark)
+            if mark in changes:
+                walk.hold(changes[mark])
         return walk.result()
 
     def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> SerialStepper:
-        return SerialStepper(_ControlledWalk, first.robot.structure, count=count)
+        return SerialStepper(_DiagramWalk, first.robot.structure, count=count)
 
 
 class _DiagramWalk:
-    """Simulation of a robot's diagram."""
+    """Simulation of a robot's diagram. A command, or actions, are signals that are held."""
 
-    def __init__(self, simulation: GaitSimulation, diagram: Diagram) -> None:
+    def __init__(self, simulation: GaitSimulation) -> None:
         robot, engine = simulation.robot, simulation.robot.scenario.settings_of(Drake)
-        self._simulation, self._diagram, self._engine = simulation, diagram, engine
+        held = HeldSignals(robot) if len(robot.commanded) else None
+        self._diagram = diagram = MakeTensegrityDiagram(
+            robot, simulation.gait, steering=simulation.steering, controller=held
+        )
+        self._simulation, self._engine = simulation, engine
         self._simulator = MakeSimulator(diagram, robot, engine)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
         self._drives_at, self._observer = drives_of(diagram), Observer(robot)
@@ -100,6 +100,16 @@ class _DiagramWalk:
         finally:
             self._wall_time += perf_counter() - started
 
+    def hold(self, signals: np.ndarray) -> None:
+        """Sets the signals (m,) in N of a robot with a command, from now on."""
+        held = self._diagram.GetSubsystemByName("controller")
+        held.Hold(held.GetMyMutableContextFromRoot(self._simulator.get_mutable_context()), signals)
+
+    def readings(self) -> Readings:
+        """The readings of a robot with a command now."""
+        held = self._diagram.GetSubsystemByName("controller")
+        return held.Read(held.GetMyContextFromRoot(self._simulator.get_context()))
+
     def result(self) -> SimulationResult:
         """The result, at the end."""
         steps, derivative_evaluations, jacobian_evaluations = self._work.total()
@@ -125,7 +135,7 @@ class _DiagramWalk:
         robot, viewer = self._simulation.robot, self._simulation.viewer
         bodies, now = self._state.Eval(context), context.get_time()
         velocities = bodies[7 * len(robot.structure.bodies) :]
-        _check(robot.scenario.simulation, now, velocities, self._speed_limit, self._work)
+        self._check(now, velocities)
         self._aimer.aim(context, velocities)
         self._sampler.after_step(context)
         drives = self._drives_at(context)
@@ -138,35 +148,16 @@ class _DiagramWalk:
         if viewer is not None and viewer.wants(now):
             viewer.show(frame_of(robot, self._diagram, context))
 
-
-class _ControlledWalk(_DiagramWalk):
-    """Simulation of a robot's diagram with signals that are held between pauses."""
-
-    def __init__(self, simulation: GaitSimulation) -> None:
-        robot = simulation.robot
-        self._held = HeldSignals(robot)
-        super().__init__(simulation, MakeTensegrityDiagram(robot, None, controller=self._held))
-        self._context = self._held.GetMyMutableContextFromRoot(
-            self._simulator.get_mutable_context()
-        )
-
-    def hold(self, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N, from now on."""
-        self._held.Hold(self._context, signals)
-
-    def readings(self) -> Readings:
-        """The readings of the robot now."""
-        return self._held.Read(self._context)
-
-
-def _play(simulation: GaitSimulation) -> SimulationResult:
-    """Simulates a command: its changes are held, as actions are."""
-    walk, changes = _ControlledWalk(simulation), simulation.changes
-    for mark in simulation.marks.tolist():
-        walk.advance_to(mark)
-        if mark in changes:
-            walk.hold(changes[mark])
-    return walk.result()
+    def _check(self, now: float, velocities: np.ndarray) -> None:
+        """Raises Diverged, if a body is beyond the speed limit, or StepBudgetExceeded."""
+        speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
+        used = self._work.derivative_evaluations()
+        budget = self._simulation.robot.scenario.simulation.max_evaluations
+        if not speed <= self._speed_limit:
+            raise Diverged.too_fast(time=now, limit=self._speed_limit)
+        if used > budget:
+            reason = f"{used} derivative evaluations, the budget is {budget}"
+            raise StepBudgetExceeded(time=now, reason=reason)
 
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
@@ -224,19 +215,6 @@ class _Work:
         self._before = self.total()
 
 
-def _check(
-    settings: SimulationSection, now: float, velocities: np.ndarray, limit: float, work: _Work
-) -> None:
-    """Raises Diverged, if a body is beyond the speed limit (m/s), or StepBudgetExceeded."""
-    speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
-    used = work.derivative_evaluations()
-    if not speed <= limit:
-        raise Diverged.too_fast(time=now, limit=limit)
-    if used > settings.max_evaluations:
-        reason = f"{used} derivative evaluations, the budget is {settings.max_evaluations}"
-        raise StepBudgetExceeded(time=now, reason=reason)
-
-
 class _StepAimer:
     """Chooses the largest allowed length of the next step, by the time to the next mode change.
 
@@ -270,9 +248,8 @@ class _StepAimer:
             and settings.look_ahead > 0.0
             and settings.scheme == "radau3"  # other schemes take short steps anyway
         )
-        name = "state_forces"
-        touches = diagram.HasSubsystemNamed(name)
-        self._struts = diagram.GetSubsystemByName(name) if touches else None
+        touches = diagram.HasSubsystemNamed("state_forces")
+        self._struts = diagram.GetSubsystemByName("state_forces") if touches else None
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
         self._last_velocities = self._acceleration = np.zeros(size)

@@ -55,12 +55,11 @@ def check_mjcf(scenario: Scenario) -> None:
     scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
 
-def make_mjcf(
-    robot: Robot, *, rest: Array | None = None, pulled: bool = False, struts_touch: bool = True
-) -> str:
+def make_mjcf(robot: Robot, *, rest: Array | None = None, own_laws: bool = False) -> str:
     """Model of a robot with a tendon for each cable and a motor for each driven one. If the
-    actuators have drives, or if `pulled`, tendons have no law, and a motor for each cable exerts
-    its tension. Without `struts_touch`, struts pass through each other.
+    actuators have drives, tendons have no law, and a motor for each cable exerts its tension. With
+    `own_laws`, this is so wherever is_pulled() is true, and struts pass through each other: the
+    engine computes tensions and contacts by its own laws.
 
     Motors are in the order of their cables; for their names see motor_names(). With a state
     (13 bodies,) at `rest`, there is a key frame of this name. Raises InputError if MuJoCo does not
@@ -69,11 +68,9 @@ def make_mjcf(
     scenario = robot.scenario
     check_mjcf(scenario)
     model = Element("mujoco", model=scenario.name)
-    pulled = pulled or has_drive(robot.model.actuator)
-    steps = {
-        "integrator": integrator_of(robot, pulled=pulled),
-        "timestep": scenario.settings_of(Mujoco).step,
-    }
+    pulled = is_pulled(robot) if own_laws else has_drive(robot.model.actuator)
+    integrator, step = integrator_of(robot, pulled=pulled), scenario.settings_of(Mujoco).step
+    steps = {"integrator": integrator, "timestep": step}
     add_element(model, "compiler", inertiafromgeom="false")
     contact = {"cone": "elliptic", "impratio": _IMPRATIO}
     add_element(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
@@ -86,7 +83,7 @@ def make_mjcf(
     _add_bodies(model, world, robot)
     if rest is not None:
         _add_key_frame(model, robot.structure, rest)
-    if robot.model.strut_contact.acts and struts_touch:
+    if robot.model.strut_contact.acts and not own_laws:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
     _add_pushes(model, world, robot.structure)

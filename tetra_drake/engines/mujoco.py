@@ -3,9 +3,9 @@
 Bodies, cables, actuation and gravity are the same as in the other engines. The ground differs: it
 is MuJoCo's soft contact with a friction cone.
 
-- Actuators with drives, and damped or driven cables that go slack: each cable's
-  tension is computed by the law of the other engines, from MuJoCo's lengths at the beginning of
-  each step. Otherwise cables are MuJoCo's own tendons.
+- Cables are MuJoCo's tendons. If actuators have drives, or damped or driven cables can go slack,
+  the law of the other engines computes the tensions, from MuJoCo's lengths at the beginning of each
+  step.
 - Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
   grows with depth. Both agree at the depth of a robot in equilibrium.
 - Contact of struts: the forces are computed by the law of the other engines, from MuJoCo's state
@@ -36,11 +36,10 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
-from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE, Actuator
-from tetra_drake.physics.cable import PASSIVE, TENSION, Cables
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NORMAL
-from tetra_drake.physics.forces import Forces, compute_strut_forces, pull_of_cable
-from tetra_drake.physics.kinematics import FORCE
+from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE
+from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.physics.forces import Forces, Parts, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.equilibrium import (
@@ -57,7 +56,7 @@ from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.compiling import compiled
-from tetra_drake.simd.packed import Packed
+from tetra_drake.simd.packed import Packed, unpacked
 
 Array = np.ndarray
 
@@ -104,25 +103,19 @@ def is_stable(robot: Robot, step: float) -> bool:
     """True if MuJoCo's steps (s) are stable for the springs and dampers of a robot at its start.
 
     They are explicit for positions and cables, and stable if step^2 K + 2 step C < 4 M with the
-    stiffness K, the damping C and the mass M. All cables count as taut. MuJoCo itself holds anchors
-    and struts that touch, so they do not count.
+    stiffness K, the damping C and the mass M. So a damper c counts as a spring 2 c / step. All
+    cables count as taut. MuJoCo itself holds anchors and struts that touch, so they do not count.
     """
     from scipy.linalg import eigvalsh
 
-    model, law = robot.model, robot.model.cables.law
-    free = model.anchors._replace(stiffness=np.zeros_like(model.anchors.stiffness))
-    taut = Unactuated(model._replace(slack=False, anchors=free))
+    anchors, cables = robot.model.anchors, robot.model.cables
+    free = anchors._replace(stiffness=np.zeros_like(anchors.stiffness))
+    taut = Unactuated(robot.model._replace(slack=False, anchors=free))
     force_at_rest(taut, robot.structure.initial_state)
-    forces, mass = taut.forces, mass_matrix(taut)
-    forces.near_struts.count[:] = 0
-    stiffness = stiffness_at_rest(taut)
-    # Springs as stiff as the dampers are strong, without tension and ground.
-    forces.cable_forces[:, TENSION] = forces.ground_forces[:, NORMAL] = 0.0
-    forces.nodes[:, FORCE : FORCE + 3] = 0.0
-    dampers = model.cables._replace(law=law._replace(stiffness=law.damping))
-    taut.model = taut.model._replace(cables=dampers)
-    change = step**2 * stiffness + 2.0 * step * stiffness_at_rest(taut)
-    return bool(eigvalsh(change, mass).max() < 4.0)
+    taut.forces.near_struts.count[:] = 0
+    stiffer = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
+    taut.model = taut.model._replace(cables=cables._replace(law=stiffer))
+    return bool(eigvalsh(step**2 * stiffness_at_rest(taut), mass_matrix(taut)).max() < 4.0)
 
 
 def installed() -> bool:
@@ -151,10 +144,9 @@ class _Simulator:
         self._touches = robot.model.strut_contact.acts
         self.stepped = self.pulled or self._touches
         """True if a law of the other engines computes forces at each step."""
-        self._struts = Packed((robot.model, Forces.of(robot.model)))
+        self._parts = Packed((robot.model, Forces.of(robot.model)))
         try:
-            text = make_mjcf(robot, pulled=self.pulled, struts_touch=False)
-            self._model = mujoco.MjModel.from_xml_string(text)
+            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot, own_laws=True))
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
@@ -177,7 +169,9 @@ class _Simulator:
     def roll_out(self, rollout: Any, state: Array, signals: Array) -> Array:
         """MuJoCo's states (time, qpos, qvel) after each step from a state, with a row of signals
         (steps, n) for each step."""
-        (states,), _ = rollout.rollout(self._model, [self._data], state, self._controls(signals))
+        controls = np.zeros((len(signals), self._model.nu))  # 0 for anchors and loads
+        controls[:, : self._motors.size] = signals[:, self._motors]
+        (states,), _ = rollout.rollout(self._model, [self._data], state, controls)
         return states
 
     def step_through(self, state: Array, signals: Array, drives: Array) -> tuple[Array, Array]:
@@ -197,37 +191,19 @@ class _Simulator:
         return states, all_drives
 
     def _push(self, data: Any, signals: Array, drives: Array, step: float) -> None:
-        """Sets the forces between struts and the controls for signals (n,), and advances the drives
-        by a step (s)."""
-        robot = self._robot.model
+        """Sets the forces between struts, and the controls for signals (n,) in N. Advances the
+        drives by a step (s)."""
         if self._touches:
             velocity, force = data.qvel.reshape(-1, 6), np.empty(data.qvel.size)
             poses, turns = np.hstack([data.xquat, data.xpos])[1:], data.cvel[1:, :3]
             state = np.concatenate([poses.ravel(), np.hstack([turns, velocity[:, :3]]).ravel()])
-            compute_strut_forces(self._struts, state, 0.0, force)
+            compute_strut_forces(self._parts, state, 0.0, force)
             data.xfrc_applied[1:] = np.roll(force.reshape(-1, 6), 3, axis=1)
         if not self.pulled:
-            data.ctrl[:] = self._controls(signals[np.newaxis])[0]
+            data.ctrl[: self._motors.size] = signals[self._motors]
             return
-        tensions = data.ctrl[: robot.cables.signal.size]
-        pull_cables(
-            robot.cables,
-            robot.actuator,
-            robot.slack,
-            data.ten_length,
-            data.ten_velocity,
-            signals,
-            step,
-            drives,
-            tensions,
-        )
-
-    def _controls(self, signals: Array) -> Array:
-        """MuJoCo's controls (steps, actuators) for signals (steps, n). Anchors and loads have the
-        control 0."""
-        controls = np.zeros((len(signals), self._model.nu))
-        controls[:, : self._motors.size] = signals[:, self._motors]
-        return controls
+        lengths, rates = data.ten_length, data.ten_velocity
+        pull_cables(self._parts, lengths, rates, signals, step, drives, data.ctrl[: lengths.size])
 
     def observe(
         self, observer: Observer, states: Array, signals: Array, drives: Array, *, first: int
@@ -408,9 +384,7 @@ class _MujocoWalk:
 
 @compiled
 def pull_cables(
-    cables: Cables,
-    actuator: Actuator,
-    slack: bool,
+    parts: Parts,
     lengths: Array,
     rates: Array,
     signals: Array,
@@ -420,15 +394,13 @@ def pull_cables(
 ) -> None:
     """Writes the tensions (cables,) in N, and advances the drives (drives,) by a step (s).
 
-    `lengths` (cables,) are in m, their `rates` in m/s, `signals` (n,) in N. With `slack`, passive
-    cables do not push.
+    `lengths` (cables,) are in m, their `rates` in m/s, `signals` (n,) in N.
     """
+    robot, _ = unpacked(parts)
     drive, table = 0, np.zeros((drives.size, DRIVE_COLUMNS))
     table[:, DRIVE] = drives
     for i in range(tensions.size):
-        tensions[i], _, drive = pull_of_cable(
-            cables, actuator, slack, i, drive, lengths[i], rates[i], signals, table
-        )
+        tensions[i], _, drive = pull_of_cable(robot, i, drive, lengths[i], rates[i], signals, table)
     drives += step * table[:, RATE]
 
 

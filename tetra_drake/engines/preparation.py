@@ -17,10 +17,12 @@ from numba.core import event
 
 from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import pull_cables
+from tetra_drake.physics.forces import Forces
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Incline
+from tetra_drake.simd.packed import Packed
 
 FUNCTIONS = 380
 """Number of functions that numba compiles in prepare(), roughly."""
@@ -71,8 +73,8 @@ def compile_others(tell: Callable[[], None]) -> None:
         robot = Robot.of(load_scenario("prism"))
         _ = robot.equilibrium
         pitch_rates(Readings.empty(robot.structure, 1), robot.structure)
-        model, none = robot.model, np.zeros(0)
-        pull_cables(model.cables, model.actuator, model.slack, none, none, none, 0.0, none, none)
+        parts, none = Packed((robot.model, Forces.of(robot.model))), np.zeros(0)
+        pull_cables(parts, none, none, none, 0.0, none, none)
 
 
 def _prepare_engine(name: str, changes: Mapping[str, Any]) -> None:

@@ -41,10 +41,10 @@ class Simulation:
 
     Each driven cable has an action: the setpoint of its actuator, by the kind of `actuation`. It is
     a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. The
-    order is the same as in `robot.driven`, oscillator by oscillator. An action is
-    held for a control period. Like a sample of a command, it begins with a linear change that takes
-    one `cpg.listing_step`; the first action acts from the start on. There is no network and no
-    start-up time. On all engines, steps with the samples of a command give the motion of
+    order is the same as in `robot.driven`, oscillator by oscillator. An action is held for a
+    control period. Like a sample of a command, it begins with a linear change that takes one
+    `cpg.listing_step`; the first action acts from the start on. There is no network and no start-up
+    time. On all engines, steps with the samples of a command give the motion of
     simulate(command=...), if each sample differs from the one before.
     """
 

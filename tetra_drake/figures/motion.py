@@ -165,9 +165,8 @@ def path_of_the_centre(
     points = path.centre / unit.length
     if np.ptp(points[:, Y]) < _STRAIGHT * np.ptp(points[:, X]):
         return _draw_height(page_of(figure, height_in=2.6), points, result.robot, unit)
-    ratio = np.ptp(points[:, Y]) / max(
-        np.ptp(points[:, X]), _MARGIN * structure.scale / unit.length
-    )
+    least = _margin(result.robot) / unit.length
+    ratio = np.ptp(points[:, Y]) / max(np.ptp(points[:, X]), least)
     page = page_of(figure, height_in=min(rcParams["figure.figsize"][0] * ratio, 5.0) + 1.4)
     panel = page.subplots()
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
@@ -283,9 +282,8 @@ def _profile(nodes: np.ndarray, sample: int, robot: Robot) -> np.ndarray:
 
     It spans the range of all nodes (samples, nodes, 3); y is their mean in one sample.
     """
-    scale, x = robot.structure.scale, nodes[..., X]
-    margin = _MARGIN * scale
-    x = np.arange(x.min() - margin, x.max() + margin, _PROFILE * scale)
+    x, margin, distance = nodes[..., X], _margin(robot), _PROFILE * robot.structure.scale
+    x = np.arange(x.min() - margin, x.max() + margin, distance)
     y = np.full_like(x, nodes[sample, ..., Y].mean())
     return np.column_stack([x, y, ground_heights(np.column_stack([x, y]), robot.ground)])
 
@@ -313,9 +311,7 @@ def _draw_paths(
         panel.plot(x, np.where(lifted[:, i], z, np.nan), color=_LIFTED, linewidth=1.6)
         panel.plot(x[0], z[0], "o", color="black")
         panel.margins(0.08)
-        least = (
-            _MARGIN * robot.structure.scale / 6 / unit.length
-        )  # a range even for a node that does not move
+        least = _margin(robot) / 6 / unit.length  # a range even for a node that does not move
         panel.update_datalim([(-least, z.min()), (least, z.min() + least)])
         name_panel(panel, name)
     panels[0].set_ylabel(f"height ({unit.length_name})")
@@ -333,9 +329,14 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
+def _margin(robot: Robot) -> float:
+    """Free space (m) around a robot."""
+    return _MARGIN * robot.structure.scale
+
+
 def _range(values: np.ndarray, robot: Robot, unit: Units) -> Span:
     """Range of coordinates with a margin."""
-    margin = _MARGIN * robot.structure.scale / unit.length
+    margin = _margin(robot) / unit.length
     return float(values.min()) - margin, float(values.max()) + margin
 
 

@@ -22,15 +22,7 @@ from tetra_drake.physics.vectors import (
 )
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import (
-    Real,
-    Table,
-    any_lane,
-    inverse_sqrt,
-    maximum,
-    named,
-    select,
-)
+from tetra_drake.simd.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
 from tetra_drake.simd.packed import Packed, unpacked
 
 
@@ -94,40 +86,28 @@ def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def pull_of_cable(
-    cables: cable.Cables,
-    of_cables: actuator.Actuator,
-    slack: bool,
-    i: int,
-    drive: int,
-    length: Real,
-    rate: Real,
-    signals: Table,
-    drives: Table,
+    robot: Model, i: int, drive: int, length: Real, rate: Real, signals: Table, drives: Table
 ) -> tuple[Real, Real, int]:
     """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the index of
     the next drive.
 
     `drive` is the index of the cable's drive, if it has one; then its rate and limit are written to
-    `drives`. The length is in m, its rate in m/s, `signals` (signals,) in N. With `slack`, a cable
-    without a drive goes slack; an actuation force acts beside its spring and damper.
+    `drives`. The length is in m, its rate in m/s, `signals` (signals,) in N. An
+    actuation force acts beside the spring and the damper of a cable that goes slack.
     """
-    driver, signal = cables.signal[i], 0.0
+    driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:
         signal = signals[driver]
-    law = cable.law_of(cables, i)
-    if driver == cable.PASSIVE or not actuator.has_drive(of_cables):
-        if not slack:
+    law = cable.law_of(robot.cables, i)
+    if driver == cable.PASSIVE or not actuator.has_drive(robot.actuator):
+        if not robot.slack:
             return cable.cable_tension(length, rate, signal, law), law.damping, drive
         elastic = cable.elastic_tension(length - law.free_length, law)
         tension, tension_per_rate = cable.slack_tension(elastic, rate, law)
         tension += signal
-        return (
-            maximum(tension, 0.0),
-            select(tension > 0.0, tension_per_rate, 0.0),
-            drive,
-        )
+        return maximum(tension, 0.0), select(tension > 0.0, tension_per_rate, 0.0), drive
     driven = actuator.actuator_force(
-        of_cables, drives[drive, actuator.DRIVE], length, rate, signal, law
+        robot.actuator, drives[drive, actuator.DRIVE], length, rate, signal, law
     )
     drives[drive, actuator.RATE] = driven.rate
     drives[drive, actuator.LIMITED] = driven.limited
@@ -156,7 +136,7 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
         length, direction = square * per_length, scaled(per_length, p_AB)
         rate = dot(v_AB, direction)
         tension, tension_per_rate, drive = pull_of_cable(
-            robot.cables, robot.actuator, robot.slack, i, drive, length, rate, signals, drives
+            robot, i, drive, length, rate, signals, drives
         )
         force = scaled(tension, direction)
         add_vector(force, a, kinematics.FORCE, nodes)

@@ -53,7 +53,7 @@ class SurfaceGrid(NamedTuple):
     top: Real
     """Height of the highest control point."""
     reach: Real
-    """Largest distance below a node at which it touches."""
+    """Largest radius of a foot."""
 
 
 @inlined

@@ -86,7 +86,10 @@ def structure_text(study: EquilibriumStudy) -> str:
     robot, statics = study.robot, study.statics
     structure = robot.structure
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
-    on_ground = " on the ground" if structure.contacts.size else ""
+    on_ground = ground = ""
+    if structure.contacts.size:
+        stiffness = robot.scenario.units.shown(robot.scenario.ground.stiffness, "N/m")
+        on_ground, ground = " on the ground", f", on a ground of {stiffness} per node"
     bodies = len(structure.bodies)
     count = f"{bodies} {'body' if bodies == 1 else 'bodies'}, {len(structure.node_names)} nodes"
     lines = [
@@ -95,7 +98,7 @@ def structure_text(study: EquilibriumStudy) -> str:
         f"Without weight: self-stress states {len(statics.self_stresses)}, "
         f"infinitesimal mechanisms {statics.mechanisms}.",
         f"Lowest natural frequencies{on_ground}, undamped: {lowest or 'none'} Hz.",
-        f"At rest, without actuation{_ground_text(study)}:",
+        f"At rest, without actuation{ground}:",
         _bodies_table(study).text(),
     ]
     if len(structure.cables):
@@ -104,13 +107,6 @@ def structure_text(study: EquilibriumStudy) -> str:
         lines.append(_anchors_table(study).text())
     lines += _faults(study)
     return "\n\n".join(lines)
-
-
-def _ground_text(study: EquilibriumStudy) -> str:
-    if not study.robot.structure.contacts.size:
-        return ""
-    scenario = study.robot.scenario
-    return f", on a ground of {scenario.units.shown(scenario.ground.stiffness, 'N/m')} per node"
 
 
 def _faults(study: EquilibriumStudy) -> list[str]:

@@ -1,7 +1,7 @@
 """Struts with an axial stiffness: their lengths in equilibrium, and their part in vibrations.
 
-Such a strut is a body of its own. It is straight, and its ends move along its axis. For
-the error of natural frequencies, see scenario.robot_structure.StrutGroup.
+Such a strut is a body of its own. It is straight, and its ends move along its axis. For the error
+of natural frequencies, see scenario.robot_structure.StrutGroup.
 """
 
 from __future__ import annotations

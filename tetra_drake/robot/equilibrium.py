@@ -159,8 +159,7 @@ class _Descent:
 
     def __init__(self, robot: Unactuated, start: np.ndarray) -> None:
         self._robot = robot
-        self._radius = robot.radius
-        self._reach = FIRST_REACH * self._radius
+        self._reach = FIRST_REACH * self._robot.radius
         self._shift = self._rounding = 0.0
         self._arrive(start, force_at_rest(robot, start))
 
@@ -175,7 +174,7 @@ class _Descent:
         hardest = max(self._stiffness.diagonal().max(), cables.max(initial=0.0))
         farthest = np.abs(self._robot.forces.nodes[:, P_WN : P_WN + 3]).max()
         self._rounding = ROUNDING * hardest * farthest
-        steepest = np.abs(force).max() / self._radius
+        steepest = np.abs(force).max() / self._robot.radius
         self._least = LEAST_STIFFNESS * max(hardest, steepest, np.finfo(float).eps)
         self._doubt = self._least
         if self._robot.forces.near_struts.count.any():
@@ -197,13 +196,13 @@ class _Descent:
 
     def step(self) -> bool:
         """Goes a step downhill. Returns False if there is none."""
-        while self._reach > SHORTEST_REACH * self._radius and np.isfinite(self.force).all():
+        while self._reach > SHORTEST_REACH * self._robot.radius and np.isfinite(self.force).all():
             step, expected = self._fall() if self.is_balanced() else self._newton_step()
             length = np.abs(step).max()
             moved, force, step, gain = self._corrected(step, expected)
             if gain > LEAST_GAIN:
                 if gain > GOOD_GAIN and length > 0.3 * self._reach:
-                    self._reach = min(2.0 * self._reach, LONGEST_REACH * self._radius)
+                    self._reach = min(2.0 * self._reach, LONGEST_REACH * self._robot.radius)
                 self._shift *= 0.1
                 self._arrive(moved, force)
                 return True
@@ -249,7 +248,7 @@ class _Descent:
             if gain > GOOD_GAIN or count == CORRECTIONS or not np.isfinite(force).all():
                 break
             stiffness = stiffness_at_rest(self._robot)
-            shift = max(HOLD * np.abs(force).max() / self._radius, self._least)
+            shift = max(HOLD * np.abs(force).max() / self._robot.radius, self._least)
             while (factor := self._factor(stiffness, shift)) is None:
                 shift *= 4.0
             correction = self._solved(factor, force)
@@ -368,14 +367,13 @@ def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
     return per_radius[:, np.newaxis] * matrix * per_radius
 
 
-def mass_matrix(unactuated: Unactuated) -> np.ndarray:
-    """Mass matrix (6 n, 6 n) at the last computed state. Rotations are scaled by the largest radius
-    of the bodies, so all coordinates are lengths."""
-    model, bodies = unactuated.model, unactuated.model.bodies
-    inertia_W = bodies.inertia if model.isotropic else unactuated.forces.inertia
+def mass_matrix(robot: Unactuated) -> np.ndarray:
+    """Mass matrix (6 n, 6 n) at the last computed state, for the displacements of displaced()."""
+    bodies = robot.model.bodies
+    inertia_W = bodies.inertia if robot.model.isotropic else robot.forces.inertia
     matrix = np.diag(np.repeat(bodies.mass, 6))
     for body, inertia in enumerate(inertia_W):
         turning = slice(6 * body, 6 * body + 3)
         tensor = RotationalInertia(*inertia).CopyToFullMatrix3()
-        matrix[turning, turning] = tensor / bodies.radius.max() ** 2
+        matrix[turning, turning] = tensor / robot.radius**2
     return matrix

@@ -15,10 +15,12 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Grid, Relief
 from tetra_drake.scenario.units import INCH
 
-STEP_AHEAD, START_DEPTH = 1.0 * INCH, 1e-6
-"""Distance from the foremost contact node to a terrain that begins in front of the robot, and a
-tolerance (m) for the depth of a node in the ground at the start; see Blueprint.scale. A node may
-also be as deep as the robot's weight would press it, because a robot may start in equilibrium."""
+STEP_AHEAD = 1.0 * INCH
+"""Distance from the foremost contact node of a robot of usual size to a terrain that begins in
+front of it; see Blueprint.scale."""
+START_DEPTH = 1e-6
+"""Tolerance (m) for the depth of a foot in the ground at the start, of a robot of usual size. A
+foot may also be as deep as the weight would press it, because a robot may start in equilibrium."""
 
 
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:

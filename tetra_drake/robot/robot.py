@@ -291,20 +291,16 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
     structure that is not moved, is clearly below the ground."""
     if not placed.contacts.size:
         return 0.0
-    heights, radius = placed.p_WN[:, 2], placed.contact_radius
-    stays = placed.held.any()
-    depths = -heights[placed.contacts]
-    depths_of_feet = radius[placed.contacts] + depths
-    below = depths_of_feet if stays else depths
-    depth = below.max()
-    if depth > DEEPEST * (np.ptp(heights) or radius.max()):
-        node = placed.contacts[below.argmax()]
-        key = f"robot.nodes.{placed.node_names[node]}"
-        shown = scenario.units.shown
-        what = f"a foot of radius {shown(radius[node], 'm')}" if stays and radius[node] else "it"
-        found = f"{what} starts {shown(depth, 'm')} below the ground"
+    stays, shown, heights = placed.held.any(), scenario.units.shown, placed.p_WN[:, 2]
+    radius, depths = placed.contact_radius[placed.contacts], -heights[placed.contacts]
+    below = radius + depths if stays else depths
+    i = below.argmax()
+    if below[i] > DEEPEST * (np.ptp(heights) or radius.max()):
+        key = f"robot.nodes.{placed.node_names[placed.contacts[i]]}"
+        what = f"a foot of radius {shown(radius[i], 'm')}" if stays and radius[i] else "it"
+        found = f"{what} starts {shown(below[i], 'm')} below the ground"
         raise InputError(scenario.name, key, f"{found}, expected on it or above")
-    return 0.0 if stays else float(depths_of_feet.max())
+    return 0.0 if stays else float((radius + depths).max())
 
 
 def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:

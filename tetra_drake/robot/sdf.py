@@ -13,7 +13,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from tetra_drake.robot.structure import Shape, Structure, shapes_of
+from tetra_drake.robot.structure import NODE_COLOUR, Shape, Structure, shapes_of
 from tetra_drake.robot.xml_elements import add_element, xml_text
 from tetra_drake.scenario.blueprint import WORLD
 
@@ -33,13 +33,15 @@ def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
         _add_inertia(link, structure.mass[body], structure.unit_inertia[body])
         for shape in shapes:
             if shape.body == body:
-                _add_visual(link, shape)
+                visual = _add_shape(link, "visual", shape, "cylinder")
+                add_element(add_element(visual, "material"), "diffuse", shape.colour)
                 if shape.length:
-                    _add_collision(link, shape.name, shape.X_BS, shape.radius, shape.length)
+                    _add_shape(link, "collision", shape, "capsule")
         for node in structure.contacts[structure.carriers[structure.contacts] == body]:
             radius, X_BS = structure.contact_radius[node], RigidTransform(structure.p_BN[node])
+            foot = Shape(f"foot {structure.node_names[node]}", body, X_BS, radius, 0.0, NODE_COLOUR)
             if radius:
-                _add_collision(link, f"foot {structure.node_names[node]}", X_BS, radius, 0.0)
+                _add_shape(link, "collision", foot, "capsule")
     if (structure.carriers == WORLD).any():
         add_element(model, "link", name=FIXED)
         joint = add_element(model, "joint", name=FIXED + " weld", type="fixed")
@@ -68,27 +70,12 @@ def _add_inertia(link: Element, mass: float, unit_inertia: np.ndarray) -> None:
         add_element(inertia, f"i{axes}", value)
 
 
-def _add_visual(link: Element, shape: Shape) -> None:
-    """Adds a visible shape."""
-    visual = add_element(link, "visual", name=shape.name)
-    _add_pose(visual, shape.X_BS)
-    add_element(add_element(visual, "material"), "diffuse", shape.colour)
-    kind = "cylinder" if shape.length else "sphere"
-    _add_solid(visual, kind, shape.radius, shape.length)
-
-
-def _add_collision(
-    link: Element, name: str, X_BS: RigidTransform, radius: float, length: float
-) -> None:
-    """Adds a capsule along the z axis of the frame S that can touch; a sphere without length."""
-    collision = add_element(link, "collision", name=name)
-    _add_pose(collision, X_BS)
-    _add_solid(collision, "capsule" if length else "sphere", radius, length)
-
-
-def _add_solid(parent: Element, kind: str, radius: float, length: float) -> None:
-    """Adds a geometry."""
-    solid = add_element(add_element(parent, "geometry"), kind)
-    add_element(solid, "radius", radius)
-    if length:
-        add_element(solid, "length", length)
+def _add_shape(link: Element, purpose: str, shape: Shape, kind: str) -> Element:
+    """Adds a shape of this kind, or a sphere if it has no length."""
+    element = add_element(link, purpose, name=shape.name)
+    _add_pose(element, shape.X_BS)
+    solid = add_element(add_element(element, "geometry"), kind if shape.length else "sphere")
+    add_element(solid, "radius", shape.radius)
+    if shape.length:
+        add_element(solid, "length", shape.length)
+    return element

@@ -30,9 +30,9 @@ def speed_limit(robot: Robot) -> float:
     fall = max(0.0, above.max() - (robot.ground.heights.min() if slope is None else 0.0))
     speed = math.sqrt(2.0 * (robot.weight * fall + _cable_energy(robot, start)))
     speed /= math.sqrt(structure.mass.min())
-    share = math.sin(abs(slope or 0.0)) if structure.contacts.size else 1.0
+    downhill = math.sin(abs(slope or 0.0)) if structure.contacts.size else 1.0
     pushed = np.linalg.norm(structure.node_load, axis=1).sum() / structure.mass.sum()
-    acceleration = share * scenario.robot.gravity + pushed
+    acceleration = downhill * scenario.robot.gravity + pushed
     return max(LEAST_LIMIT, float(speed + acceleration * scenario.simulation.duration))
 
 

@@ -185,7 +185,7 @@ class Rough(Relief):
         _check_size((half, half), scale, source, "wavelength")
         x, y = _axes((half, half), 0.0, scale)
         generator = np.random.default_rng(self.seed)
-        heights = generator.uniform(-2.0 * self.amplitude, 0.0, (len(x), len(y)))
+        heights = generator.uniform(-2.0 * self.amplitude, 0.0, x.shape)
         return _grid(x, y, heights, (half, half))
 
 
@@ -221,15 +221,14 @@ class Obstacles(Relief):
         corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
         generator = np.random.default_rng(self.seed)
         centres = corners + spacing * generator.uniform(size=corners.shape)
-        heights = np.zeros((len(x), len(y)))
-        nearest = np.rint((centres - (x[0], y[0])) / cell).astype(int)
+        heights = np.zeros_like(x)
+        nearest = np.rint((centres - (x[0, 0], y[0, 0])) / cell).astype(int)
         for offset in np.ndindex(5, 5):  # a bump is four cells wide
             at = nearest + offset - np.array([2, 2])
             inside = ((at >= 0) & (at < heights.shape)).all(axis=1)
-            at, centre = at[inside], centres[inside]
-            r_squared = (x[at[:, 0]] - centre[:, 0]) ** 2 + (y[at[:, 1]] - centre[:, 1]) ** 2
-            bumps = self.height * (1.0 - r_squared / self.radius**2)
-            np.maximum.at(heights, (at[:, 0], at[:, 1]), bumps)
+            at, centre = tuple(at[inside].T), centres[inside]
+            r_squared = (x[at] - centre[:, 0]) ** 2 + (y[at] - centre[:, 1]) ** 2
+            np.maximum.at(heights, at, self.height * (1.0 - r_squared / self.radius**2))
         return _grid(x, y, heights, (cell, cell))
 
 
@@ -271,19 +270,16 @@ def _check_size(cell: tuple[float, float], scale: float, source: object, key: st
 
 
 def _axes(cell: tuple[float, float], origin: float, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates x and y of a grid that covers the generated area, with a spare cell at each side.
-    One x is `origin`."""
+    """Coordinates x and y (rows, columns) of a grid that covers the generated area, with a spare
+    cell at each side. One x is `origin`."""
     first = math.floor((-scale * BEHIND - origin) / cell[0])
     last = math.ceil((scale * AHEAD - origin) / cell[0])
     aside = math.ceil(scale * ASIDE / cell[1]) + 1
-    return (
-        origin + cell[0] * np.arange(first - 1, last + 2),
-        cell[1] * np.arange(-aside, aside + 1.0),
-    )
+    x = origin + cell[0] * np.arange(first - 1, last + 2)
+    x, y = np.meshgrid(x, cell[1] * np.arange(-aside, aside + 1.0), indexing="ij")
+    return x, y
 
 
 def _grid(x: np.ndarray, y: np.ndarray, heights: np.ndarray, cell: tuple[float, float]) -> Grid:
-    """Grid of heights (rows, columns), or of heights (rows,) that do not depend on y."""
-    if heights.ndim == 1:
-        heights = np.repeat(heights[:, None], len(y), axis=1)
-    return Grid(heights, (float(x[0]), float(y[0])), cell)
+    """Grid of heights (rows, columns) at the coordinates of _axes()."""
+    return Grid(heights, (float(x[0, 0]), float(y[0, 0])), cell)

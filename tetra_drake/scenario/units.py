@@ -113,10 +113,11 @@ def _fitting(lengths: tuple[float, ...]) -> Units:
     lengths are round in no unit, as in a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
-    return min(
-        SYSTEMS.values(),
-        key=lambda units: sum(min(_MANY, _digits(x / units.length)) for x in long),
-    )
+
+    def digits(units: Units) -> int:
+        return sum(min(_MANY, _digits(length / units.length)) for length in long)
+
+    return min(SYSTEMS.values(), key=digits)
 
 
 _MANY = 6

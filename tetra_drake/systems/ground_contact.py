@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from collections.abc import Sequence
 
@@ -189,12 +190,10 @@ def AddGroundContact(
 
 def _radii(radius: float | Sequence[float], *, count: int) -> np.ndarray:
     """Radii of feet (count,) in m. Raises InputError if they are not numbers of 0 or more."""
-    expected = f"a number of 0 or more, or {count} of them"
-    try:
-        radii = np.broadcast_to(np.asarray(radius, dtype=float), count)
-    except (TypeError, ValueError) as error:
-        problem = f"found {radius!r:.60}, expected {expected}"
-        raise InputError("AddGroundContact", "radius", problem) from error
+    radii = np.full(count, np.nan)
+    with contextlib.suppress(TypeError, ValueError):
+        radii[:] = radius
     if not (np.isfinite(radii) & (radii >= 0.0)).all():
-        raise InputError("AddGroundContact", "radius", f"found {radius!r:.60}, expected {expected}")
-    return radii.copy()
+        problem = f"found {radius!r:.60}, expected a number of 0 or more, or {count} of them"
+        raise InputError("AddGroundContact", "radius", problem)
+    return radii

@@ -99,7 +99,7 @@ class Prepared:
     @property
     def log_sizes(self) -> dict[str, int]:
         """Sizes of the engine's Log for this gait. There is space for a few more marks."""
-        return sizes_in_lanes(self.robot, Solver.of(self.robot.model)) | {
+        return sizes_in_lanes(self.robot, self.constants.solver) | {
             "marks": len(self.marks) + 1 + _SPARE_MARKS,
             "times": len(self.times) + 1,
             "samples": len(self.times),
