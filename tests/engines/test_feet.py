@@ -77,7 +77,7 @@ def test_a_foot_is_as_thick_as_its_sphere_else_as_its_strut_unless_the_file_says
 
 
 def test_a_foot_below_the_ground_that_anchors_keep_there_is_refused(refused):
-    tree = WHEELS | {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.0, 0.4, 0.0]}, "anchors": {"a": "x"}}
+    tree = WHEELS | {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.0, 0.4, 0.0]}, "anchors": {"b": "z"}}
     with refused("anchored", "robot.nodes.a", "radius"):
         Robot.of(wheels().with_sections(name="anchored", robot=StructureFile.model_validate(tree)))
 

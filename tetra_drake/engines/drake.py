@@ -176,11 +176,12 @@ def default_accuracy(structure: Structure) -> float:
     """Target accuracy for a structure: half the least damping ratio of a cable, within limits.
 
     The damping ratio c / (2 sqrt(k m)) of a cable is for the reduced mass m of its two bodies. A
-    structure without cables has the finest accuracy.
+    structure without elastic cables has the finest accuracy.
     """
-    cables = structure.cables
+    is_elastic = structure.cables["stiffness"] > 0.0
+    cables, ends = structure.cables[is_elastic], structure.cable_ends[is_elastic]
     per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
-    per_reduced_mass = per_mass[structure.carriers[structure.cable_ends]].sum(axis=1)
+    per_reduced_mass = per_mass[structure.carriers[ends]].sum(axis=1)
     ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
     return min(COARSEST, max(FINEST, 0.5 * min(ratios, default=0.0)))
 

@@ -104,7 +104,7 @@ def is_stable(robot: Robot, step: float) -> bool:
 
     They are explicit for positions and cables, and stable if step^2 K + 2 step C < 4 M with the
     stiffness K, the damping C and the mass M. So a damper c counts as a spring 2 c / step. All
-    cables count as taut. MuJoCo itself holds anchors and struts that touch, so they do not count.
+    cables count as taut. Anchors and struts that touch do not count.
     """
     from scipy.linalg import eigvalsh
 

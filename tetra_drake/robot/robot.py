@@ -286,12 +286,13 @@ def axial_forces_at_rest(scenario: Scenario, structure: Structure) -> np.ndarray
 
 
 def _lift(scenario: Scenario, placed: Structure) -> float:
-    """Distance (m) to move a structure up so that its feet stand on the ground. A structure with
-    anchors or without ground is not moved. Raises InputError if a contact node, or a foot of a
-    structure that is not moved, is clearly below the ground."""
+    """Distance (m) to move a structure up so that its feet stand on the ground. A structure that is
+    held along z or without ground is not moved; one with other anchors is not moved down. Raises
+    InputError if a contact node, or a foot of a structure that is held along z, is clearly below
+    the ground."""
     if not placed.contacts.size:
         return 0.0
-    stays, shown, heights = placed.held.any(), scenario.units.shown, placed.p_WN[:, 2]
+    stays, shown, heights = placed.held[:, 2].any(), scenario.units.shown, placed.p_WN[:, 2]
     radius, depths = placed.contact_radius[placed.contacts], -heights[placed.contacts]
     below = radius + depths if stays else depths
     i = below.argmax()
@@ -300,7 +301,10 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
         what = f"a foot of radius {shown(radius[i], 'm')}" if stays and radius[i] else "it"
         found = f"{what} starts {shown(below[i], 'm')} below the ground"
         raise InputError(scenario.name, key, f"{found}, expected on it or above")
-    return 0.0 if stays else float((radius + depths).max())
+    lift = float((radius + depths).max())
+    if placed.held.any():
+        return 0.0 if stays else max(0.0, lift)
+    return lift
 
 
 def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:
