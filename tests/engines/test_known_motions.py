@@ -309,6 +309,25 @@ def test_a_bar_rests_across_two_others_where_the_contact_bears_its_weight(engine
     np.testing.assert_allclose(p_WB, robot.structure.p_WB, atol=atol)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("drop", "dissipation", "expected"), [(0.05, 0.5, 0.75), (0.8, 5.0, 0.05)])
+def test_a_bar_that_is_dropped_on_two_others_rebounds(engine, drop, dissipation, expected):
+    # Hunt and Crossley's restitution on rigid supports. At 4 m/s, the bar would be beyond the
+    # others within a step.
+    beams = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
+    across = ((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))
+    fall = float(np.sqrt(2.0 * drop / G))
+    held = CROSSED | {"a0": "xyz", "b0": "yz", "a1": "xyz", "b1": "yz"}
+    given = {"dissipation": dissipation, "gravity": G, "anchors": held}
+    resting = loose_bars([*beams, across], **given, duration=round(fall + 0.05, 3))
+    offsets = [["0 m", "0 m", f"{z} m"] for z in (0.0, 0.0, drop)]
+    robot = Robot.of(resting.scenario.with_changes({"robot.offsets": offsets}))
+    found = trajectory_of(robot, engine)
+    rebound = float(found.v_WN.sel(node="a2", axis="z").max())
+    assert rebound / (G * fall) == pytest.approx(expected, abs=0.05)
+    assert found.p_WB[-1, -1, 2] > found.p_WB[-1, 0, 2] + RADIUS
+
+
 def test_forces_do_not_depend_on_when_near_struts_were_searched():
     robot = tumbling(0.0)
     states = simulated(robot)[1].states
