@@ -220,10 +220,7 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
             set_heading(state, ground, frames, i, lands, modes)
         begins_1, begins_2 = friction.begins_to_stick(before, after, ground.friction)
         sticks_here = lands | begins_1, lands | begins_2
-        if ground.is_round:
-            begin_turn(state, nodes, ground, frames, i, sticks_here, slide, modes)
-        else:
-            move_stick_point(nodes, ground, frames, i, sticks_here, slide, modes)
+        move_stick_point(state, nodes, ground, frames, i, sticks_here, slide, modes)
         modes[i, CONTACT] = select(touches, 1.0, 0.0)
         modes[i, MODE], modes[i, MODE + 1] = after
         changed = changed | (touched ^ touches)
@@ -232,7 +229,7 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
 
 
 @inlined
-def begin_turn(
+def move_stick_point(
     state: Table,
     nodes: Table,
     ground: Ground,
@@ -242,29 +239,21 @@ def begin_turn(
     slide: friction.Slide,
     modes: Table,
 ) -> None:
-    """Stores the orientation of a round foot. The stick point moves so that the deflection stays,
-    or is zero along the tangents in `along`; see move_stick_point()."""
-    x_1 = select(along[0], 0.0, slide.t1.deflection)
-    x_2 = select(along[1], 0.0, slide.t2.deflection)
-    bend = terrain.to_world(x_1, x_2, 0.0, frames, i, ground.flat)
-    p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
-    put_vector(difference(p_WN, bend), i, STICK_POINT, modes)
-    kinematics.put_orientation(state, ground.carriers[i], i, ORIENTATION, modes)
-
-
-@inlined
-def move_stick_point(
-    nodes: Table,
-    ground: Ground,
-    frames: Table,
-    i: int,
-    along: tuple[Truth, Truth],
-    slide: friction.Slide,
-    modes: Table,
-) -> None:
     """Moves the stick point of a contact node to the node. `along` says, for t1 and t2, whether the
-    stick point moves along this tangent."""
-    p_x, p_y, p_z = vector_at(nodes, ground.contacts[i], kinematics.P_WN)
+    stick point moves along this tangent.
+
+    With round feet, the orientation is stored, and along the other tangents the stick point moves
+    so that the deflection stays.
+    """
+    p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
+    if ground.is_round:
+        x_1 = select(along[0], 0.0, slide.t1.deflection)
+        x_2 = select(along[1], 0.0, slide.t2.deflection)
+        bend = terrain.to_world(x_1, x_2, 0.0, frames, i, ground.flat)
+        put_vector(difference(p_WN, bend), i, STICK_POINT, modes)
+        kinematics.put_orientation(state, ground.carriers[i], i, ORIENTATION, modes)
+        return
+    p_x, p_y, p_z = p_WN
     stick_x, stick_y, stick_z = vector_at(modes, i, STICK_POINT)
     if ground.flat:
         modes[i, STICK_POINT] = select(along[0], p_x, stick_x)
