@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pandas
 
-from tetra_drake.analysis.robustness import PERCENT, by_gait, judge
+from tetra_drake.analysis.robustness import PERCENT, by_gait, robustness
 from tetra_drake.analysis.statistics import json_rows
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
@@ -166,7 +166,7 @@ def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = No
     gaits = {row["trial"]: run.gait(row["trial"], row["evaluation"]) for row in best}
     for row, change in zip(best, sensitivity(scenario, [*gaits.values()], workers), strict=True):
         row["sensitivity_in"] = json_number(change)
-    judgement = judge(scenario, gaits, percent=PERCENT, alone=False, workers=workers)
+    judgement = robustness(scenario, gaits, percent=PERCENT, alone=False, workers=workers)
     content = {
         "schema": SCHEMA,
         "versions": versions(),

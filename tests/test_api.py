@@ -16,7 +16,6 @@ from helpers.brief import BRIEF
 
 import tetra_drake as td
 from tetra_drake.errors import InputError
-from tetra_drake.prototype.export import export
 from tetra_drake.report.result_folder import save_result_folder
 from tetra_drake.robot.gait import save_gait
 from tetra_drake.scenario.load import load_scenario
@@ -41,7 +40,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         gait = td.evolve(scenario, "runs/demo").best_gait()
         save_gait(gait, "gait.json", scenario)
         save_result_folder(Path("out"), td.simulate(scenario, gait, record=True))
-        export(scenario, gait, rate=100.0, out=Path("lab"))
+        td.evolve(scenario, "runs/other", seed=1)
+        td.export(scenario, gait, "lab")
         yield folder
         os.chdir(before)
 

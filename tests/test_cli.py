@@ -69,7 +69,7 @@ def refusal(command, capsys):
     ("command", "source", "values"),
     [
         ("", "", "COMMAND"),
-        ("simulate --seed 1 --gait good.json", " simulate", "--gait --seed"),
+        ("simulate --seed 1 good.json", " simulate", "FILE|RUN --seed"),
         ("simulate --sceanrio thesis", " simulate", "--sceanrio '--scenario'?"),
         ("figures a --width 3.4", " figures", "--width '3.4' '3.4 in'"),
         ("simulate --scenario key.yaml", ": key.yaml", "robot.tetrahedron tetrahedra"),
@@ -90,7 +90,7 @@ def test_wrong_options_and_files_are_refused_in_one_line(
     "command",
     [
         "simulate --scenario short.yaml --out",
-        "simulate --gait",
+        "simulate",
         "simulate --scenario",
         "export --scenario short.yaml --out",
         "evolve --scenario quick --out",
@@ -147,7 +147,7 @@ def test_simulate_gives_the_same_numbers_of_seed_and_gait_and_replay_the_same_pa
     gait = seeded_gait(load_scenario(), 3)
     save_gait(gait, "gait.json", load_scenario("short.yaml"))
     results, out = [], work / "made" / "when missing"
-    for option in ("--seed=3", "--gait=gait.json"):
+    for option in ("--seed=3", "gait.json"):
         assert main(["simulate", "--scenario=short.yaml", option, f"--out={out}"]) == 0
         names = ["replay.html", "result.json", "scenario.yaml", "trajectory.nc"]
         assert sorted(os.listdir(out)) == names

@@ -44,9 +44,9 @@ RUNS = {"evolve", "evolve_map"}
 READERS = {
     "replay {}": RESULTS | RUNS,
     "figures {}": RESULTS | RUNS,
-    "simulate --gait {}": RUNS,
+    "simulate {}": RUNS,
     "export {}": RUNS,
-    "cpg --gait {}": RUNS,
+    "cpg {}": RUNS,
     "robustness {} --draws 1 --workers 1": RUNS,
     "compare {}": RUNS,
 }

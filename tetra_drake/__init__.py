@@ -23,6 +23,10 @@ Functions, and the main attributes of their results:
     Simulation          robots in control periods: reset(), step(actions), state
     fit                 values of scenario keys that meet measurements: parameters, scenario
     MotionCapture, Rest measurements for fit(): motion over time; shape, tensions, frequencies
+    robustness          how far gaits walk on disturbed robots
+    compare             how well runs search, with intervals
+    study_equilibrium   shape, tensions, self-stress, natural frequencies at rest
+    export              writes a gait as commands for the actuators of a prototype
     prepare             compiles everything once, so that nothing later waits
     load_command        commands for actuators from a file, for simulate(scenario, command=...)
 
@@ -65,7 +69,9 @@ _HOMES = {
     "Simulation": "tetra_drake.engines.simulation",
     "MotionCapture": "tetra_drake.analysis.measurements",
     "Rest": "tetra_drake.analysis.measurements",
+    "compare": "tetra_drake.analysis.comparison",
     "evolve": "tetra_drake.experiment",
+    "export": "tetra_drake.prototype.export",
     "fit": "tetra_drake.experiment",
     "load_command": "tetra_drake.prototype.command_file",
     "load_gait": "tetra_drake.robot.gait",
@@ -73,9 +79,11 @@ _HOMES = {
     "load_run": "tetra_drake.evolution.run",
     "load_scenario": "tetra_drake.scenario.load",
     "prepare": "tetra_drake.engines.preparation",
+    "robustness": "tetra_drake.analysis.robustness",
     "seeded_gait": "tetra_drake.robot.gait",
     "simulate": "tetra_drake.engines.simulate",
     "simulate_many": "tetra_drake.engines.simulate",
+    "study_equilibrium": "tetra_drake.analysis.equilibrium",
     "sweep": "tetra_drake.analysis.sweep",
 }
 

@@ -101,7 +101,7 @@ Folder = Annotated[Path, Option(metavar="DIR", type=Path)]
 File = Annotated[Path, Option(metavar="FILE", type=Path)]
 Count = Annotated[int, Option(metavar="N", type=integer(1))]
 Seed = Annotated[int, Option(metavar="N", type=integer(0))]
-Rate = Annotated[float, Option(metavar="RATE", type=quantity("Hz", "2 kHz"))]
+Rate = Annotated[float, Option(metavar="RATE", type=quantity("Hz", "100 Hz"))]
 Length = Annotated[float, Option(metavar="LENGTH", type=quantity("m", "3.4 in"))]
 Unit = Annotated[str, Option(metavar="UNIT")]
 Size = Annotated[tuple[int, int], Option(metavar="WxH", type=size)]
@@ -131,9 +131,9 @@ StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
 
 
 def _simulate(
+    gait: GaitFile | None = None,
     *,
     scenario: ScenarioName | None = None,
-    gait: GaitFile | None = None,
     seed: GaitSeed | None = None,
     command: CommandFile | None = None,
     engine: EngineName | None = None,
@@ -421,14 +421,14 @@ def _robustness(
 
     Example: tetra-drake robustness runs/thesis --draws 50 --out robustness
     """
-    from tetra_drake.analysis.robustness import judge
+    from tetra_drake.analysis.robustness import robustness
     from tetra_drake.evolution.source import load_source
     from tetra_drake.report.analysis_text import robustness_text
 
     found = load_source(source, scenario=scenario, warn=_warn)
     if out:
         check_folder(out)
-    judgement = judge(found.scenario, found.gaits, draws=draws, seed=seed, workers=workers)
+    judgement = robustness(found.scenario, found.gaits, draws=draws, seed=seed, workers=workers)
     print(robustness_text(judgement))
     if out:
         from tetra_drake.figures.robustness import save_judgement
@@ -537,9 +537,9 @@ def _fit(
 
 
 def _cpg(
+    gait: GaitFile | None = None,
     *,
     scenario: ScenarioName | None = None,
-    gait: GaitFile | None = None,
     seed: GaitSeed | None = None,
     rate: Rate | None = None,
     out: File,

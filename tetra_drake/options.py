@@ -131,11 +131,15 @@ def positive(text: str) -> float:
 
 
 def quantity(unit: str, example: str) -> Callable[[str], float]:
-    """Function that reads a quantity as a number in an SI unit. Errors name the `example`."""
+    """Function that reads a quantity as a number in an SI unit. Errors name the `example`, or its
+    unit."""
 
     def read(text: str) -> float:
         from tetra_drake.scenario.units import quantity_to_si
 
+        if re.fullmatch(r"[\d.]+", text):
+            advice = f"did you mean '{text} {example.split()[1]}'?"
+            raise argparse.ArgumentTypeError(f"found '{text}' without a unit; {advice}")
         try:
             return quantity_to_si(text, unit)
         except ValueError as error:

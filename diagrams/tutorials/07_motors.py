@@ -7,7 +7,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import tetra_drake as td
-from tetra_drake.prototype.export import export
 
 run = td.load_run(Path(__file__).parents[2] / "runs" / "champion")
 gait = run.best_gait()
@@ -23,7 +22,7 @@ print(f"{needs.metrics.distance_in:.1f} in by forces, {driven.metrics.distance_i
 
 # %% A folder for the lab: commands at 100 Hz, expected positions, loads. Then a simulation of it.
 shutil.rmtree("out/lab", ignore_errors=True)
-print(export(motors, gait, rate=100.0, out="out/lab"))
+print(td.export(motors, gait, rate=100.0, out="out/lab"))
 played = td.simulate(motors, command=td.load_command("out/lab/command.csv", motors))
 print(f"played from the file: {played.metrics.distance_in:.1f} in")
 

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 
 import tetra_drake as td
 from tetra_drake.prototype.command_file import table_text
-from tetra_drake.prototype.export import export
 from tetra_drake.scenario.scenario import Scenario
 
 settings = {"actuation": "!TensionMotor {max_force: 20 N, max_speed: 1 m/s, time_constant: 20 ms}"}
@@ -27,7 +26,7 @@ def play(scenario: Scenario, out: str, color: str) -> td.MotionCapture:
     """The log of a gait that is evolved on a scenario: of its first 3 s, as differences grow."""
     run = td.evolve(scenario, out, overwrite=True, reevaluate=False, report=False)
     lab = f"{out}/lab"
-    print(export(scenario, run.best_gait(), rate=100.0, out=lab))
+    print(td.export(scenario, run.best_gait(), rate=100.0, out=lab))
     command = td.load_command(f"{lab}/command.csv", scenario)
     for robot, who, width in (scenario, "model", 1.0), (prototype, "prototype", 4.0):
         result = td.simulate(robot, command=command, record=True)

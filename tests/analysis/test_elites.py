@@ -98,7 +98,7 @@ def test_elites_are_simulated_on_disturbed_robots_once(run_of, monkeypatch):
         tables = {"undisturbed": DataFrame(undisturbed), "draws": DataFrame(draws)}
         return Judgement(scenario, options["seed"], alone=DataFrame(), **tables)
 
-    monkeypatch.setattr("tetra_drake.analysis.elites.judge", judge)
+    monkeypatch.setattr("tetra_drake.analysis.elites.robustness", judge)
     run = run_of({2.0: (0.01, 0.3), 3.0: (0.05, 0.3)})
     path = run.directory / "elites.jsonl"
     keep(run, {1: 0.25})

@@ -39,7 +39,7 @@ def gaits(scenario):
 
 @pytest.fixture(scope="module")
 def judgement(scenario, gaits):
-    return robustness.judge(scenario, gaits, draws=DRAWS, seed=5, workers=2)
+    return robustness.robustness(scenario, gaits, draws=DRAWS, seed=5, workers=2)
 
 
 GROUND = ["ground.damping", "ground.stiffness"]
@@ -94,7 +94,7 @@ def test_every_change_is_also_made_alone(judgement, gaits):
 
 
 def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits, judgement):
-    again = robustness.judge(scenario, {"b": gaits["b"]}, draws=DRAWS, seed=5, workers=1)
+    again = robustness.robustness(scenario, {"b": gaits["b"]}, draws=DRAWS, seed=5, workers=1)
     for name in ("undisturbed", "draws", "alone"):
         table = getattr(judgement, name)
         of_b = table[table["gait"] == "b"].reset_index(drop=True)
@@ -104,11 +104,11 @@ def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits,
 def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
     damping = Disturbances(draws=4, spreads={"robot.cables.damping": 0.2})
     disturbing = scenario.with_changes({"disturbances": damping, "require": {"distance": "1 m"}})
-    judged = robustness.judge(disturbing, gaits, draws=2)
+    judged = robustness.robustness(disturbing, gaits, draws=2)
     assert set(judged.alone["what"]) == {"robot.cables.damping", robustness.TERRAIN}
     assert judged.draws["robot.cables.damping"].between(0.8, 1.2).all()
     assert robustness.by_gait(judged)["missed"].tolist() == [2, 2]  # no gait walks a metre
-    given = robustness.judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1, alone=False)
+    given = robustness.robustness(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1, alone=False)
     assert given.scenario.disturbances == robustness.default_disturbances(scenario, 3.0)
 
 
@@ -126,7 +126,7 @@ def test_no_evolution_sees_a_fresh_draw():
 
 def test_a_simulation_that_fails_has_a_reason_and_no_distance_and_keeps_nothing(scenario, gaits):
     stopped = scenario.with_changes({"simulation.max_evaluations": 100})
-    found = robustness.judge(stopped, {"a": gaits["a"]}, draws=2)
+    found = robustness.robustness(stopped, {"a": gaits["a"]}, draws=2)
     for table in (found.undisturbed, found.draws, found.alone):
         assert table["distance"].isna().all() and table["failure"].str.contains("100").all()
     row = robustness.by_gait(found).loc["a"]
@@ -196,4 +196,4 @@ def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement
 
 def test_a_gait_of_another_robot_is_refused(scenario, refused):
     with refused("gait random gait 1", "weights", "expected 4"):
-        robustness.judge(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)
+        robustness.robustness(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)

@@ -95,6 +95,9 @@ def compare(
 ) -> Compared:
     """Compares runs with the same objective, finished or not.
 
+        >>> compared = td.compare(["runs/demo", "runs/other"], reach=0.3)
+        >>> compared.trials[["run", "fitness", "reached"]], compared.improvement, compared.notes
+
     Args:
         directories: folders of runs.
         reach: a distance (m); the result says at which cost it was reached.

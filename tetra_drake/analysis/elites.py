@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.analysis.robustness import by_gait, judge
+from tetra_drake.analysis.robustness import by_gait, robustness
 from tetra_drake.evolution.entries import ELITES, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, load_run
@@ -66,7 +66,7 @@ def _cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> npt.NDArray[np.in
 
 
 def judge_elites(directory: Path, *, workers: int | None = None) -> None:
-    """Simulates the elites of a run on disturbed robots, as judge() does, and records the results.
+    """Simulates the elites of a run on disturbed robots and records the results; see robustness().
 
     The scenario sets the number of draws. Elites with a recorded result are skipped.
     """
@@ -83,7 +83,9 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
     keys = missing[_KEY].to_numpy().tolist()
     gaits = {i: run.gait(trial, index) for i, (trial, index) in enumerate(keys)}
     seed = run.manifest.seed
-    judgement = judge(scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers)
+    judgement = robustness(
+        scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers
+    )
     table = by_gait(judgement)
     lines = [
         {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}

@@ -18,6 +18,7 @@ from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.scenario.load import GivenScenario, given_scenario
 
 if TYPE_CHECKING:
     import pandas
@@ -43,10 +44,23 @@ class EquilibriumStudy:
     """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely."""
 
 
-def study_equilibrium(robot: Robot) -> EquilibriumStudy:
-    """Studies a robot in equilibrium. Raises InputError if no equilibrium is found."""
+def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
+    """Studies a robot in equilibrium.
+
+        >>> study = td.study_equilibrium("prism")
+        >>> study.frequencies.round(1)[:3]
+        array([12.9, 12.9, 17.4])
+        >>> tensions, heights = study.cables.tension, study.nodes.z
+
+    Args:
+        given: a scenario, its name or file, or a run; or a robot.
+
+    Raises:
+        InputError: if the robot has no equilibrium.
+    """
     import pandas
 
+    robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium
     unactuated = Unactuated(robot.model)
     force_at_rest(unactuated, equilibrium.state)

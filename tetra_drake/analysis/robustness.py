@@ -16,9 +16,10 @@ from tetra_drake.errors import InputError
 from tetra_drake.machine import versions
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import Gait, GivenGait, given_gait
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
+from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import varied, written
@@ -47,7 +48,7 @@ QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
 
 @dataclass(frozen=True)
 class Judgement:
-    """Result of judge(): tables with one row per simulation.
+    """Result of robustness(): tables with one row per simulation.
 
     All tables have the columns gait (its key), failure (reason, or missing), missed (requirements
     of the scenario that are not met), fitness, and the metrics in SI. Fitness and metrics are NaN
@@ -86,9 +87,9 @@ def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Distur
     return Disturbances(draws=1, spreads=spreads, start=share)
 
 
-def judge(
-    scenario: Scenario,
-    gaits: Mapping[Any, Gait],
+def robustness(
+    scenario: GivenScenario,
+    gaits: Mapping[Any, GivenGait],
     *,
     percent: float | None = None,
     draws: int = DRAWS,
@@ -98,12 +99,18 @@ def judge(
 ) -> Judgement:
     """Simulates gaits on disturbed robots, with the compiled engine.
 
+        >>> run = td.load_run("runs/demo")
+        >>> judgement = td.robustness(run, {"best": run}, draws=3)
+        >>> distances = judgement.draws.distance
+        >>> kept = judgement.compared(judgement.draws).kept.mean()
+
     Each gait is simulated undisturbed and in all draws; the draws are the same for all gaits. No
     evolution uses these draws, whatever its seed.
 
     Args:
-        scenario: its disturbances are used, if it has any and `percent` is None.
-        gaits: gaits by any key.
+        scenario: a scenario, its name or file, or a run. Its disturbances are used, if it has any
+            and `percent` is None.
+        gaits: gaits, files or runs, by any key.
         percent: size of the default disturbances.
         draws: number of draws.
         seed: seed of the draws.
@@ -113,6 +120,8 @@ def judge(
     Raises:
         InputError: if a gait is for another robot, or `percent` is too large for the scenario.
     """
+    scenario = given_scenario(scenario)
+    walkers = {key: given_gait(gait, scenario) for key, gait in gaits.items()}
     disturbances = scenario.disturbances
     if disturbances is None or percent is not None:
         disturbances = default_disturbances(scenario, percent or PERCENT)
@@ -123,7 +132,7 @@ def judge(
         plan.append(({"what": ALL, "draw": i, **draw.factors}, draw))
     if alone:
         plan += _alone(disturbances, fresh)
-    rows = _simulated(scenario, plan, gaits, workers)
+    rows = _simulated(scenario, plan, walkers, workers)
     changed = [row for row in rows if row["what"] not in (NOTHING, ALL)]
     return Judgement(
         scenario=scenario,

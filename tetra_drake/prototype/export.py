@@ -11,15 +11,15 @@ import numpy as np
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import check_folder, write_whole
+from tetra_drake.files import check_folder, given_path, write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.prototype.command_file import command_text, load_command, table_text
 from tetra_drake.prototype.loads import Loads, actuator_loads
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import save_scenario
+from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
@@ -29,23 +29,32 @@ LEAST_RATE = 1000.0
 """Least sampling rate (Hz) for finding peaks. The rate of the files may be lower."""
 
 
-def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> str:
-    """Simulates a gait and writes a folder for a prototype. Returns a verdict.
+def export(
+    scenario: GivenScenario, gait: GivenGait, out: str | Path, *, rate: float = 100.0
+) -> str:
+    """Simulates a gait and writes it as commands for the actuators of a prototype. Returns a
+    verdict.
+
+        >>> print(td.export(td.load_scenario("quick"), "gait.json", "prototype"))
 
     The verdict has the loads on the actuators, whether the actuators can bear them, and the
     distance when the written commands are simulated. With feedback, the commands are the signals of
     this one simulation.
 
     Args:
+        scenario: a scenario, its name or file, or a run.
+        gait: a gait, its file, or a run; a run means its best gait.
+        out: the new folder. See the command `tetra-drake export` for its files.
         rate: samples per second (Hz) in the files.
-        out: the new folder.
 
     Raises:
         InputError: if an argument cannot be used.
         SimulationFailure: if the simulation of the gait fails.
     """
+    scenario = given_scenario(scenario)
+    gait = given_gait(gait, scenario)
     check_rate(rate, scenario)
-    out = Path(out)
+    out = given_path(out, "export", "out")
     check_folder(out)
     if out.exists():
         raise InputError(out, "", "exists, expected a new folder")

@@ -11,6 +11,7 @@ from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import Units
@@ -75,8 +76,9 @@ def result_text(result: SimulationResult) -> str:
     lines.append(metrics_table({"": {"fitness": result.fitness} | vars(metrics)}, scenario).text())
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
-    if sinking := result.robot.sinking_remark():
-        lines.append(f"{sinking[0].upper()}{sinking[1:]}.")
+    still = result.robot.stillness_remark(metrics.distance) if result.gait else ""
+    for remark in filter(None, [still, result.robot.sinking_remark()]):
+        lines.append(f"{remark[0].upper()}{remark[1:]}.")
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]
     time, factor = _time(result.wall_time), rounded(result.duration / result.wall_time)
@@ -101,6 +103,8 @@ def run_text(run: Run) -> str:
         best = run.fittest()
         gaits = {"initially": run.initial_best(best["trial"]), "best": best}
         texts.append(metrics_table(gaits, run.scenario).text())
+        if still := Robot.of(run.scenario).stillness_remark(best["distance"]):
+            texts.append(f"{still[0].upper()}{still[1:]}.")
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
         texts.append(f"to watch the best gait:  {replay}\nfigures and numbers:     {report}")

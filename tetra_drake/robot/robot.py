@@ -28,6 +28,7 @@ from tetra_drake.robot.structure import Structure, moved_nodes, node_positions, 
 from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.actuator_kinds import DrivenCables
 from tetra_drake.scenario.common_sections import CpgSection
+from tetra_drake.scenario.metrics import looks_for_distance
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.simd.packed import Packed
@@ -36,6 +37,8 @@ AMPLITUDE = 0.5
 """Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""
 LEAST_MOTION = 0.01
 """Least change of a cable's length that signals should cause, as a share of the length."""
+STILL = 0.1
+"""Distance that a robot should walk, as a share of its length."""
 SINKS, BEARS = 0.03, 0.01
 """Depths of a robot in its ground, as shares of its height: too deep, and as deep as in a ground
 that bears it."""
@@ -162,8 +165,8 @@ class Robot:
         """Warning if signals with this `cpg.gain` hardly move the cables, or exceed the limits of
         the actuators; empty if neither."""
         cpg, driven = self.scenario.cpg, self.structure.cables[self.driven]
-        signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
-        moved = cable.elastic_stretch(signal, cable.CableLaw.of(driven))
+        signal = self._usual_signal()
+        moved = self._elastic_stretch(signal)
         share = np.max(moved / self._starting_lengths(driven))
         if share < LEAST_MOTION:
             problem = f"move no cable by more than {share:.2g} of its length"
@@ -171,6 +174,18 @@ class Robot:
             least = np.min(driven["free_length"] - moved)
             problem = self.scenario.actuation.excess(signal, free_length=least)
         return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
+
+    def stillness_remark(self, distance: float) -> str:
+        """Remark on a robot that has walked a `distance` (m) of less than STILL of its length,
+        although it was to walk; empty for another one."""
+        scenario, units = self.scenario, self.scenario.units
+        length = np.ptp(self.structure.p_WN, axis=0).max()
+        if not looks_for_distance(scenario.objective) or not abs(distance) < STILL * length:
+            return ""
+        moved = np.max(self._elastic_stretch(self._usual_signal()))
+        signals = f"signals with cpg.gain {units.shown(scenario.cpg.gain, 'N')}"
+        way = f"walks {units.shown(distance, 'm')}, less than a tenth of its length"
+        return f"the robot {way}; {signals} stretch cables by {units.shown(moved, 'm')} at most"
 
     def sinking_remark(self) -> str:
         """Warning if the robot at rest is in its ground by more than SINKS of its height, with a
@@ -190,6 +205,16 @@ class Robot:
         needed = units.shown(ground.stiffness * depth / (BEARS * height), "N/m")
         sinks = f"the robot sinks into its ground by {units.shown(depth, 'm')}"
         return f"{sinks}; a ground.stiffness of {needed} would bear it"
+
+    def _usual_signal(self) -> float:
+        """Typical amplitude (N) of the signals."""
+        cpg = self.scenario.cpg
+        return abs(cpg.gain) * AMPLITUDE * cpg.external_input
+
+    def _elastic_stretch(self, force: float) -> np.ndarray:
+        """Stretch (driven cables,) in m of the driven cables by a force (N)."""
+        law = cable.CableLaw.of(self.structure.cables[self.driven])
+        return np.asarray(cable.elastic_stretch(force, law))
 
     def starting_drives(self) -> np.ndarray:
         """States of the actuators at t = 0 (drives,); see physics.actuator and
