@@ -11,6 +11,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import raw_output
 from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.units import INCH
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
@@ -104,3 +105,14 @@ def test_a_gain_that_hardly_acts_or_asks_too_much_is_named(name, gain, problem):
     remark = Robot.of(load_scenario(name).with_changes({"cpg.gain": gain})).gain_remark()
     assert bool(remark) == bool(problem)
     assert problem in remark
+
+
+def test_a_robot_that_walks_less_than_a_tenth_of_its_length_is_named():
+    robot = Robot.of(load_scenario("thesis").with_changes({"cpg.gain": "1 lbf"}))
+    # From T1's base to T5's tip: four spacings of 2.94 in, and 4.9 in of a tetrahedron.
+    tenth = 0.1 * (4 * 2.94 + 4.899) * INCH
+    assert not robot.stillness_remark(-1.01 * tenth)
+    # Signals of 0.25 lbf (half of u0 = 0.5) stretch cables of 0.2 lbf/in by 1.25 in.
+    assert "1.25 in" in robot.stillness_remark(0.99 * tenth)
+    turning = robot.scenario.with_changes({"objective": {"heading_change": "1 /rad"}})
+    assert not Robot.of(turning).stillness_remark(0.0)
