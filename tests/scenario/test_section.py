@@ -38,6 +38,7 @@ class Settings(Section):
     limits: Annotated[dict[str, float], UnitsByName({"a": "N", "share": ""})] = Field(default={})
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
+    groups: dict[str, dict[str, int]] = Field(default={})
     inner: Incline
 
 
@@ -54,6 +55,12 @@ GOOD: list[tuple[str, str, Any]] = [
     ("ramps: [{slope: 1 rad}]", "ramps", [Incline(slope=1.0)]),  # without a tag, the first kind
     ("probe: {at: [0 m, 0 m, 0 m], active: false}", "probe", Probe(at=[0.0] * 3, active=False)),
     ("probe:", "probe", None),
+    ("terrain:", "terrain", Flat()),
+    ("limits:", "limits", {}),
+    ("ramps: [!Flat ]", "ramps", [Flat()]),
+    ("groups: {a: }", "groups", {"a": {}}),
+    ("inner:", "inner", Incline(slope=0.0)),  # on a base, no change
+    ("inner: {surface: smooth}", "inner", Incline(slope=0.0, surface="smooth")),
 ]
 
 
@@ -79,8 +86,10 @@ BAD = [
     ("cont: 3", "cont", "'count'"),
     ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
     ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
-    ("terrain:", "terrain", "nothing"),
-    ("terrain: !Incline {}", "terrain.slope", "missing"),
+    ("terrain: 5", "terrain", "5"),
+    ("terrain: !Incline", "terrain.slope", "missing"),
+    ("inner: {slope: }", "inner.slope", "nothing"),
+    ("ramps:", "ramps", "nothing"),
     ("terrain: !Cells {cells: [1 m, 1 m, 1 m, one]}", "terrain.cells[3]", "'one'"),
     ("limits: {a: 1}", "limits.a", "1 without a unit"),
     ("limits: {b: 1}", "limits.b", "of a, share"),

@@ -77,18 +77,24 @@ class Section(BaseModel):
             first = max(of_field, key=lambda one: _place(one, tree)[1])
         key, problem = _in_words(first, cls, tree)
         if first["type"] == "missing" and info.context and info.context["has_base"]:
-            problem += ", or name a `base` that has it"
+            is_kind = isinstance(tree, dict) and TAG in tree
+            whole = f", as !{cls.tag} replaces a base's kind"
+            problem += whole if is_kind else ", or name a `base` that has it"
         refuse(key, problem)
 
     @pydantic.model_validator(mode="before")
     @classmethod
     def _check_keys(cls, tree: Any) -> Any:
+        tree = {} if tree is None else tree
         if not isinstance(tree, dict) or tree.get(TAG, cls.tag) != cls.tag:
             refuse("", f"found {described(tree)}, expected a mapping of keys")
-        for name in tree:
-            if name != TAG and name not in keys_of(cls):
+        fields, values = keys_of(cls), {}
+        for name, value in tree.items():
+            if name != TAG and name not in fields:
                 refuse(str(name), f"unknown key; {cls._advice(str(name))}")
-        return {name: python_value(value) for name, value in tree.items() if name != TAG}
+            if name != TAG:
+                values[name] = _with_mappings(python_value(value), fields[name].annotation)
+        return values
 
     def __eq__(self, other: object) -> bool:
         return type(other) is type(self) and other._compared() == self._compared()
@@ -144,6 +150,14 @@ def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
     return {field.alias or name: field for name, field in section.model_fields.items()}
 
 
+def _with_mappings(value: Any, annotation: Any) -> Any:
+    """A value with an empty mapping in place of nothing, where its type is a mapping."""
+    if typing.get_origin(annotation) is not dict or not isinstance(value, dict | None):
+        return value
+    _, of_items = typing.get_args(annotation)
+    return {name: _with_mappings(item, of_items) for name, item in (value or {}).items()}
+
+
 def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
     """Dotted keys in a section that end with a name."""
     for key, field in keys_of(section).items():
@@ -177,6 +191,7 @@ class Kinds:
 
 def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
     """The kind of a mapping. Refuses a key that only another kind has."""
+    value = {} if value is None else value
     tags = [f"!{name}" for name in kinds]
     if not isinstance(value, dict):
         refuse("", f"found {described(value)}; {hint('!', tags)}")
