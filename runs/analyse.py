@@ -206,7 +206,7 @@ def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
     directions[:, :, 2] = np.abs(directions[:, :, 2])  # not into the ground
     starts = [Draw({}), *(Draw({}, moves=DISPLACEMENT * each) for each in directions)]
-    compiled = scenario.with_changes({"engine": "!Compiled"})
+    compiled = scenario.on_engine("compiled")
     scenarios = [disturbed(compiled, start) for start in starts]
     outcomes = simulate_many(
         scenarios * len(gaits), [gait for gait in gaits for _ in scenarios], workers=workers
@@ -278,8 +278,10 @@ def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     if isinstance(scenario.terrain, Flat):
         for law, shipped in LAWS.items():
             other = load_scenario(shipped)
-            compiled = other.with_changes({"engine": "!Compiled"})
-            changes[law] = {"friction": other.friction, "engine": compiled.engine}
+            changes[law] = {
+                "friction": other.friction,
+                "engine": other.on_engine("compiled").engine,
+            }
     settings = {}
     for name, change in changes.items():
         with contextlib.suppress(InputError):

@@ -195,7 +195,7 @@ def _scenario_of_command(scenario: str | None, command: Path, engine: str | None
     chosen = load_scenario(scenario or beside or "thesis")
     if scenario and beside:
         _warn(f"{command}: simulated on scenario {chosen.name}, not on {beside} beside it")
-    return chosen.with_changes(_engine_change(engine))
+    return chosen.on_engine(engine)
 
 
 def _export(
@@ -269,16 +269,18 @@ def _evolve(
     from tetra_drake.report.summary import run_text
     from tetra_drake.scenario.load import load_scenario
 
-    changes = _engine_change(engine)
+    changes: dict[str, Any] = {}
     if trials is not None:
         changes["evolution.trials"] = trials
     if evaluations is not None:
         changes["evolution.evaluations"] = evaluations
     chosen: Scenario | None = None  # None means the scenario of the run
     if scenario is not None or not resume:
-        chosen = load_scenario(scenario or "quick").with_changes(changes)
-    elif changes:
-        chosen = read_manifest(out).scenario.with_changes(changes)
+        chosen = load_scenario(scenario or "quick")
+    elif changes or engine is not None:
+        chosen = read_manifest(out).scenario
+    if chosen is not None:
+        chosen = chosen.on_engine(engine).with_changes(changes)
 
     executor: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
     if dask is not None:
@@ -636,11 +638,6 @@ def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
     return Print(look, kinds=[*FILE_KINDS, "pdf"] if pdf else FILE_KINDS)
 
 
-def _engine_change(engine: str | None) -> dict[str, Any]:
-    """The change of the scenario by --engine."""
-    return {"engine": f"!{engine.capitalize()}"} if engine else {}
-
-
 def _chosen_gait(
     scenario: str | None, gait: Path | None, seed: int | None, engine: str | None = None
 ) -> tuple[Scenario, Gait]:
@@ -650,10 +647,10 @@ def _chosen_gait(
     from tetra_drake.scenario.load import load_scenario
 
     if gait is None:
-        chosen = load_scenario(scenario or "thesis").with_changes(_engine_change(engine))
+        chosen = load_scenario(scenario or "thesis").on_engine(engine)
         return chosen, seeded_gait(chosen, WALKING_SEED if seed is None else seed)
     source = load_source(gait, scenario=scenario, warn=_warn)
-    return source.scenario.with_changes(_engine_change(engine)), source.best
+    return source.scenario.on_engine(engine), source.best
 
 
 def _say(text: str) -> None:

@@ -12,9 +12,9 @@ run = td.load_run(Path(__file__).parents[2] / "runs" / "champion")
 flat = run.scenario.with_changes({"robot.contacts": "all"})  # every node can touch the ground
 
 # %% Kinds of terrain and friction, with their settings.
-grounds = {
+grounds: dict[str, dict[str, object]] = {
     "flat": {},
-    "flat, slippery": {"friction": "!Coulomb {static: 0.15, kinetic: 0.15}"},
+    "flat, slippery": {"friction": "!Coulomb {static: 0.15, kinetic: 0.15, stiffness: 300 N/m}"},
     "incline of 5 deg": {"terrain": "!Incline {slope: 5 deg}"},
     "steps of 0.25 in": {"terrain": "!Steps {height: 0.25 in, depth: 6 in, count: 4}"},
     "rough": {"terrain": "!Rough {amplitude: 0.25 in, wavelength: 6 in}"},

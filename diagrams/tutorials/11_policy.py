@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import tetra_drake as td
 
 generations, most = 120, 2.0  # most: the largest force in N
-changes = {"engine": "!Compiled", "simulation.duration": "5 s", "simulation.steady_from": "1 s"}
+changes = {"simulation.duration": "5 s", "simulation.steady_from": "1 s"}
 robots = td.Simulation(td.load_scenario("coulomb").with_changes(changes), count=48)
 driven, start = robots.robot.driven, robots.state
 

@@ -1,13 +1,20 @@
 """Scenarios made from others: changed values, balanced spacing."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from tetra_drake.robot.robot import make_structure
+from tetra_drake.scenario.changes import merged
+from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
+from tetra_drake.scenario.refusals import TAG
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import Kinds, keys_of
+from tetra_drake.scenario.yaml_text import parse_yaml
 
 
 def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
@@ -67,15 +74,48 @@ def test_a_mapping_changes_what_it_names_as_in_a_file(load_text, scenario):
     stiff = {"robot.cables.outer_stiffness": "0.4 lbf/in"}
     balanced = load_text(f"robot: {{{STIFF}}}").robot
     assert scenario.with_changes(stiff).robot == balanced != scenario.robot
-    coulomb = scenario.with_changes({"friction": Coulomb(static=0.7)})
-    assert coulomb.with_changes({"friction": {"kinetic": 0.3}}).friction == Coulomb(
-        static=0.7, kinetic=0.3
-    )
 
 
-def test_a_mapping_of_free_keys_and_a_kind_of_another_tag_are_replaced_as_a_whole(scenario):
-    changed = scenario.with_changes({"objective": {"speed": "3 s/m"}, "friction": "!Coulomb {}"})
-    assert (changed.objective, changed.friction) == ({"speed": 3.0}, Coulomb())
+KINDS = [
+    (name, kind)
+    for name, field in Scenario.model_fields.items()
+    if any(isinstance(mark, Kinds) for mark in field.metadata)
+    for kind in get_args(field.annotation)
+]
+
+
+@pytest.mark.parametrize(("name", "kind"), KINDS)
+def test_a_kind_replaces_the_base_with_its_tag_and_changes_keys_without(name, kind):
+    base = {name: {TAG: kind.tag} | dict.fromkeys(keys_of(kind), "base's")}
+    with_tag = {name: parse_yaml(f"!{kind.tag}", "file")}
+    assert merged(base, with_tag) == with_tag
+    for key in keys_of(kind):
+        assert merged(base, {name: {key: "own"}}) == {name: base[name] | {key: "own"}}
+
+
+def test_a_kind_from_python_follows_the_rule_of_files(scenario):
+    coulomb = load_scenario("coulomb")
+    whole = coulomb.with_changes({"friction": "!Coulomb {static: 0.6}", "engine": "!Compiled"})
+    assert (whole.friction, whole.engine) == (Coulomb(static=0.6), Compiled())
+    changed = coulomb.with_changes({"friction": {"static": 0.6}})
+    assert changed.friction == Coulomb(static=0.6, stiffness=300.0)
+    assert coulomb.on_engine("compiled") == coulomb.on_engine(None) == coulomb
+    assert coulomb.on_engine("drake").engine == scenario.engine
+
+
+def test_a_key_with_nothing_is_an_empty_mapping_which_changes_nothing(load_text, refused):
+    robust = load_scenario("robust")
+    sections = [key for key, value in robust.model_dump().items() if isinstance(value, dict)]
+    for key in {*sections} - {"objective", "disturbances"}:
+        assert robust.with_changes({key: None}) == robust
+    assert load_text("base: robust\nfriction:\nrobot: {cables: }") == robust
+    assert robust.with_changes({"disturbances": None}).disturbances is None
+    with refused("scenario robust", "objective", "1 items"):
+        robust.with_changes({"objective": None})
+
+
+def test_a_mapping_of_free_keys_is_replaced_as_a_whole(scenario):
+    assert scenario.with_changes({"objective": {"speed": "3 s/m"}}).objective == {"speed": 3.0}
     added = scenario.with_changes({"objective.speed": "3 s/m"}).objective
     assert added == scenario.objective | {"speed": 3.0}, "a key with a dot is added"
 

@@ -121,7 +121,7 @@ def test_a_unit_is_that_of_bare_coordinates() -> None:
         ("!Tetrahedra {file: own.yaml}", "robot.file", "unknown"),
         ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
         ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
-        ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.struts", "`base`"),
+        ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.struts", "!Structure"),
         ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
         ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
     ],
@@ -177,6 +177,6 @@ def test_metrics_of_a_row_are_refused(section: str, value: object, refused) -> N
 
 def test_memory_limits_count_bodies(folder: Path, refused) -> None:
     more = "simulation: {sample_period: 2e-5 s}"
-    assert load(folder, "!Tetrahedra {tetrahedra: 2}", more=more)
+    assert load(folder, "{tetrahedra: 2}", more=more)
     with refused(folder / "mine.yaml", "simulation.sample_period", "2.25e-05"):
         load(folder, "!Structure {file: own.yaml}", more=more)

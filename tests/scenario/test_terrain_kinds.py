@@ -183,7 +183,7 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
     file = scenario_file(tmp_path / "hills", "terrain: !HeightField {file: heights.csv, cell: 5 m}")
     absolute = HeightField(file=str(tmp_path / "hills" / "heights.csv"), cell=5.0)
     assert load_scenario(file.relative_to(tmp_path)).terrain == absolute
-    based = scenario_file(tmp_path / "mine", "terrain: !HeightField {cell: 1 m}", base=str(file))
+    based = scenario_file(tmp_path / "mine", "terrain: {cell: 1 m}", base=str(file))
     assert load_scenario(based).terrain == HeightField(file=absolute.file, cell=1.0)
 
 

@@ -125,7 +125,7 @@ def robustness(
     disturbances = scenario.disturbances
     if disturbances is None or percent is not None:
         disturbances = default_disturbances(scenario, percent or PERCENT)
-    scenario = scenario.with_changes({"engine": "!Compiled", "disturbances": disturbances})
+    scenario = scenario.on_engine("compiled").with_changes({"disturbances": disturbances})
     fresh = fresh_draws(scenario, seed, draws)
     plan: list[_Planned] = [({"what": NOTHING}, Draw({}))]
     for i, draw in enumerate(fresh):

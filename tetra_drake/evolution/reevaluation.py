@@ -59,7 +59,7 @@ def reevaluate(
     for trial, index, iteration in missing:
         vector = run.vector(trial, index)
         tasks.append(manifest.task(vector, trial=trial, index=index, iteration=iteration))
-    evaluate = GaitEvaluation(scenario.with_changes({"engine": "!Drake"}), objective)
+    evaluate = GaitEvaluation(scenario.on_engine("drake"), objective)
     progress = progress or Progress()
     progress.stage(_TITLE, 0, len(missing))
     chosen = evaluator_of(evaluate, workers=workers, executor=executor, warn=progress.warn)

@@ -13,6 +13,9 @@ from tetra_drake.scenario.yaml_text import parse_yaml
 REPLACED = ("objective", "require", "robot.actuated")
 """Mappings that a file replaces as a whole."""
 
+REMOVABLE = ("disturbances",)
+"""Sections that are absent if nothing is given for them."""
+
 
 class Part(Tree):
     """A mapping made from dotted keys. It changes a part of a mapping, or items of a list by their
@@ -22,24 +25,24 @@ class Part(Tree):
 def merged(base: Any, changes: Any, key: str = "") -> Any:
     """The tree of a scenario, or the part of it at `key`, with changes. The rules are:
 
-    - A mapping changes the keys that it names; the others stay.
-    - A kind with another tag replaces the base's kind and all its keys. With the same tag, or
-      without a tag, it changes keys.
+    - A mapping changes the keys that it names; the others stay. Nothing, as in `friction:`, is an
+      empty mapping, but removes `disturbances`.
+    - A kind with its tag replaces the base's kind and all its keys. Without a tag it changes keys.
     - `objective`, `require` and `robot.actuated` are replaced as a whole. Only dotted keys from
       Python, such as "objective.speed", change a part of them.
     - Numbers, texts, lists, and sections from Python replace the base's value. Only keys from
       Python, such as "robot.loads.n3[2]", change an item of a list.
     """
+    if changes is None and isinstance(base, dict) and key not in REMOVABLE:
+        changes = {}
     if not isinstance(changes, dict):
         return changes
     if isinstance(base, list) and isinstance(changes, Part):
         return _with_items(base, changes, key)
-    is_whole = key in REPLACED and not isinstance(changes, Part)
-    if not isinstance(base, dict) or is_whole or changes.get(TAG, base.get(TAG)) != base.get(TAG):
-        base = {}
-    tree = dict(base)
+    is_whole = TAG in changes or (key in REPLACED and not isinstance(changes, Part))
+    tree = dict(base) if isinstance(base, dict) and not is_whole else {}
     for name, value in changes.items():
-        tree[name] = merged(base.get(name), value, joined(key, str(name)))
+        tree[name] = merged(tree.get(name), value, joined(key, str(name)))
     return tree
 
 

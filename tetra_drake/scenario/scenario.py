@@ -33,7 +33,7 @@ from tetra_drake.scenario.quantities import UnitsByName
 from tetra_drake.scenario.refusals import TAG, hint, refuse
 from tetra_drake.scenario.robot_structure import Robot
 from tetra_drake.scenario.section import Section, Tree, flattened, written
-from tetra_drake.scenario.structure_files import names_structure, with_structure
+from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.strut_contact_kinds import NoStrutContact, StrutContactKind
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.units import Units, plainest, rounded_in_text, shortest, units_for
@@ -179,20 +179,17 @@ class Scenario(Section):
         """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
 
         The rules are the same as for a file with this scenario as its base: quantities have units,
-        mappings are merged, and the spacing is adapted. A kind may be a text as in a file
-        ("friction": "!Coulomb {static: 0.3}"), or a section with SI numbers
-        ({"friction": Coulomb()}), which replaces the old one. Raises InputError, naming the key.
+        mappings change the keys that they name, and the spacing is adapted. A kind may be a text as
+        in a file ("friction": "!Coulomb {static: 0.3}"), or a section with SI numbers
+        ({"friction": Coulomb()}); both replace the old one. Raises InputError, naming the key.
         """
         source = f"scenario {self.name}"
         return self.with_file(tree_of_changes(changes, source), source)
 
     def with_file(self, changes: Tree, source: object) -> Self:
         """The scenario of a file's tree with this scenario as its base; see changes.merged()."""
-        base = self.model_dump()
-        if names_structure(changes):
-            del base["robot"]  # replaced as a whole
         changes = with_structure(changes, source)
-        tree = merged(base, changes)
+        tree = merged(self.model_dump(), changes)
         changed = self.from_tree(tree, source)
         robot = changes.get("robot")
         if not isinstance(robot, dict):
@@ -201,6 +198,13 @@ class Scenario(Section):
         if not implied:
             return changed
         return self.from_tree(merged(tree, {"robot": implied}), source)
+
+    def on_engine(self, name: str | None) -> Self:
+        """The scenario on the engine of this name, such as "compiled": with its own settings if it
+        is on this engine or there is no name, otherwise with default settings."""
+        if name in (None, self.engine_name):
+            return self
+        return self.with_changes({"engine": f"!{str(name).capitalize()}"})
 
     def with_sections(self, **sections: Any) -> Self:
         """A copy with other sections. They are not checked."""

@@ -8,6 +8,7 @@ TAG.
 from __future__ import annotations
 
 import functools
+import os
 import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
@@ -39,6 +40,21 @@ class Section(BaseModel):
     tag: ClassVar[str] = ""
     """Name of the kind in files; the name of the class if not given."""
 
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise _input_error(error, type(self).__name__) from None
+
+    # Otherwise pydantic would also call it in the validation of a tree.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    def __setattr__(self, name: str, value: Any = None) -> None:
+        problem = "cannot be changed in place; with_changes() of a scenario makes a changed copy"
+        raise InputError(type(self).__name__, name, problem)
+
+    __delattr__ = __setattr__
+
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         cls.tag = cls.__dict__.get("tag", cls.__name__)
@@ -61,18 +77,24 @@ class Section(BaseModel):
             first = max(of_field, key=lambda one: _place(one, tree)[1])
         key, problem = _in_words(first, cls, tree)
         if first["type"] == "missing" and info.context and info.context["has_base"]:
-            problem += ", or name a `base` that has it"
+            is_kind = isinstance(tree, dict) and TAG in tree
+            whole = f", as !{cls.tag} replaces a base's kind"
+            problem += whole if is_kind else ", or name a `base` that has it"
         refuse(key, problem)
 
     @pydantic.model_validator(mode="before")
     @classmethod
     def _check_keys(cls, tree: Any) -> Any:
+        tree = {} if tree is None else tree
         if not isinstance(tree, dict) or tree.get(TAG, cls.tag) != cls.tag:
             refuse("", f"found {described(tree)}, expected a mapping of keys")
-        for name in tree:
-            if name != TAG and name not in keys_of(cls):
+        fields, values = keys_of(cls), {}
+        for name, value in tree.items():
+            if name != TAG and name not in fields:
                 refuse(str(name), f"unknown key; {cls._advice(str(name))}")
-        return {name: python_value(value) for name, value in tree.items() if name != TAG}
+            if name != TAG:
+                values[name] = _with_mappings(python_value(value), fields[name].annotation)
+        return values
 
     def __eq__(self, other: object) -> bool:
         return type(other) is type(self) and other._compared() == self._compared()
@@ -107,8 +129,13 @@ class Section(BaseModel):
         try:
             return cls.model_validate(tree, context={"has_base": cls.has_base})
         except ValidationError as error:
-            refused = error.errors(include_url=False)[0]["ctx"]
-            raise InputError(source, joined(key, refused["key"]), refused["problem"]) from None
+            raise _input_error(error, source, key) from None
+
+
+def _input_error(error: ValidationError, source: object, key: str = "") -> InputError:
+    """The error of a section at `key` as an InputError that names `source`."""
+    refused = error.errors(include_url=False)[0]["ctx"]
+    return InputError(source, joined(key, refused["key"]), refused["problem"])
 
 
 def _hashable(value: Any) -> Any:
@@ -121,6 +148,14 @@ def _hashable(value: Any) -> Any:
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
     """Fields of a section by their keys in files."""
     return {field.alias or name: field for name, field in section.model_fields.items()}
+
+
+def _with_mappings(value: Any, annotation: Any) -> Any:
+    """A value with an empty mapping in place of nothing, where its type is a mapping."""
+    if typing.get_origin(annotation) is not dict or not isinstance(value, dict | None):
+        return value
+    _, of_items = typing.get_args(annotation)
+    return {name: _with_mappings(item, of_items) for name, item in (value or {}).items()}
 
 
 def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
@@ -156,6 +191,7 @@ class Kinds:
 
 def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
     """The kind of a mapping. Refuses a key that only another kind has."""
+    value = {} if value is None else value
     tags = [f"!{name}" for name in kinds]
     if not isinstance(value, dict):
         refuse("", f"found {described(value)}; {hint('!', tags)}")
@@ -194,7 +230,9 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def python_value(value: Any) -> Any:
-    """Converts tuples, and arrays and numbers of numpy, to Python's lists and numbers."""
+    """Converts tuples, arrays and numbers of numpy, and paths to lists, numbers and texts."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (list, tuple)):
