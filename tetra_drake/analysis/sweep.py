@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,14 +14,23 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.changes import given_changes
-from tetra_drake.scenario.common_sections import by_separate_key, separate
+from tetra_drake.scenario.common_sections import (
+    by_separate_key,
+    joining_advice,
+    repeated,
+    separate,
+)
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import value_at
+from tetra_drake.scenario.section import Section, python_value, value_at
 
 if TYPE_CHECKING:
     import xarray
+
+
+MOST = 1_000_000
+"""Largest number of simulations of a sweep."""
 
 
 def sweep(
@@ -63,10 +72,14 @@ def sweep(
     if not walkers:
         raise InputError("sweep", "gaits", "found none, expected one at least")
     swept = given_changes(changes, "sweep")
+    if twice := repeated(swept):
+        raise InputError("sweep", twice, "is given twice")
     changes = {key: _values(key, values) for key, values in swept.items()}
+    count = len(walkers) * math.prod(len(values) for values in changes.values())
+    if count > MOST:
+        raise InputError("sweep", "changes", f"found {count} simulations, expected at most {MOST}")
     combinations = list(itertools.product(*changes.values()))
-    grid = [dict(zip(changes, each, strict=True)) for each in combinations]
-    scenarios = [base.with_changes(by_separate_key(each)) for each in grid]
+    scenarios = [_changed(base, dict(zip(changes, each, strict=True))) for each in combinations]
     outcomes = simulate_many(
         [changed for changed in scenarios for _ in walkers],
         walkers * len(scenarios),
@@ -88,13 +101,24 @@ def sweep(
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
 
 
-def _values(key: str, given: Any) -> list[Any]:
-    """The values for a key as a list; `given` may be a single value."""
-    is_single = isinstance(given, (str, Mapping)) or not isinstance(given, Iterable)
-    values = [given] if is_single else list(given)
-    if not values:
+def _values(key: str, given: Any) -> Collection[Any]:
+    """The values for a key; `given` may be a single value."""
+    given = python_value(given)
+    is_one = isinstance(given, (str, bytes, Mapping, Section)) or not isinstance(given, Collection)
+    values = [given] if is_one else given
+    if not len(values):
         raise InputError("sweep", key, "found no value, expected one at least")
     return values
+
+
+def _changed(base: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    """A scenario with changes by joined keys. Raises InputError, naming the key."""
+    by_key = by_separate_key(changes)
+    try:
+        return base.with_changes(by_key)
+    except InputError as error:
+        problem = error.problem + joining_advice(error, by_key)
+        raise InputError(error.source, error.key, problem) from error
 
 
 def _dimension(key: str, changes: Iterable[str]) -> str:

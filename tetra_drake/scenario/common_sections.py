@@ -6,11 +6,13 @@ file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
+from tetra_drake.errors import InputError
 from tetra_drake.scenario.quantities import DampingPerLength, Force, Speed, Stiffness, Time
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Section, Varied
@@ -162,6 +164,12 @@ class Disturbances(Section):
     """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
     at risk). 1 is the mean over all draws. At least one draw counts."""
 
+    @model_validator(mode="after")
+    def _check(self) -> Disturbances:
+        if key := repeated(self.spreads):
+            refuse("spreads", f"'{key}' is given twice")
+        return self
+
 
 def separate(joined: str) -> list[str]:
     """Splits a key of `spreads` at its commas into scenario keys."""
@@ -171,3 +179,19 @@ def separate(joined: str) -> list[str]:
 def by_separate_key(by_joined: Mapping[str, Value]) -> dict[str, Value]:
     """Values by scenario key, from values for joined keys."""
     return {key: value for joined, value in by_joined.items() for key in separate(joined)}
+
+
+def repeated(all_joined: Iterable[str]) -> str:
+    """The first scenario key that is given twice in joined keys; "" if there is none."""
+    counts = Counter(key for joined in all_joined for key in separate(joined))
+    return next((key for key, count in counts.items() if count > 1), "")
+
+
+def joining_advice(error: InputError, changed: Collection[str]) -> str:
+    """Advice for an error about a key that was not changed itself, but has a common limit with a
+    `changed` key of its section; "" for other errors."""
+    section = error.key.rpartition(".")[0]
+    beside = [key for key in changed if key.rpartition(".")[0] == section]
+    if not beside or error.key in changed:
+        return ""
+    return f"; keys joined by a comma, '{beside[0]}, {error.key}', get the same value"
