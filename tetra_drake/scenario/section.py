@@ -8,6 +8,7 @@ TAG.
 from __future__ import annotations
 
 import functools
+import os
 import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
@@ -38,6 +39,21 @@ class Section(BaseModel):
 
     tag: ClassVar[str] = ""
     """Name of the kind in files; the name of the class if not given."""
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise _input_error(error, type(self).__name__) from None
+
+    # Otherwise pydantic would also call it in the validation of a tree.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    def __setattr__(self, name: str, value: Any = None) -> None:
+        problem = "cannot be changed in place; with_changes() of a scenario makes a changed copy"
+        raise InputError(type(self).__name__, name, problem)
+
+    __delattr__ = __setattr__
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -107,8 +123,13 @@ class Section(BaseModel):
         try:
             return cls.model_validate(tree, context={"has_base": cls.has_base})
         except ValidationError as error:
-            refused = error.errors(include_url=False)[0]["ctx"]
-            raise InputError(source, joined(key, refused["key"]), refused["problem"]) from None
+            raise _input_error(error, source, key) from None
+
+
+def _input_error(error: ValidationError, source: object, key: str = "") -> InputError:
+    """The error of a section at `key` as an InputError that names `source`."""
+    refused = error.errors(include_url=False)[0]["ctx"]
+    return InputError(source, joined(key, refused["key"]), refused["problem"])
 
 
 def _hashable(value: Any) -> Any:
@@ -194,7 +215,9 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def python_value(value: Any) -> Any:
-    """Converts tuples, and arrays and numbers of numpy, to Python's lists and numbers."""
+    """Converts tuples, arrays and numbers of numpy, and paths to lists, numbers and texts."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (list, tuple)):
