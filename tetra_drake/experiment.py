@@ -177,7 +177,7 @@ def fit(
             raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
     found = fit_values(
         given_scenario(scenario),
-        list(measurements),
+        measurements,
         parameters,
         search=search,
         folder=folder,
