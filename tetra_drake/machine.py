@@ -7,7 +7,6 @@ import os
 import platform
 from collections.abc import Iterable
 from importlib import metadata
-from numbers import Integral
 
 from tetra_drake.errors import InputError
 
@@ -15,17 +14,6 @@ from tetra_drake.errors import InputError
 def available_cores() -> int:
     """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def given_workers(workers: int | None, source: str) -> int:
-    """An argument as a number of workers; one per core if it is None. Raises InputError, naming
-    `source`, if it is no integer above 0."""
-    if workers is None:
-        return available_cores()
-    if not isinstance(workers, Integral) or workers < 1:
-        problem = f"found {workers!r:.60}, expected an integer, 1 or more"
-        raise InputError(source, "workers", problem)
-    return int(workers)
 
 
 def check_package(name: str, *, extra: str, source: str) -> None:

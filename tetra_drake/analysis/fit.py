@@ -14,17 +14,13 @@ import numpy as np
 import pandas
 
 from tetra_drake import __version__
+from tetra_drake.analysis.joined_keys import with_joined_changes
 from tetra_drake.analysis.measurements import FitFile, Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say, Table, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
-from tetra_drake.scenario.common_sections import (
-    by_separate_key,
-    joining_advice,
-    repeated,
-    separate,
-)
+from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import python_value, value_at
@@ -81,10 +77,9 @@ class Parameter(NamedTuple):
         width = self.most - self.least
         return min(abs(self.start) or width, width)
 
-    def changes(self, number: float) -> dict[str, str | float]:
-        """Changes of a scenario that give each of the joined keys the number."""
-        given = f"{number!r} {self.unit}" if self.unit else number
-        return by_separate_key({self.key: given})
+    def value(self, number: float) -> str | float:
+        """The number as a value for the scenario."""
+        return f"{number!r} {self.unit}" if self.unit else number
 
 
 @dataclass(frozen=True)
@@ -254,10 +249,10 @@ def _parameter(scenario: Scenario, key: str, bounds: Bounds, source: object) -> 
     parameter = Parameter(key, unit, float(start), least, most)
     try:
         for bound in (least, most):  # a scenario may have limits of its own
-            scenario.with_changes(parameter.changes(bound))
+            with_joined_changes(scenario, {key: parameter.value(bound)})
     except InputError as error:
-        problem = f"{error.key}: {error.problem}{joining_advice(error, separate(key))}"
-        raise InputError(source, place, problem) from error
+        named = "" if error.key in separate(key) else f"{error.key}: "
+        raise InputError(source, place, f"{named}{error.problem}") from error
     return parameter
 
 
@@ -305,12 +300,9 @@ class _Problem:
 
     def scenario_at(self, x: np.ndarray) -> Scenario:
         """The scenario with relative parameters (n,)."""
-        numbers = (x * self.scale).tolist()
-        pairs = zip(self.parameters, numbers, strict=True)
-        changes: dict[str, str | float] = {}
-        for parameter, number in pairs:
-            changes |= parameter.changes(number)
-        return self.scenario.with_changes(changes)
+        pairs = zip(self.parameters, (x * self.scale).tolist(), strict=True)
+        changes = {parameter.key: parameter.value(number) for parameter, number in pairs}
+        return with_joined_changes(self.scenario, changes)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Weighted residuals (numbers,); the neighbours of the point are simulated with it."""

@@ -54,11 +54,8 @@ LEAST, MOST = 1e-12, 1e12
 INSTALL = "pip install 'tetra_drake[parquet]'"
 
 Frequency = Annotated[float, Unit("Hz")]
-MeasuredLength = Annotated[Length, Field(ge=-MOST, le=MOST)]
-MeasuredForce = Annotated[Force, Field(ge=-MOST, le=MOST)]
-MeasuredFrequency = Annotated[Frequency, Field(ge=0, le=MOST)]
-UNCERTAINTY: Any = {"ge": LEAST, "le": MOST}
-"""Limits of an uncertainty."""
+
+_SIZE, _UNCERTAINTY = Field(ge=-MOST, le=MOST), Field(ge=LEAST, le=MOST)
 
 
 class Prediction(NamedTuple):
@@ -99,7 +96,7 @@ class MotionCapture(Section):
     """File of the commands that the robot followed."""
     gait: str | None = None
     """File of the gait that the robot walked with, in place of a command."""
-    uncertainty: Length = Field(**UNCERTAINTY)
+    uncertainty: Annotated[Length, _UNCERTAINTY]
     """Standard deviation of a coordinate."""
     clock: Time = Field(default=0.0, ge=0)
     """Largest offset of the log's clock from the command's, which is found; 0 for none."""
@@ -152,17 +149,17 @@ class Rest(Section):
 
     changes: dict[str, Any] = Field(default={})
     """Values of scenario keys in this case, such as loads."""
-    positions: dict[str, MeasuredLength] = Field(default={})
+    positions: dict[str, Annotated[Length, _SIZE]] = Field(default={})
     """Coordinates by node and axis, such as "n3 z"."""
-    tensions: dict[str, MeasuredForce] = Field(default={})
+    tensions: dict[str, Annotated[Force, _SIZE]] = Field(default={})
     """Tensions by the names of the cables."""
-    frequencies: list[MeasuredFrequency] = Field(default=[])
+    frequencies: list[Annotated[Frequency, _SIZE]] = Field(default=[])
     """Natural frequencies, the lowest one first."""
-    position_uncertainty: Length = Field(default=1e-3, **UNCERTAINTY)
+    position_uncertainty: Annotated[Length, _UNCERTAINTY] = 1e-3
     """Standard deviation of a coordinate."""
-    tension_uncertainty: Force = Field(default=1.0, **UNCERTAINTY)
+    tension_uncertainty: Annotated[Force, _UNCERTAINTY] = 1.0
     """Standard deviation of a tension."""
-    frequency_uncertainty: Frequency = Field(default=0.05, **UNCERTAINTY)
+    frequency_uncertainty: Annotated[Frequency, _UNCERTAINTY] = 0.05
     """Standard deviation of a frequency."""
 
     @property
@@ -200,15 +197,14 @@ class Rest(Section):
         )
 
 
+_Pair = Annotated[list[str | float], Field(min_length=2, max_length=2)]
 Measurement = Annotated[MotionCapture | Rest, Kinds()]
 
 
 class FitFile(Section):
     """What a fit needs beside the scenario."""
 
-    parameters: dict[str, Annotated[list[str | float], Field(min_length=2, max_length=2)]] = Field(
-        min_length=1
-    )
+    parameters: Annotated[dict[str, _Pair], Field(min_length=1)]
     """Bounds, least and most, by scenario key. Keys joined by commas get the same value."""
     measurements: list[Measurement] = Field(min_length=1)
 

@@ -9,17 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tetra_drake.analysis.joined_keys import with_joined_changes
 from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.changes import given_changes
-from tetra_drake.scenario.common_sections import (
-    by_separate_key,
-    joining_advice,
-    repeated,
-    separate,
-)
+from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
@@ -79,7 +75,8 @@ def sweep(
     if count > MOST:
         raise InputError("sweep", "changes", f"found {count} simulations, expected at most {MOST}")
     combinations = list(itertools.product(*changes.values()))
-    scenarios = [_changed(base, dict(zip(changes, each, strict=True))) for each in combinations]
+    grid = [dict(zip(changes, each, strict=True)) for each in combinations]
+    scenarios = [with_joined_changes(base, each) for each in grid]
     outcomes = simulate_many(
         [changed for changed in scenarios for _ in walkers],
         walkers * len(scenarios),
@@ -109,16 +106,6 @@ def _values(key: str, given: Any) -> Collection[Any]:
     if not len(values):
         raise InputError("sweep", key, "found no value, expected one at least")
     return values
-
-
-def _changed(base: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """A scenario with changes by joined keys. Raises InputError, naming the key."""
-    by_key = by_separate_key(changes)
-    try:
-        return base.with_changes(by_key)
-    except InputError as error:
-        problem = error.problem + joining_advice(error, by_key)
-        raise InputError(error.source, error.key, problem) from error
 
 
 def _dimension(key: str, changes: Iterable[str]) -> str:

@@ -273,9 +273,7 @@ def _unpacked(path: Path) -> bytes:
     except lzma.LZMAError as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     if not unpacking.eof or unpacking.unused_data:
-        limit = f"{MOST // 2**20} MB"
-        problem = f"is cut, or larger than {limit}, expected one stream of at most {limit}"
-        raise InputError(path, "", problem)
+        raise InputError(path, "", f"is cut, or has more than {MOST // 2**20} MB of lines")
     return content
 
 

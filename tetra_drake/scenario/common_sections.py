@@ -7,12 +7,11 @@ file.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
-from tetra_drake.errors import InputError
 from tetra_drake.scenario.quantities import DampingPerLength, Force, Speed, Stiffness, Time
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Section, Varied
@@ -185,13 +184,3 @@ def repeated(all_joined: Iterable[str]) -> str:
     """The first scenario key that is given twice in joined keys; "" if there is none."""
     counts = Counter(key for joined in all_joined for key in separate(joined))
     return next((key for key, count in counts.items() if count > 1), "")
-
-
-def joining_advice(error: InputError, changed: Collection[str]) -> str:
-    """Advice for an error about a key that was not changed itself, but has a common limit with a
-    `changed` key of its section; "" for other errors."""
-    section = error.key.rpartition(".")[0]
-    beside = [key for key in changed if key.rpartition(".")[0] == section]
-    if not beside or error.key in changed:
-        return ""
-    return f"; keys joined by a comma, '{beside[0]}, {error.key}', get the same value"
