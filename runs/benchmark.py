@@ -26,7 +26,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import yaml
 
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.engines.mujoco import installed
@@ -67,13 +66,6 @@ CONVERGED = "!Compiled {tolerance: 0.001 mm/s, max_step: 0.5 ms}"
 CONVERGED_MUJOCO = "!Mujoco {step: 0.0125 ms}"
 
 
-def with_engine(scenario: Scenario, engine: str) -> Scenario:
-    """The scenario with an engine written as in a file, such as "!Mujoco {step: 0.2 ms}"."""
-    tag, _, settings = engine.partition(" ")
-    values = {f"engine.{key}": value for key, value in yaml.safe_load(settings).items()}
-    return scenario.with_changes({"engine": tag} | values)
-
-
 def brief(scenario: Scenario) -> Scenario:
     """Runs a simulation only to load and compile the code before measurements."""
     return scenario.with_changes(
@@ -108,10 +100,10 @@ def engines_table(scenario: Scenario, engines: Sequence[str]) -> str:
         if reference == CONVERGED_MUJOCO and not installed():
             continue
         if reference not in exact_in:
-            converged = with_engine(scenario, reference)
+            converged = scenario.with_changes({"engine": reference})
             results = walk(converged, GAITS, cores=available_cores(), lanes=True)
             exact_in[reference] = distances_in(results)
-        measured = with_engine(scenario, engine)
+        measured = scenario.with_changes({"engine": engine})
         walk(brief(measured), 1, cores=1, lanes=False)
         started = time.perf_counter()
         results = walk(measured, GAITS, cores=1, lanes=False)
@@ -149,7 +141,7 @@ def median_speeds(batches: Sequence[Batch]) -> np.ndarray:
 
 def batches_table(scenario: Scenario) -> str:
     """Table of the compiled engine's speed with many gaits at a time, on one core and on all."""
-    compiled = with_engine(scenario, "!Compiled {}")
+    compiled = scenario.with_changes({"engine": "!Compiled {}"})
     rows = []
     for cores in sorted({1, available_cores()}):
         batches = [Batch(compiled, gaits, cores) for gaits in BATCHES if gaits >= cores]
@@ -171,7 +163,10 @@ def grounds_table(scenario: Scenario) -> str:
     batches = []
     for changes in grounds.values():
         ground = scenario.with_changes(changes)
-        compiled, diagram = with_engine(ground, "!Compiled {}"), with_engine(ground, "!Drake {}")
+        compiled, diagram = (
+            ground.with_changes({"engine": "!Compiled {}"}),
+            ground.with_changes({"engine": "!Drake {}"}),
+        )
         batches += [Batch(compiled, 1), Batch(compiled, GROUND_BATCH), Batch(diagram, 1)]
     speeds = median_speeds(batches).reshape(len(grounds), 3)
     rows = [
@@ -222,7 +217,7 @@ def rollout_row(scenario: Scenario) -> list[str]:
     import mujoco
     from mujoco.rollout import Rollout
 
-    robot = controlled_robot(with_engine(scenario, "!Mujoco {step: 0.2 ms}"))
+    robot = controlled_robot(scenario.with_changes({"engine": "!Mujoco {step: 0.2 ms}"}))
     model = mujoco.MjModel.from_xml_string(make_mjcf(robot))
     data = [mujoco.MjData(model) for _ in range(available_cores())]
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -256,7 +251,7 @@ def median_times(*runs: Callable[[], object]) -> np.ndarray:
 
 def controlled_table(scenario: Scenario) -> str:
     """Table of the speed of robots in control periods."""
-    compiled, coulomb = with_engine(scenario, "!Compiled {}"), load_scenario("coulomb")
+    compiled, coulomb = scenario.with_changes({"engine": "!Compiled {}"}), load_scenario("coulomb")
     changes = {"friction": coulomb.friction, "engine": coulomb.engine, "name": coulomb.name}
     second = compiled.with_sections(**changes)
     rows = [*controlled_rows(compiled), *controlled_rows(second)]

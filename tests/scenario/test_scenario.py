@@ -188,6 +188,7 @@ BAD_FILES = [
     ("base: thesis\nrobot: {spacing: 2 in, spacing: 3 in}", "", "'spacing'"),
     ("!!python/object/apply:os.getcwd []", "", "YAML"),
     ("[" * 1000, "", "YAML"),
+    ("base: thesis\nrobot: &any {}\ncpg: {<<: *any}", "", "line 3, column 7"),
 ]
 
 

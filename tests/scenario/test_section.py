@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
+import yaml
 from pydantic import Field
 
 from tetra_drake.scenario.changes import merged
@@ -90,6 +91,23 @@ BAD = [
 def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
     with refused("file", key, found):
         load(text)
+
+
+NUMBERS = {"010": 10, "0o10": 8, "-.43": -0.43, "+.5": 0.5, "1e-3": 0.001, "0x1F": 31}
+TEXTS = ["1:30", "yes", "on", "off", "1_1", "1_000.5", "2001-01-01", "0b11", "="]
+
+
+def test_numbers_and_texts_are_read_as_in_yaml_1_2():
+    for text, number in NUMBERS.items():
+        assert repr(parse_yaml(text, "file")) == repr(number)
+    assert parse_yaml(f"[{', '.join(TEXTS)}]", "file") == TEXTS
+
+
+def test_what_is_written_is_read_alike_by_readers_of_yaml_1_1_and_1_2():
+    texts = [*NUMBERS, *TEXTS, "<<", "null", "true", ""]
+    tree = {text: [text, 1e-05, 1e16, 10, True, None] for text in texts}
+    dumped = dump_yaml(tree)
+    assert parse_yaml(dumped, "file") == yaml.safe_load(dumped) == tree
 
 
 def test_a_mapping_of_many_keys_is_read_as_fast_as_many_mappings():

@@ -1,4 +1,4 @@
-"""YAML with tagged kinds: reading and writing."""
+"""YAML 1.2 with tagged kinds: reading and writing."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+import yamlcore
+from yamlcore.loader import CommonResolver
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
@@ -51,23 +53,25 @@ def dump_yaml(tree: Tree) -> str:
     return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
 
 
-class _Loader(yaml.SafeLoader):
-    """Loader of YAML with tagged kinds. It refuses repeated keys, and reads 1e-3 as a number."""
+class _Loader(yamlcore.CoreLoader):
+    """Loader of YAML 1.2 with tagged kinds. It refuses repeated keys."""
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)
         self.deep_construct = True  # refuses an alias of what holds it
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [key for key, _ in node.value]
-        tree = super().construct_mapping(node, deep)
+    def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[Any, Any]:
         seen = set()
-        for key_node in keys:
-            key = self.construct_object(key_node, deep=True)
-            if key in seen:
-                problem = f"found {_shown(str(key), 'a key')} twice"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
-            seen.add(key)
+        for key, _ in node.value if isinstance(node, yaml.MappingNode) else ():
+            name, problem = str(key.value), ""
+            if name in seen:
+                problem = f"found {_shown(name, 'a key')} twice"
+            elif name == "<<" and key.style is None:
+                problem = "found the merge key <<, which YAML 1.2 does not have"
+            if problem:
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+            seen.add(name)
+        tree: dict[Any, Any] = super().construct_mapping(node, deep)
         return tree
 
     def construct_kind(self, name: str, node: Any) -> dict[Any, Any]:
@@ -82,8 +86,9 @@ def _shown(name: str, what: str) -> str:
     return f"'{name}'" if re.fullmatch(r"!?[\w.]{1,40}", name) else what
 
 
-class _Dumper(yaml.SafeDumper):
-    """Writer of YAML with tagged kinds. Each key of a mapping has its own line."""
+class _Dumper(yaml.SafeDumper, CommonResolver):
+    """Writer of YAML with tagged kinds, for readers of YAML 1.1 and 1.2: texts that either would
+    take for something else are quoted. Each key of a mapping has its own line."""
 
     def represent_dict(self, data: Any) -> yaml.MappingNode:
         entries = {name: value for name, value in data.items() if name != TAG}
@@ -92,8 +97,6 @@ class _Dumper(yaml.SafeDumper):
 
 
 _Loader.add_multi_constructor("!", _Loader.construct_kind)
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"), "-+0123456789"
-)
+_Dumper.init_resolvers("core")
 _Dumper.add_representer(dict, _Dumper.represent_dict)
 _Dumper.add_multi_representer(str, _Dumper.represent_str)  # for HeightFile, a subclass of str
