@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import numbers
 import re
 from typing import Any, Self
 
@@ -47,6 +48,16 @@ def _one_line(text: str) -> str:
 
 def _cut(text: str, length: int) -> str:
     return text if len(text) <= length else f"{text[:length]} ..."
+
+
+def check_whole(
+    source: object, key: str, number: Any, *, least: int, most: int | None = None
+) -> None:
+    """Raises InputError unless a number is whole, and from `least` to `most`."""
+    is_whole = isinstance(number, numbers.Integral) and not isinstance(number, bool)
+    if not is_whole or number < least or (most is not None and number > most):
+        limits = f"{least} or more" if most is None else f"{least} to {most}"
+        raise InputError(source, key, f"found {number!r:.60}, expected an integer, {limits}")
 
 
 class SimulationFailure(RuntimeError):

@@ -6,14 +6,13 @@ import contextlib
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from numbers import Integral
 from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
 from tetra_drake.analysis.fit import EVALUATIONS, Bounds, Fit, fit_values
 from tetra_drake.analysis.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure, check_whole
 from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
@@ -177,7 +176,7 @@ def fit(
             raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
     found = fit_values(
         given_scenario(scenario),
-        list(measurements),
+        measurements,
         parameters,
         search=search,
         folder=folder,
@@ -202,9 +201,8 @@ def _check_budget(scenario: Scenario) -> None:
 def _check_counts(**given: tuple[int | None, int]) -> None:
     """Raises InputError for an argument that is no integer or below its least value."""
     for name, (value, least) in given.items():
-        if value is not None and not (isinstance(value, Integral) and value >= least):
-            problem = f"found {value!r}, expected an integer, {least} or more"
-            raise InputError("evolve", name, problem)
+        if value is not None:
+            check_whole("evolve", name, value, least=least)
 
 
 def _check_functions(**given: object) -> None:

@@ -22,22 +22,29 @@ applied as they are.
 Reward: the increase of the fitness, which the scenario's `objective` defines. Within an episode it
 is the part of `rolled` and of the metrics that follow from positions. The last reward adds the
 other metrics, so the sum of an episode's rewards is the fitness of the walk. If the robot fails,
-the last reward makes the sum 0.
+the last reward makes the sum 0. Walk-v0 rewards each centimetre forward with 1, and punishes each
+centimetre sideways with 0.5. Roll-v0 rewards each radian by which the robot has rolled forward with
+1, and punishes each metre sideways with 4. A robot that stands still gets 0.
 
 The time between actions is `simulation.control_period`, or the argument `control_period`. An
 episode ends (terminated) if the robot fails, and (truncated) at `simulation.duration`. With
 `disturbances` in the scenario, each episode has a draw of its own.
+
+A copy of an environment, by pickle or deepcopy, is made anew from the same arguments: it does not
+have the state of the original, and begins with reset().
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from tetra_drake.engines.simulation import Simulation, checked_actions
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure, check_whole
 from tetra_drake.results.metrics import pose_fitness, poses_of
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import AMPLITUDE, Robot
 from tetra_drake.scenario.load import GivenScenario
@@ -46,6 +53,7 @@ from tetra_drake.scenario.scenario import Scenario
 try:
     import gymnasium
     from gymnasium import spaces
+    from gymnasium.utils import EzPickle, seeding
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
 except ImportError:
@@ -56,15 +64,35 @@ except ImportError:
 Info = dict[str, Any]
 
 WALK, ROLL = "tetra_drake/Walk-v0", "tetra_drake/Roll-v0"
-"""Names of the environments of a robot that walks, by default on the scenario `coulomb`, and of one
+"""Names of the environments of a robot that walks, by default on the scenario `walk`, and of one
 that rolls, by default on `rover`."""
+
+_SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
 
 
 class _Episodes:
     """Episodes of robots side by side: observations, actions and rewards of all environments."""
 
-    def __init__(self, simulation: Simulation, *, grouped: bool) -> None:
-        self.simulation = simulation
+    def __init__(
+        self,
+        simulation: Simulation,
+        *,
+        grouped: bool,
+        render_mode: str | None,
+        most_steps: int | None = None,
+    ) -> None:
+        """Robots that have no episodes yet. An episode has at most `most_steps`."""
+        if render_mode not in (None, _RENDERED):
+            problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
+            raise InputError(_SOURCE, "render_mode", problem)
+        if most_steps is not None:
+            check_whole(_SOURCE, "max_episode_steps", most_steps, least=1)
+        self.simulation, self._most_steps = simulation, most_steps
+        self.metadata = {
+            "render_modes": [_RENDERED],
+            "render_fps": max(1, round(1.0 / simulation.control_period)),
+        }
+        self._camera: Any = None
         self._scenario: Scenario = simulation.scenario
         robot, count, start = simulation.robot, simulation.count, simulation.state
         by_network = Robot.of(self._scenario)
@@ -80,10 +108,14 @@ class _Episodes:
         # Time, pitch rate, and angle by which it has rolled, of each robot (N,).
         self._time, self._rate, self._rolled = np.zeros(count), np.zeros(count), np.zeros(count)
         self._offsets, self._rewarded = np.zeros(count), np.zeros(count)
+        self._steps, self._going = np.zeros(count, dtype=int), np.zeros(count, dtype=bool)
 
-    def reset(self, seed: int, places: np.ndarray) -> np.ndarray:
-        """Begins episodes. Returns the observations of all robots."""
-        readings = self.simulation.reset(seed=seed, indices=places)
+    def reset(self, places: np.ndarray, generators: Sequence[np.random.Generator]) -> np.ndarray:
+        """Begins episodes, with draws from the generators of all robots. Returns the observations
+        of all robots."""
+        seeds = [int(generators[place].integers(2**31)) for place in places]
+        readings = self.simulation.reset(seed=seeds, indices=places)
+        self._steps[places], self._going[places] = 0, True
         for place in places.tolist():
             self._start[place] = self._steady[place] = readings.p_WN[place]
             self._time[place] = self._rate[place] = self._rolled[place] = 0.0
@@ -91,18 +123,23 @@ class _Episodes:
             self._offsets[place] = self._fitness(readings, place)
         return self._observe(readings)
 
-    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Simulates a control period. Returns observations, rewards, and whether episodes are
-        terminated and truncated."""
+    def step(
+        self, actions: np.ndarray, places: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Simulates a control period of some robots. Returns observations, rewards, and whether
+        episodes are terminated and truncated, of all robots."""
         simulation = self.simulation
-        readings = simulation.step(self._setpoints(actions))
+        if (over := places[~self._going[places]]).size:
+            raise InputError(_SOURCE, "step", f"robot {over[0]} has no episode; reset() begins one")
+        readings = simulation.step(self._setpoints(actions), indices=places)
+        self._steps[places] += 1
         self._roll(readings)
         early = readings.time <= self._scenario.simulation.steady_from
         self._steady[early] = readings.p_WN[early]
         terminated = np.array([failure is not None for failure in simulation.failures])
         truncated = simulation.ended & ~terminated
-        places = range(simulation.count)
-        fitness = np.array([self._fitness(readings, place) for place in places], dtype=float)
+        robots = range(simulation.count)
+        fitness = np.array([self._fitness(readings, robot) for robot in robots], dtype=float)
         fitness -= self._offsets
         for place in np.flatnonzero(truncated).tolist():
             try:
@@ -110,6 +147,9 @@ class _Episodes:
             except SimulationFailure:  # known only at the end
                 terminated[place], truncated[place] = True, False
         fitness[terminated] = 0.0
+        if self._most_steps is not None:
+            truncated |= ~terminated & (self._steps >= self._most_steps)
+        self._going &= ~(terminated | truncated)
         rewards = fitness - self._rewarded
         self._rewarded = fitness
         return self._observe(readings), rewards, terminated, truncated
@@ -141,6 +181,14 @@ class _Episodes:
         )
         return setpoints
 
+    def pictures(self) -> tuple[np.ndarray, ...]:
+        """Pictures of all robots now; see visualization.picture."""
+        if self._camera is None:
+            from tetra_drake.visualization.picture import Camera
+
+            self._camera = Camera(self.simulation.robot)
+        return tuple(self._camera.picture(p_WN) for p_WN in self.simulation.state.p_WN)
+
     def _observe(self, readings: Readings) -> np.ndarray:
         """Observations (N, size)."""
         per_length, per_weight = 1.0 / self._start_lengths, 1.0 / self._weight
@@ -156,8 +204,10 @@ class _Episodes:
         return np.hstack([part.reshape(count, -1) for part in parts])
 
 
-class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
     """Environment of one robot; see tetra_drake.gym for observation, action and reward."""
+
+    metadata: Info = {"render_modes": [_RENDERED]}  # noqa: RUF012
 
     def __init__(
         self,
@@ -165,39 +215,57 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         *,
         control_period: float | None = None,
         grouped: bool = False,
+        record: bool = False,
+        render_mode: str | None = None,
     ) -> None:
         """Args:
             scenario: a scenario, its name or file, or a run.
             control_period: time (s) between actions; by default the scenario's.
             grouped: an action for each oscillator, otherwise for each driven cable.
+            record: records the trajectories, for result().
+            render_mode: "rgb_array" for pictures by render().
 
         Raises:
             InputError: if an argument does not fit the scenario.
         """
-        simulation = Simulation(scenario, control_period=control_period, workers=1)
-        self._episodes = _Episodes(simulation, grouped=grouped)
+        options: Info = {"grouped": grouped, "render_mode": render_mode}
+        EzPickle.__init__(self, scenario, control_period=control_period, record=record, **options)
+        simulation = Simulation(scenario, control_period=control_period, record=record, workers=1)
+        self._episodes = _Episodes(simulation, **options)
+        self.metadata, self.render_mode = self._episodes.metadata, render_mode
         self.observation_space = self._episodes.observation_space
         self.action_space = self._episodes.action_space
 
     def reset(
         self, *, seed: int | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
-        super().reset(seed=seed)
-        draw = int(self.np_random.integers(2**31))
-        return self._episodes.reset(draw, np.array([0]))[0], {}
+        _check_options(options)
+        super().reset(seed=_checked_seed(seed))
+        return self._episodes.reset(np.array([0]), [self.np_random])[0], {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        observations, rewards, terminated, truncated = self._episodes.step(action)
-        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), {}
+        seen, rewards, terminated, truncated = self._episodes.step(action, np.array([0]))
+        return seen[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), {}
+
+    def render(self) -> np.ndarray | None:
+        """The picture (height, width, 3) of the robot now; None without a `render_mode`."""
+        return self._episodes.pictures()[0] if self.render_mode else None
+
+    def result(self) -> SimulationResult:
+        """The result of an episode that has reached `simulation.duration`, until the next reset.
+        Raises its failure if it failed, and InputError if it has not ended."""
+        return self._episodes.simulation.result()
 
 
-class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickle):
     """Environments of robots side by side, in the lanes and threads of the compiled engine; see
-    tetra_drake.gym.
+    tetra_drake.gym. They behave like environments of one robot in Gymnasium's SyncVectorEnv.
 
-    A robot whose episode ends begins the next one in the same step; its last observation is in
-    `final_obs` of the info.
+    By default a robot whose episode ends begins the next one in the same step; its last observation
+    is in `final_obs` of the info. The argument `autoreset_mode` has Gymnasium's other ways.
     """
+
+    metadata: Info = {"render_modes": [_RENDERED]}  # noqa: RUF012
 
     def __init__(
         self,
@@ -207,45 +275,106 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         control_period: float | None = None,
         grouped: bool = False,
         workers: int | None = None,
+        max_episode_steps: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
+        render_mode: str | None = None,
     ) -> None:
-        """See TensegrityEnv. `workers` is the number of threads; one per core by
-        default."""
-        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
-        self.num_envs = num_envs
-        simulation = Simulation(
-            scenario, count=num_envs, control_period=control_period, workers=workers
-        )
-        self._episodes = _Episodes(simulation, grouped=grouped)
+        """See TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes
+        are truncated after `max_episode_steps`. `autoreset_mode` is "SameStep", "NextStep" or
+        "Disabled"."""
+        options: Info = {"grouped": grouped, "render_mode": render_mode}
+        made: Info = {"control_period": control_period, "workers": workers}
+        ended: Info = {"max_episode_steps": max_episode_steps, "autoreset_mode": autoreset_mode}
+        EzPickle.__init__(self, num_envs, scenario, **options, **made, **ended)
+        try:
+            self._autoreset = AutoresetMode(autoreset_mode)
+        except ValueError:
+            modes = ", ".join(repr(mode.value) for mode in AutoresetMode)
+            problem = f"found {autoreset_mode!r:.60}, expected one of {modes}"
+            raise InputError(_SOURCE, "autoreset_mode", problem) from None
+        simulation = Simulation(scenario, count=num_envs, **made)
+        self._episodes = _Episodes(simulation, **options, most_steps=max_episode_steps)
+        self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
+        self._ended = np.zeros(num_envs, dtype=bool)
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.metadata = self._episodes.metadata | {"autoreset_mode": self._autoreset}
         self.single_observation_space = self._episodes.observation_space
         self.single_action_space = self._episodes.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
     def reset(
-        self, *, seed: int | None = None, options: Info | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
-        super().reset(seed=seed)
-        return self._begin(np.arange(self.num_envs)), {}
+        """Begins episodes of all robots, or of those with True in the option `reset_mask` (N,). A
+        seed is for the first robot, the next one is for the second; or there is a list of them."""
+        mask = self._reset_mask(options)
+        seeds = self._seeds(seed)
+        for place in np.flatnonzero(mask):
+            if seeds[place] is not None:
+                self._generators[place] = seeding.np_random(seeds[place])[0]
+        self._ended &= ~mask
+        return self._episodes.reset(np.flatnonzero(mask), self._generators), {}
 
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
-        observations, rewards, terminated, truncated = self._episodes.step(actions)
-        ended = terminated | truncated
-        if not ended.any():
-            return observations, rewards, terminated, truncated, {}
+        again = self._ended & (self._autoreset == AutoresetMode.NEXT_STEP)
+        if again.any():
+            self._episodes.reset(np.flatnonzero(again), self._generators)
+        seen, rewards, terminated, truncated = self._episodes.step(actions, np.flatnonzero(~again))
+        self._ended = terminated | truncated
+        if self._autoreset != AutoresetMode.SAME_STEP or not self._ended.any():
+            return seen, rewards, terminated, truncated, {}
         last = np.full(self.num_envs, None, dtype=object)
-        for place in np.flatnonzero(ended).tolist():
-            last[place] = observations[place]
-        info = {"final_obs": last, "_final_obs": ended}
-        return self._begin(np.flatnonzero(ended)), rewards, terminated, truncated, info
+        for place in np.flatnonzero(self._ended).tolist():
+            last[place] = seen[place]
+        info: Info = {"final_obs": last, "_final_obs": self._ended, "final_info": {}}
+        seen = self._episodes.reset(np.flatnonzero(self._ended), self._generators)
+        return seen, rewards, terminated, truncated, info
 
-    def _begin(self, places: np.ndarray) -> np.ndarray:
-        """Begins episodes. Returns the observations of all robots."""
-        return self._episodes.reset(int(self.np_random.integers(2**31)), places)
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Pictures of the robots now; None without a `render_mode`."""
+        return self._episodes.pictures() if self.render_mode else None
+
+    def _reset_mask(self, options: Info | None) -> np.ndarray:
+        _check_options(options, _MASK)
+        mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
+        is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()
+        if not is_mask or mask.shape != (self.num_envs,):
+            problem = f"found {mask!r:.60}, expected an array of {self.num_envs} truths, one True"
+            raise InputError(_SOURCE, f"options[{_MASK!r}]", problem)
+        return np.asarray(mask)
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """A seed for each robot; None if its generator goes on."""
+        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+            if len(seed) != self.num_envs:
+                problem = f"found {len(seed)} seeds, expected {self.num_envs}"
+                raise InputError(_SOURCE, "seed", problem)
+            return [_checked_seed(each) for each in seed]
+        first = _checked_seed(seed)
+        return [None if first is None else first + i for i in range(self.num_envs)]
 
 
-for _name, _scenario in {WALK: "coulomb", ROLL: "rover"}.items():
+def _checked_seed(seed: int | None) -> int | None:
+    if seed is None:
+        return None
+    check_whole(_SOURCE, "seed", seed, least=0)
+    return int(seed)
+
+
+def _check_options(options: Info | None, *known: str) -> None:
+    """Raises InputError for an option of reset() that is none of the known ones."""
+    if options is not None and not isinstance(options, Mapping):
+        raise InputError(_SOURCE, "options", f"found {options!r:.60}, expected a mapping")
+    for name in options or {}:
+        if name not in known:
+            expected = ", ".join(map(repr, known)) or "none"
+            raise InputError(_SOURCE, "options", f"found {name!r:.60}, expected {expected}")
+
+
+for _name, _scenario in {WALK: "walk", ROLL: "rover"}.items():
     gymnasium.register(
         _name,
         entry_point="tetra_drake.gym:TensegrityEnv",

@@ -8,12 +8,21 @@ import platform
 from collections.abc import Iterable
 from importlib import metadata
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_whole
 
 
 def available_cores() -> int:
     """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def threads_for(workers: int | None, *, source: str) -> int:
+    """Number of threads for the argument `workers` of a function `source`: one per core by default.
+    Raises InputError unless it is a whole number, 1 or more."""
+    if workers is None:
+        return available_cores()
+    check_whole(source, "workers", workers, least=1)
+    return int(workers)
 
 
 def check_package(name: str, *, extra: str, source: str) -> None:

@@ -12,11 +12,13 @@ from helpers.anchored import HUNG, scenario_of, supported_prism
 from helpers.converged import shortly
 
 from tetra_drake.analysis import measurements
-from tetra_drake.analysis.fit import fit_values
-from tetra_drake.analysis.measurements import MotionCapture, Rest
+from tetra_drake.analysis.fit import Parameter, _Problem, fit_values
+from tetra_drake.analysis.measurements import MotionCapture, Prediction, Rest
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError
 from tetra_drake.experiment import fit
+from tetra_drake.formatting import silent
 from tetra_drake.prototype.command_file import command_text, load_command, table_text
 from tetra_drake.robot.command import Command, robot_without_network
 from tetra_drake.robot.robot import Robot
@@ -50,6 +52,7 @@ def pulled_down(stiffness: float, free_length: float, noise: np.ndarray) -> list
 def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_straight_line():
     found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), BOUNDS)
     assert found.parameters["value"].to_list() == pytest.approx([210.0, 0.39], rel=1e-5)
+    assert found.warnings == []
     # z = 1 - l0 - c f, with the compliance c = 1 / k: linear regression of z on f.
     forces = Robot.of(hung()).weight + np.array(PULLS)
     slope = NOISE / math.sqrt(((forces - forces.mean()) ** 2).sum())
@@ -62,6 +65,27 @@ def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_str
     assert (fitted.stiffness, fitted.free_length) == tuple(found.parameters["value"])
 
 
+def test_two_values_that_are_known_but_hardly_apart_are_named_together():
+    found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4))[:2], BOUNDS)
+    assert found.correlations.loc[STIFFNESS, FREE_LENGTH] > 0.95
+    assert found.parameters["determined"].all()
+    (warning,) = found.warnings
+    assert STIFFNESS in warning and FREE_LENGTH in warning
+
+
+@pytest.mark.parametrize(("limit", "slope"), [(math.inf, 2.0), (1.0005, 1.999)])
+def test_derivatives_are_central_and_one_sided_where_a_neighbour_fails(limit, slope):
+    class Square(measurements.Measured):
+        def predict(self, scenarios):
+            x = [each.robot.cables["line"].stiffness / 200.0 for each in scenarios]
+            return [Prediction(np.array([each**2 if each < limit else math.nan])) for each in x]
+
+    square = Square("", pandas.DataFrame({"measured": [0.0], "uncertainty": [1.0]}))
+    stiffness = Parameter(STIFFNESS, "N/m", 200.0, 100.0, 400.0)
+    problem = _Problem(hung(), [stiffness], [square], "", None, silent)
+    assert problem.jacobian(np.ones(1)) == pytest.approx(slope, rel=1e-9)
+
+
 def test_a_parameter_without_influence_is_told_and_stays():
     bounds = BOUNDS | {DAMPING: (0.0, 5.0)}
     found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), bounds)
@@ -70,6 +94,9 @@ def test_a_parameter_without_influence_is_told_and_stays():
     assert math.isnan(found.parameters["low"][DAMPING])
     assert [DAMPING in warning for warning in found.warnings] == [True]
     assert found.parameters["value"].to_list()[:2] == pytest.approx([210.0, 0.39], rel=1e-5)
+    alone = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), {DAMPING: (0.0, 5.0)})
+    assert alone.parameters["value"][DAMPING] == pytest.approx(0.0, abs=1e-6)
+    assert [DAMPING in warning for warning in alone.warnings] == [True]
 
 
 def test_two_values_that_act_alike_are_not_determined():
@@ -94,6 +121,7 @@ def test_a_tension_and_a_frequency_give_mass_and_stiffness():
     bounds = {"robot.masses.a": (0.1, 0.5), STIFFNESS: (100.0, 400.0)}
     found = fit_values(scenario, [case], bounds)
     assert found.parameters["value"].to_list() == pytest.approx([0.3, stiffness], rel=1e-4)
+    assert found.residuals["uncertainty"].unique().tolist() == [1.0, 0.05]
 
 
 def test_joined_keys_get_the_same_value():
@@ -167,6 +195,15 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
     assert again.parameters.equals(whole.parameters)
     fit(hung(), cases, BOUNDS, search=True, out=tmp_path)
     assert len(predicted) == needed
+    # Damaged evaluations are simulated again: torn, changed by a bit, of another name.
+    torn, changed, swapped, other = sorted((tmp_path / "evaluations").iterdir())[:4]
+    torn.write_bytes(torn.read_bytes()[:-8])
+    changed.write_bytes(changed.read_bytes()[:-1] + bytes([changed.read_bytes()[-1] ^ 1]))
+    swapped.write_bytes(other.read_bytes())
+    again = fit(hung(), cases, BOUNDS, search=True, out=tmp_path)
+    assert again.parameters.equals(whole.parameters)
+    assert sum(predicted[needed:]) == 3 * len(cases)
+    needed = len(predicted)
     # Other values are other evaluations.
     fit(hung().with_changes({DAMPING: "1 N*s/m"}), cases, BOUNDS, out=tmp_path)
     assert len(predicted) > needed
@@ -176,6 +213,8 @@ SIDE = {
     "robot.cables.side.stiffness": ("60 N/m", "200 N/m"),
     "robot.cables.side.damping": ("0.1 N*s/m", "2 N*s/m"),
 }
+
+TRUTH = dict(zip(SIDE, ("110 N/m", "0.6 N*s/m"), strict=True))
 
 
 def write_log(file: Path, times: np.ndarray, p_WN: np.ndarray) -> None:
@@ -195,14 +234,15 @@ def write_pulls(file: Path, scenario: Scenario, *, period: float, share: float, 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory):
     """A supported prism whose cables are pulled in turn, and a log of its motion: other constants,
-    noise of 0.2 mm, a clock that is 30 ms ahead, gaps, and in mm."""
+    noise of 0.2 mm, a clock that is 30 ms ahead, gaps, and in mm; and one without noise."""
     folder = tmp_path_factory.mktemp("lab")
     scenario, command = supported_prism(duration=1.5, engine="!Compiled"), folder / "command.csv"
     write_pulls(command, scenario, period=0.05, share=0.4, rate=2.0 * np.pi)
-    truth = scenario.with_changes(dict(zip(SIDE, ("110 N/m", "0.6 N*s/m"), strict=True)))
+    truth = scenario.with_changes(TRUTH)
     played = load_command(command, truth)
     moved = simulate(truth, command=played, record=True).trajectory
     p_WN = moved.p_WN.sel(node=["n3", "n4"])
+    write_log(folder / "exact.csv", p_WN.time.values, p_WN.values)
     noisy = p_WN.values + NOISE * np.random.default_rng(2).standard_normal(p_WN.shape)
     noisy[40:61, 0, 0] = np.nan
     write_log(folder / "log.csv", p_WN.time.values + 0.03, noisy)
@@ -228,6 +268,14 @@ def test_stiffness_and_damping_come_back_from_a_noisy_motion_with_another_clock(
     # Without a clock of its own the model is wrong, which the misfit tells.
     wrong = fit(load_scenario(lab / "scenario.yaml"), [captured(lab / "log.csv", lab)], SIDE)
     assert wrong.misfit > 2.0
+
+
+def test_without_a_clock_the_times_of_the_log_count(lab):
+    truth = load_scenario(lab / "scenario.yaml").with_changes(TRUTH)
+    measured = captured(lab / "exact.csv", lab).read(truth, "")
+    ((predicted, offset),) = measured.predict([truth])
+    assert predicted == pytest.approx(measured.numbers["measured"].to_numpy(), abs=1e-6)
+    assert np.ptp(predicted) > 1e-2 and offset == 0.0
 
 
 FIT_FILE = """
@@ -264,8 +312,12 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
         ({STIFFNESS: ("1 m", "400 N/m")}, STIFFNESS),
         ({STIFFNESS: (-1.0, 400.0)}, STIFFNESS),
         ({MASSES: (0.1, 0.5)}, MASSES),  # 0.2 and 0.3
+        ({STIFFNESS: 100.0}, STIFFNESS),
+        ({STIFFNESS: (100.0, math.nan)}, f"{STIFFNESS}[1]"),
         ({}, "parameters"),
+        ([STIFFNESS], "parameters"),
         (BOUNDS, "parameters"),  # two for one number
+        ({STIFFNESS: (100.0, 400.0), f"{DAMPING}, {STIFFNESS}": (0.0, 5.0)}, "parameters"),
     ],
 )
 def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, tmp_path, refused):
@@ -314,8 +366,11 @@ def test_a_log_in_parquet_has_the_numbers_of_the_csv_file(lab, tmp_path, monkeyp
         numbers(tmp_path / "log.parquet")
 
 
-def test_unknown_names_of_measurements_are_refused(refused):
+def test_what_is_no_list_of_measurements_and_unknown_names_are_refused(refused):
     bounds = {STIFFNESS: (100.0, 400.0)}
+    for given in (Rest(positions={"a z": 0.5}), [{"positions": {"a z": 0.5}}], [], None):
+        with pytest.raises(InputError, match="measurements"):
+            fit(hung(), given, bounds)
     with refused("measurement 1", "positions.c z"):
         fit_values(hung(), [Rest(positions={"c z": 0.1})], bounds)
     with refused("measurement 1", "tensions.line"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -15,15 +14,16 @@ import numpy as np
 import pandas
 
 from tetra_drake import __version__
-from tetra_drake.analysis.measurements import Measured, Measurement, Prediction
+from tetra_drake.analysis.joined_keys import with_joined_changes
+from tetra_drake.analysis.measurements import FitFile, Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say, Table, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
-from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import value_at
+from tetra_drake.scenario.section import python_value, value_at
 from tetra_drake.scenario.units import given_quantity
 
 STEP = 1e-3
@@ -51,8 +51,11 @@ STRONG = 0.95
 """Correlation above which two parameters are named."""
 HUGE = 1e200
 """Sum of squares where a simulation fails."""
+SEAL = 32
+"""Size of the digest in the file of an evaluation, in bytes."""
 EVALUATIONS = "evaluations"
-"""Folder of the evaluations of a fit."""
+"""Folder of the evaluations of a fit. A file has a digest of its name and of its numbers, and the
+numbers: for each measurement the predicted ones and the offset of the clock."""
 
 Bounds = Sequence[str | float]
 
@@ -74,10 +77,9 @@ class Parameter(NamedTuple):
         width = self.most - self.least
         return min(abs(self.start) or width, width)
 
-    def changes(self, number: float) -> dict[str, str | float]:
-        """Changes of a scenario that give each of the joined keys the number."""
-        given = f"{number!r} {self.unit}" if self.unit else number
-        return dict.fromkeys(separate(self.key), given)
+    def value(self, number: float) -> str | float:
+        """The number as a value for the scenario."""
+        return f"{number!r} {self.unit}" if self.unit else number
 
 
 @dataclass(frozen=True)
@@ -176,18 +178,17 @@ def fit_values(
     from scipy.optimize import least_squares
 
     began = time.perf_counter()
-    fitted = [_parameter(scenario, key, bounds, source) for key, bounds in parameters.items()]
+    given = _given(measurements, parameters, source)
+    fitted = [_parameter(scenario, key, each, source) for key, each in given.parameters.items()]
     measured = [
         each.read(scenario, f"measurement {number}")
-        for number, each in enumerate(measurements, start=1)
+        for number, each in enumerate(given.measurements, start=1)
     ]
     numbers = sum(len(each.numbers) for each in measured)
-    if not fitted:
-        raise InputError(source, "parameters", "is empty, expected a key with bounds")
     if numbers < len(fitted):
         found = f"found {len(fitted)} keys and {numbers} measured numbers"
         raise InputError(source, "parameters", f"{found}, expected at least a number for each key")
-    digest = _digest(scenario, measurements)
+    digest = _digest(scenario, given.measurements)
     problem = _Problem(scenario, fitted, measured, digest, folder, say)
     start = np.array([parameter.start / parameter.scale for parameter in fitted])
     first = problem.residuals(start)
@@ -202,9 +203,23 @@ def fit_values(
         x_scale="jac",
         ftol=2.0 * NEGLIGIBLE / numbers,
         xtol=TOLERANCE,
-        gtol=None,
+        gtol=np.finfo(float).eps,  # without it, no influence and no residual give NaN
     )
     return _result(problem, start, solution.x, time.perf_counter() - began)
+
+
+def _given(
+    measurements: Sequence[Measurement], parameters: Mapping[str, Bounds], source: object
+) -> FitFile:
+    """Arguments as the content of a file. Raises InputError, naming `source`, if they are none, or
+    if a key is given twice."""
+    if isinstance(parameters, Mapping):
+        parameters = {key: python_value(bounds) for key, bounds in parameters.items()}
+    given = {"parameters": parameters, "measurements": measurements}
+    content = FitFile.from_tree(given, source)
+    if key := repeated(content.parameters):
+        raise InputError(source, "parameters", f"'{key}' is given twice")
+    return content
 
 
 def _parameter(scenario: Scenario, key: str, bounds: Bounds, source: object) -> Parameter:
@@ -222,9 +237,10 @@ def _parameter(scenario: Scenario, key: str, bounds: Bounds, source: object) -> 
         found = " and ".join(f"{each:g}" for each in starts)
         raise InputError(source, place, f"found {found}, expected joined keys of the same value")
     unit = start.unit if isinstance(start, Quantity) else ""
-    if isinstance(bounds, str) or not isinstance(bounds, Sequence) or len(bounds) != 2:
-        raise InputError(source, place, f"found {bounds!r:.40}, expected bounds: least and most")
-    least, most = (_bound(bound, unit, source, place) for bound in bounds)
+    least, most = (
+        given_quantity(bound, unit, source, place) if isinstance(bound, str) else float(bound)
+        for bound in bounds
+    )
     if not least < most:
         raise InputError(source, place, f"found bounds {least:g} to {most:g}, expected least first")
     if not least <= start <= most:
@@ -233,18 +249,11 @@ def _parameter(scenario: Scenario, key: str, bounds: Bounds, source: object) -> 
     parameter = Parameter(key, unit, float(start), least, most)
     try:
         for bound in (least, most):  # a scenario may have limits of its own
-            scenario.with_changes(parameter.changes(bound))
+            with_joined_changes(scenario, {key: parameter.value(bound)})
     except InputError as error:
-        raise InputError(source, place, error.problem) from error
+        named = "" if error.key in separate(key) else f"{error.key}: "
+        raise InputError(source, place, f"{named}{error.problem}") from error
     return parameter
-
-
-def _bound(bound: str | float, unit: str, source: object, place: str) -> float:
-    if isinstance(bound, str):
-        return given_quantity(bound, unit, source, place)
-    if isinstance(bound, bool) or not isinstance(bound, int | float) or not math.isfinite(bound):
-        raise InputError(source, place, f"found the bound {bound!r:.40}, expected a number")
-    return float(bound)
 
 
 def _digest(scenario: Scenario, measurements: Sequence[Measurement]) -> str:
@@ -291,12 +300,9 @@ class _Problem:
 
     def scenario_at(self, x: np.ndarray) -> Scenario:
         """The scenario with relative parameters (n,)."""
-        numbers = (x * self.scale).tolist()
-        pairs = zip(self.parameters, numbers, strict=True)
-        changes: dict[str, str | float] = {}
-        for parameter, number in pairs:
-            changes |= parameter.changes(number)
-        return self.scenario.with_changes(changes)
+        pairs = zip(self.parameters, (x * self.scale).tolist(), strict=True)
+        changes = {parameter.key: parameter.value(number) for parameter, number in pairs}
+        return with_joined_changes(self.scenario, changes)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Weighted residuals (numbers,); the neighbours of the point are simulated with it."""
@@ -382,23 +388,35 @@ class _Problem:
         text = f"{self._digest} {keys} {(x * self.scale).tolist()}"
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
+    def _file(self, name: str) -> Path | None:
+        return self._folder and self._folder / EVALUATIONS / f"{name}.bin"
+
     def _save(self, name: str) -> None:
-        if self._folder is None:
-            return
-        content = io.BytesIO()
-        arrays = [np.append(each.values, each.clock_offset) for each in self._known[name]]
-        np.savez(content, *arrays)
-        write_whole(self._folder / EVALUATIONS / f"{name}.npz", content.getvalue())
+        if file := self._file(name):
+            numbers = [[*each.values, each.clock_offset] for each in self._known[name]]
+            content = np.concatenate(numbers).tobytes()
+            write_whole(file, _seal(name, content) + content)
 
     def _restore(self, name: str) -> bool:
-        """Takes an evaluation from the folder. Returns False if it is not there."""
-        file = self._folder and self._folder / EVALUATIONS / f"{name}.npz"
-        if not file or not file.exists():
+        """Takes an evaluation from the folder. Returns False if it is not there, or damaged."""
+        counts = [len(each.numbers) + 1 for each in self.measured]
+        size = np.dtype(float).itemsize * sum(counts)
+        try:
+            file = self._file(name)
+            content = read_bytes(file, "evaluation", most=SEAL + size) if file else b""
+        except InputError:  # it is simulated again
             return False
-        with np.load(io.BytesIO(read_bytes(file, "evaluation"))) as kept:
-            arrays = [kept[key] for key in kept]
+        numbers = content[SEAL:]
+        if len(numbers) != size or content[:SEAL] != _seal(name, numbers):
+            return False
+        arrays = np.split(np.frombuffer(numbers), np.cumsum(counts)[:-1])
         self._known[name] = [Prediction(each[:-1], float(each[-1])) for each in arrays]
         return True
+
+
+def _seal(name: str, content: bytes) -> bytes:
+    """Digest (SEAL bytes) of the name and the content of an evaluation."""
+    return hashlib.sha256(name.encode() + content).digest()
 
 
 def _searched(problem: _Problem, start: np.ndarray) -> np.ndarray:

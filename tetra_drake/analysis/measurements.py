@@ -49,9 +49,13 @@ ROUNDING = 1e-6
 """Time (s) by which times in a log may be rounded."""
 CUT = 0.05
 """Share of a command that may be missing at the end of a log."""
+LEAST, MOST = 1e-12, 1e12
+"""Least uncertainty of a measured number, and its largest size, in SI."""
 INSTALL = "pip install 'tetra_drake[parquet]'"
 
 Frequency = Annotated[float, Unit("Hz")]
+
+_SIZE, _UNCERTAINTY = Field(ge=-MOST, le=MOST), Field(ge=LEAST, le=MOST)
 
 
 class Prediction(NamedTuple):
@@ -92,7 +96,7 @@ class MotionCapture(Section):
     """File of the commands that the robot followed."""
     gait: str | None = None
     """File of the gait that the robot walked with, in place of a command."""
-    uncertainty: Length = Field(gt=0)
+    uncertainty: Annotated[Length, _UNCERTAINTY]
     """Standard deviation of a coordinate."""
     clock: Time = Field(default=0.0, ge=0)
     """Largest offset of the log's clock from the command's, which is found; 0 for none."""
@@ -145,17 +149,17 @@ class Rest(Section):
 
     changes: dict[str, Any] = Field(default={})
     """Values of scenario keys in this case, such as loads."""
-    positions: dict[str, Length] = Field(default={})
+    positions: dict[str, Annotated[Length, _SIZE]] = Field(default={})
     """Coordinates by node and axis, such as "n3 z"."""
-    tensions: dict[str, Force] = Field(default={})
+    tensions: dict[str, Annotated[Force, _SIZE]] = Field(default={})
     """Tensions by the names of the cables."""
-    frequencies: list[Frequency] = Field(default=[])
+    frequencies: list[Annotated[Frequency, _SIZE]] = Field(default=[])
     """Natural frequencies, the lowest one first."""
-    position_uncertainty: Length = Field(default=1e-3, gt=0)
+    position_uncertainty: Annotated[Length, _UNCERTAINTY] = 1e-3
     """Standard deviation of a coordinate."""
-    tension_uncertainty: Force = Field(default=1.0, gt=0)
+    tension_uncertainty: Annotated[Force, _UNCERTAINTY] = 1.0
     """Standard deviation of a tension."""
-    frequency_uncertainty: Frequency = Field(default=0.05, gt=0)
+    frequency_uncertainty: Annotated[Frequency, _UNCERTAINTY] = 0.05
     """Standard deviation of a frequency."""
 
     @property
@@ -193,13 +197,14 @@ class Rest(Section):
         )
 
 
+_Pair = Annotated[list[str | float], Field(min_length=2, max_length=2)]
 Measurement = Annotated[MotionCapture | Rest, Kinds()]
 
 
 class FitFile(Section):
     """What a fit needs beside the scenario."""
 
-    parameters: dict[str, Annotated[list[str | float], Field(min_length=2, max_length=2)]]
+    parameters: Annotated[dict[str, _Pair], Field(min_length=1)]
     """Bounds, least and most, by scenario key. Keys joined by commas get the same value."""
     measurements: list[Measurement] = Field(min_length=1)
 
@@ -326,6 +331,9 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
             raise InputError(path, name, f"found unknown node '{node}'; {hint(node, nodes)}")
         scale = given_quantity(f"1 {unit}", "m", path, name)
         columns[coordinate] = scale * column_numbers(cells[name], path, gaps=True)
+        for row in np.flatnonzero(np.abs(columns[coordinate]) > MOST):
+            problem = f"found {cells[name][row]}, expected at most {MOST:g} m"
+            raise InputError(path, f"line {row + 2}, {name}", problem)
     table = pandas.DataFrame(columns, index=times)
     if not np.isfinite(table.to_numpy(dtype=float)).any():
         raise InputError(path, "", "has no positions, expected one at least")

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tetra_drake.analysis.joined_keys import with_joined_changes
 from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.changes import given_changes
-from tetra_drake.scenario.common_sections import by_separate_key, separate
+from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import value_at
+from tetra_drake.scenario.section import Section, python_value, value_at
 
 if TYPE_CHECKING:
     import xarray
+
+
+MOST = 1_000_000
+"""Largest number of simulations of a sweep."""
 
 
 def sweep(
@@ -63,10 +68,15 @@ def sweep(
     if not walkers:
         raise InputError("sweep", "gaits", "found none, expected one at least")
     swept = given_changes(changes, "sweep")
+    if twice := repeated(swept):
+        raise InputError("sweep", twice, "is given twice")
     changes = {key: _values(key, values) for key, values in swept.items()}
+    count = len(walkers) * math.prod(len(values) for values in changes.values())
+    if count > MOST:
+        raise InputError("sweep", "changes", f"found {count} simulations, expected at most {MOST}")
     combinations = list(itertools.product(*changes.values()))
     grid = [dict(zip(changes, each, strict=True)) for each in combinations]
-    scenarios = [base.with_changes(by_separate_key(each)) for each in grid]
+    scenarios = [with_joined_changes(base, each) for each in grid]
     outcomes = simulate_many(
         [changed for changed in scenarios for _ in walkers],
         walkers * len(scenarios),
@@ -88,11 +98,12 @@ def sweep(
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
 
 
-def _values(key: str, given: Any) -> list[Any]:
-    """The values for a key as a list; `given` may be a single value."""
-    is_single = isinstance(given, (str, Mapping)) or not isinstance(given, Iterable)
-    values = [given] if is_single else list(given)
-    if not values:
+def _values(key: str, given: Any) -> Collection[Any]:
+    """The values for a key; `given` may be a single value."""
+    given = python_value(given)
+    is_one = isinstance(given, (str, bytes, Mapping, Section)) or not isinstance(given, Collection)
+    values = [given] if is_one else given
+    if not len(values):
         raise InputError("sweep", key, "found no value, expected one at least")
     return values
 

@@ -9,7 +9,7 @@ from tetra_drake.engines.gait_simulation import Driver, GaitSimulation, Viewer
 from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
 from tetra_drake.engines.simulation import Controller, simulate_controlled
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.machine import available_cores
+from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
@@ -117,9 +117,7 @@ def simulate_many(
     if len(scenarios) != len(gaits):
         problem = f"found {len(scenarios)}, expected one, or one for each of {len(gaits)} gaits"
         raise InputError("simulate_many", "scenario", problem)
-    threads = available_cores() if workers is None else workers
-    if threads < 1:
-        raise InputError("simulate_many", "workers", f"found {workers}, expected at least 1")
+    threads = min(threads_for(workers, source="simulate_many"), max(1, len(gaits)))
     pairs = [(each, _driver(gait, each)) for each, gait in zip(scenarios, gaits, strict=True)]
     engines = {engine_of(scenario) for scenario in scenarios}
     if len(engines) == 1:

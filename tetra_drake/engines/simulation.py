@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import numbers
-from collections.abc import Callable, Sequence
-from typing import Any
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, Viewer
 from tetra_drake.engines.interface import check_can_be_watched, engine_of
+from tetra_drake.engines.stepper import Stepper
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.machine import available_cores
+from tetra_drake.errors import InputError, SimulationFailure, check_whole
+from tetra_drake.machine import threads_for
 from tetra_drake.physics.cable import CableLaw
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import controlled_robot
@@ -25,6 +28,9 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
+
+MOST_ROBOTS = 100_000
+"""Largest number of robots side by side. They take about 2 GB of memory."""
 
 Controller = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of one robot to its actions (actions,)."""
@@ -46,6 +52,10 @@ class Simulation:
     `cpg.listing_step`; the first action acts from the start on. There is no network and no start-up
     time. On all engines, steps with the samples of a command give the motion of
     simulate(command=...), if each sample differs from the one before.
+
+    One thread at a time may use a simulation. If a step is interrupted, as by Ctrl-C, reset() puts
+    all robots at their start; until then the other methods refuse. A simulation can be used after a
+    fork of the process. It cannot be copied or pickled.
     """
 
     def __init__(
@@ -78,17 +88,23 @@ class Simulation:
         self.robot: Robot = controlled_robot(scenario)
         """The robot without disturbances. Its structure has the names of nodes and cables."""
         self._first_readings = first_readings(self.robot)
-        workers = available_cores() if workers is None else workers
-        _check_whole("count", count, least=1)
-        _check_whole("workers", workers, least=1)
+        check_whole("Simulation", "count", count, least=1, most=MOST_ROBOTS)
+        self._threads = threads_for(workers, source="Simulation")
+        if not isinstance(record, bool):
+            problem = f"found {record!r:.60}, expected True or False"
+            raise InputError("Simulation", "record", problem)
+        if not isinstance(name, str):
+            raise InputError("Simulation", "name", f"found {name!r:.60}, expected a text")
         if viewer is not None:
             check_can_be_watched(scenario)
         self._listing_steps = _listing_steps(control_period, scenario)
+        self.control_period = self._listing_steps * scenario.cpg.listing_step
+        """Time (s) between actions."""
         self._gait = Gait(name=name, weights=(), tau_a=1.0, tau_b=1.0)
         self._record, self._viewer = record, viewer
-        first = self._gait_simulation(self.robot)
-        self._stepper = engine_of(scenario).stepper(first, count=count, threads=workers)
         self._robots = [self.robot] * count
+        self._stepper = self._new_stepper()
+        self._owner, self._is_whole = threading.RLock(), True
         shape = count, self.robot.driven.size
         self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
         self._signals = np.empty(shape)
@@ -108,7 +124,8 @@ class Simulation:
     @property
     def state(self) -> Readings:
         """The readings of all robots now."""
-        return self._stepper.readings.copied()
+        with self._used("state"):
+            return self._stepper.readings.copied()
 
     @property
     def ended(self) -> np.ndarray:
@@ -117,59 +134,70 @@ class Simulation:
         return failed | (self._time_after(self._steps) >= self.scenario.simulation.duration)
 
     def reset(
-        self, *, seed: int | None = None, indices: Sequence[int] | np.ndarray | None = None
+        self,
+        *,
+        seed: int | Sequence[int] | None = None,
+        indices: Sequence[int] | np.ndarray | None = None,
     ) -> Readings:
         """Puts robots at their start, and returns the readings of all robots.
 
         Args:
-            seed: seed of the scenario's disturbances; each robot has a draw of its own. None for
-                robots without disturbances.
+            seed: seed of the scenario's disturbances; each robot has a draw of its own. Or a seed
+                for each of the robots, which then have the draws of lone robots with these seeds.
+                None for robots without disturbances.
             indices: the robots; all by default.
 
         Raises:
             InputError: if the seed or an index is wrong.
         """
-        for place in self._places(indices):
-            scenario = self.scenario
-            if seed is not None and scenario.disturbances is not None:
-                _check_whole("seed", seed, least=0)
-                scenario = disturbed(scenario, draw_disturbances(scenario, (seed, place)))
-            same = scenario is self.scenario
-            self._put(place, self.robot if same else controlled_robot(scenario))
-        return self.state
+        places = self._places(indices)
+        seeds = self._seeds(seed, places)
+        is_whole = self._is_whole or len(set(places)) == self.count
+        with self._used("reset", is_whole=is_whole):
+            robots = [self.robot if seed is None else self._drawn(seed) for seed in seeds]
+            if not self._is_whole:
+                self._stepper = self._new_stepper()
+            self._is_whole = False
+            for place, robot in zip(places, robots, strict=True):
+                self._put(place, robot)
+            self._is_whole = True
+            return self.state
 
-    def step(self, actions: npt.ArrayLike) -> Readings:
+    def step(
+        self, actions: npt.ArrayLike, *, indices: Sequence[int] | np.ndarray | None = None
+    ) -> Readings:
         """Simulates one control period, and returns the readings of all robots.
 
         The last period ends at `simulation.duration`.
 
         Args:
             actions: the actions (N, actions); of a single robot also (actions,).
+            indices: the robots that go on; all by default. The others pause, and their actions may
+                be anything.
 
         Raises:
             InputError: if the shape is wrong, an action is not finite, or a robot has reached the
                 end.
         """
-        goes = np.array([failure is None for failure in self.failures])
-        signals = np.where(goes[:, np.newaxis], self._to_signals(actions, goes), 0.0)
-        now, until = self._time_after(self._steps), self._time_after(self._steps + 1)
-        duration = self.scenario.simulation.duration
-        if (late := goes & (now >= duration)).any():
-            problem = f"robot {late.argmax()} has reached the end at {duration:g} s; reset it"
-            raise InputError("Simulation", "step", problem)
-        for place in np.flatnonzero(goes & (self._steps == 0)).tolist():
-            begun = dataclasses.replace(
-                self._robots[place], commanded=signals[place : place + 1].copy()
-            )
-            self._stepper.begin(place, self._gait_simulation(begun))
-        marks = self._marks(now, until, changed=(signals != self._signals).any(axis=1))
-        marks[~goes] = math.inf
-        self._stepper.advance(signals, marks)
-        self._signals = signals
-        self._steps[goes] += 1
-        for place in np.flatnonzero(goes & self._stepper.failed()).tolist():
-            self.failures[place] = self._stepper.failure(place)
-        return self.state
+        with self._used("step"):
+            goes = np.zeros(self.count, dtype=bool)
+            goes[self._places(indices)] = True
+            goes &= [failure is None for failure in self.failures]
+            signals = np.where(goes[:, np.newaxis], self._to_signals(actions, goes), 0.0)
+            marks = self._marks(goes, changed=(signals != self._signals).any(axis=1))
+            for place in np.flatnonzero(goes & (self._steps == 0)).tolist():
+                begun = dataclasses.replace(
+                    self._robots[place], commanded=signals[place : place + 1].copy()
+                )
+                self._stepper.begin(place, self._gait_simulation(begun))
+            self._is_whole = False
+            self._stepper.advance(signals, marks)
+            self._signals[goes] = signals[goes]
+            self._steps[goes] += 1
+            for place in np.flatnonzero(goes & self._stepper.failed()).tolist():
+                self.failures[place] = self._stepper.failure(place)
+            self._is_whole = True
+            return self.state
 
     def result(self, place: int = 0) -> SimulationResult:
         """The result of a robot that has reached the end. Raises its failure if it failed, and
@@ -179,7 +207,54 @@ class Simulation:
             time = float(self._stepper.readings.time[place])
             problem = f"robot {place} is at {time:g} s; its result exists at the end"
             raise InputError("Simulation", "result", problem)
-        return dataclasses.replace(self._stepper.result(place), scenario=self.scenario)
+        with self._used("result"):
+            return dataclasses.replace(self._stepper.result(place), scenario=self.scenario)
+
+    def __reduce__(self) -> NoReturn:
+        problem = "cannot be copied or pickled: make another one from the same arguments"
+        raise InputError("Simulation", "", problem)
+
+    @contextlib.contextmanager
+    def _used(self, method: str, *, is_whole: bool | None = None) -> Iterator[None]:
+        """A block in which this thread alone uses the robots. Raises InputError, naming `method`,
+        if another one does, or if the robots are not whole."""
+        if not self._owner.acquire(blocking=False):
+            problem = "another thread uses these robots; give each thread its own Simulation"
+            raise InputError("Simulation", method, problem)
+        try:
+            if not (self._is_whole if is_whole is None else is_whole):
+                problem = "a step was interrupted; reset() all robots first"
+                raise InputError("Simulation", method, problem)
+            yield
+        finally:
+            self._owner.release()
+
+    def _new_stepper(self) -> Stepper:
+        """A stepper of the scenario's engine for all robots."""
+        first = self._gait_simulation(self.robot)
+        return engine_of(self.scenario).stepper(first, count=self.count, threads=self._threads)
+
+    def _seeds(
+        self, seed: int | Sequence[int] | None, places: list[int]
+    ) -> list[tuple[int, int] | None]:
+        """Seeds of the draws of some robots; None for robots without disturbances."""
+        if seed is None:
+            return [None] * len(places)
+        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+            seeds: list[Any] = [(each, 0) for each in seed]
+        else:
+            seeds = [(seed, place) for place in places]
+        if len(seeds) != len(places):
+            problem = f"found {len(seeds)} seeds, expected one, or one for each of {len(places)}"
+            raise InputError("Simulation", "seed", problem)
+        for each, _ in seeds:
+            check_whole("Simulation", "seed", each, least=0)
+        return [None] * len(places) if self.scenario.disturbances is None else seeds
+
+    def _drawn(self, seed: tuple[int, int]) -> Robot:
+        """The robot with a draw of the scenario's disturbances."""
+        draw = draw_disturbances(self.scenario, seed)
+        return controlled_robot(disturbed(self.scenario, draw))
 
     def _put(self, place: int, robot: Robot) -> None:
         """Puts a robot at its start."""
@@ -214,17 +289,22 @@ class Simulation:
         times = (step * (self._listing_steps * steps)).round(MARK_DECIMALS)
         return np.where(times > duration - 0.5 * step, duration, times)
 
-    def _marks(self, now: np.ndarray, until: np.ndarray, *, changed: np.ndarray) -> np.ndarray:
-        """Times (N, marks) in s at which steps must end in the control period from `now` to
-        `until`: the same as for a command."""
+    def _marks(self, goes: np.ndarray, *, changed: np.ndarray) -> np.ndarray:
+        """Times (N, marks) in s at which steps must end in the next control period: the same as for
+        a command. Raises InputError if a robot that goes has reached the end."""
         simulation, starts = self.scenario.simulation, self._steps == 0
+        now, until = self._time_after(self._steps), self._time_after(self._steps + 1)
+        if (late := goes & (now >= simulation.duration)).any():
+            problem = f"robot {late.argmax()} has reached the end at {simulation.duration:g} s"
+            raise InputError("Simulation", "step", f"{problem}; reset it")
         change_ends = (now + self.scenario.cpg.listing_step).round(MARK_DECIMALS)
         is_change = changed & ~starts & (change_ends < until)
         change_ends = np.where(is_change, change_ends, math.inf)
         steady = np.full(self.count, simulation.steady_from).round(MARK_DECIMALS)
         is_within = (now < steady) & (steady < until) & (steady != change_ends)
         start, steady = np.where(starts, 0.0, math.inf), np.where(is_within, steady, math.inf)
-        return np.sort(np.stack([start, change_ends, steady, until], axis=1), axis=1)
+        marks = np.sort(np.stack([start, change_ends, steady, until], axis=1), axis=1)
+        return np.where(goes[:, np.newaxis], marks, math.inf)
 
     def _places(self, indices: Sequence[int] | np.ndarray | None) -> list[int]:
         """The places of robots. Raises InputError for an index that is none."""
@@ -241,16 +321,19 @@ class Simulation:
 
 def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
     """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, naming
-    `source`, if they have another shape."""
+    `source`, if they have another shape, or are not real numbers."""
     least = shape[1:] if shape[0] == 1 else shape
     try:
-        given = np.asarray(actions, dtype=float)
-    except (TypeError, ValueError) as error:
-        problem = f"found {actions!r:.60}, expected numbers of shape {least}"
-        raise InputError(source, "actions", problem) from error
+        given: np.ma.MaskedArray = np.ma.asarray(actions)
+        is_real = given.dtype.kind in "iuf" and not np.ma.is_masked(given)
+    except (TypeError, ValueError):
+        is_real = False
+    if not is_real:
+        problem = f"found {actions!r:.60}, expected real numbers of shape {least}"
+        raise InputError(source, "actions", problem)
     if given.shape not in (shape, least):
         raise InputError(source, "actions", f"found the shape {given.shape}, expected {least}")
-    return given.reshape(shape)
+    return given.data.astype(float).reshape(shape)
 
 
 def simulate_controlled(
@@ -283,16 +366,10 @@ def _listing_steps(period: float | None, scenario: Scenario) -> int:
     if period is None:
         period = scenario.simulation.control_period
         source, key = f"scenario {scenario.name}", "simulation.control_period"
-    is_number = isinstance(period, numbers.Real) and math.isfinite(period)
-    steps = round(period / step) if is_number else 0
+    is_number = isinstance(period, numbers.Real) and not isinstance(period, bool)
+    within = is_number and 0.0 < period <= max(scenario.simulation.duration, step)
+    steps = round(period / step) if within else 0
     if steps < 1 or abs(period - steps * step) > 1e-6 * step:
-        expected = f"a multiple of cpg.listing_step, {step:g} s"
-        raise InputError(source, key, f"found {period!r}, expected {expected}")
+        expected = f"a multiple of cpg.listing_step, {step:g} s, up to simulation.duration"
+        raise InputError(source, key, f"found {period!r:.60}, expected {expected}")
     return steps
-
-
-def _check_whole(key: str, number: object, *, least: int) -> None:
-    """Raises InputError unless a number is whole, `least` or more."""
-    if not isinstance(number, numbers.Integral) or int(number) < least:
-        problem = f"found {number!r}, expected an integer, {least} or more"
-        raise InputError("Simulation", key, problem)

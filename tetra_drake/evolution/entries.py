@@ -16,13 +16,15 @@ has its own checksums.
 
 from __future__ import annotations
 
+import io
+import itertools
 import json
 import lzma
 import math
 import os
 import re
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -30,13 +32,16 @@ from typing import Annotated, Any, NoReturn
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import json_number, make_folder
+from tetra_drake.files import json_number, make_folder, read_bytes
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.scenario.metrics import wrong_metric
 
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
+
+MOST = 2**30
+"""Largest size of a file, and of its earlier lines when they are not compressed, in bytes."""
 
 REMEDY = (
     "cut this line and those after it off the file, and `tetra-drake evolve --resume` makes good "
@@ -178,15 +183,11 @@ class RecordFile:
         Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
         to another run or trial.
         """
-        packed = compressed(self.path)
-        try:
-            earlier = lzma.decompress(_read(packed)) if packed.exists() else b""
-        except lzma.LZMAError as error:
-            raise InputError(packed, "", f"cannot be read: {error}") from error
-        entries = _parse(earlier, packed, checksums=False)
-        entries += _parse(_read(self.path), self.path, checksums=True)
+        packed, entries = compressed(self.path), []
+        earlier = _parse(_unpacked(packed), packed, is_packed=True)
+        later = _parse(_read(self.path), self.path, is_packed=False)
         counter = _COUNTERS.get(self.path.name)
-        for row, entry in enumerate(entries):
+        for row, entry in enumerate(itertools.chain(earlier, later)):
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
                     self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
@@ -194,6 +195,7 @@ class RecordFile:
             if counter is not None and entry.get(counter) != row:
                 problem = f"is damaged: {counter} is {entry.get(counter)}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
+            entries.append(entry)
         self._check_unique(entries)
         return entries
 
@@ -251,22 +253,42 @@ def json_line(entry: Mapping[str, Any]) -> str:
 
 
 def _read(path: Path) -> bytes:
+    """Content of a file, empty if there is none. Raises InputError if it cannot be read."""
     try:
-        return path.read_bytes()
-    except FileNotFoundError:
+        return read_bytes(path, "record", most=MOST)
+    except InputError as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            return b""
+        raise
+
+
+def _unpacked(path: Path) -> bytes:
+    """Content of a compressed file, empty if there is none. Raises InputError if it is damaged."""
+    packed = _read(path)
+    if not packed:
         return b""
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from error
+    unpacking = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=MOST)
+    try:
+        content = unpacking.decompress(packed, MOST)
+    except lzma.LZMAError as error:
+        raise InputError(path, "", f"cannot be read: {error}") from error
+    if not unpacking.eof or unpacking.unused_data:
+        raise InputError(path, "", f"is cut, or has more than {MOST // 2**20} MB of lines")
+    return content
 
 
-def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any]]:
-    """The entries of a file's complete lines. With `checksums`, each line must have a checksum."""
-    entries = []
-    for number, line in enumerate(content.split(b"\n")[:-1], start=1):
-        problem = ""
-        match = _CHECKSUM.fullmatch(line)
-        if match is None and checksums:
+def _parse(content: bytes, file: Path, *, is_packed: bool) -> Iterator[dict[str, Any]]:
+    """The entries of a file's lines, each of which has a checksum unless it is packed. A kill may
+    have cut the last line, but not before it was packed."""
+    for number, line in enumerate(io.BytesIO(content), start=1):
+        problem, is_whole = "", line.endswith(b"\n")
+        if not (is_whole or is_packed):
+            return
+        match = _CHECKSUM.fullmatch(line.removesuffix(b"\n"))
+        if match is None and not is_packed:
             problem = "it has no checksum"
+        if not is_whole:
+            problem = "it has no end"
         if match is not None and zlib.crc32(match[1]) != int(match[2], 16):
             problem = "its checksum does not match its content"
         if problem:
@@ -278,5 +300,4 @@ def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any
         if not isinstance(entry, dict):
             problem = f"is damaged: it is no object of JSON; {REMEDY}"
             raise InputError(file, f"line {number}", problem)
-        entries.append(entry)
-    return entries
+        yield entry

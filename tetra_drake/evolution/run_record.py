@@ -37,7 +37,7 @@ from tetra_drake.evolution.manifest import (
     read_manifest,
     write_manifest,
 )
-from tetra_drake.files import check_folder, make_folder
+from tetra_drake.files import check_file, check_folder, make_folder
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.height_files import RECORDED
@@ -257,6 +257,7 @@ def _set_aside(directory: Path) -> Iterator[None]:
 def _locked(directory: Path) -> BinaryIO:
     """The lock file of a run, locked. The system unlocks it when this process ends. Raises
     InputError if another process has the lock."""
+    check_file(directory / LOCK)  # opening a pipe would wait for a reader
     with contextlib.ExitStack() as undo:
         try:
             lock = undo.enter_context((directory / LOCK).open("ab"))

@@ -5,7 +5,6 @@ import math
 import os
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from numbers import Integral
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, Self
 
@@ -13,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import Table, heading_html
 from tetra_drake.robot.weights import KINDS, Weights
@@ -214,8 +213,7 @@ def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
     Raises:
         InputError: if an argument cannot be used.
     """
-    if not isinstance(seed, Integral) or seed < 0:
-        raise InputError("seeded_gait", "seed", f"found {seed!r}, expected an integer, 0 or more")
+    check_whole("seeded_gait", "seed", seed, least=0)
     space = ParameterSpace.of(given_scenario(scenario))
     return space.gait(space.random(np.random.default_rng(seed)), name=f"random gait {seed}")
 

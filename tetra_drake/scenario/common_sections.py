@@ -6,7 +6,8 @@ file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import Field, model_validator
@@ -162,6 +163,12 @@ class Disturbances(Section):
     """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
     at risk). 1 is the mean over all draws. At least one draw counts."""
 
+    @model_validator(mode="after")
+    def _check(self) -> Disturbances:
+        if key := repeated(self.spreads):
+            refuse("spreads", f"'{key}' is given twice")
+        return self
+
 
 def separate(joined: str) -> list[str]:
     """Splits a key of `spreads` at its commas into scenario keys."""
@@ -171,3 +178,9 @@ def separate(joined: str) -> list[str]:
 def by_separate_key(by_joined: Mapping[str, Value]) -> dict[str, Value]:
     """Values by scenario key, from values for joined keys."""
     return {key: value for joined, value in by_joined.items() for key in separate(joined)}
+
+
+def repeated(all_joined: Iterable[str]) -> str:
+    """The first scenario key that is given twice in joined keys; "" if there is none."""
+    counts = Counter(key for joined in all_joined for key in separate(joined))
+    return next((key for key, count in counts.items() if count > 1), "")

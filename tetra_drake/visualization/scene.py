@@ -256,12 +256,17 @@ def floor_points(ground: Ground, corners: np.ndarray, units: Units) -> np.ndarra
     return np.stack([x, y, z], axis=-1)[np.ix_(rows, columns)]
 
 
-def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Position of a camera that looks at `target` (3,) and sees all `points` (points, 3)."""
+def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit vectors (3,) of the camera: to the right, up, and forward."""
     forward = np.array(VIEW) / np.linalg.norm(VIEW)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
+    return right, np.cross(right, forward), forward
+
+
+def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Position of a camera that looks at `target` (3,) and sees all `points` (points, 3)."""
+    right, up, forward = view_axes()
     offset = points - target
     slope = np.tan(np.deg2rad(FIELD_OF_VIEW) / 2)
     for_width = np.abs(offset @ right) / (ASPECT * slope) - offset @ forward

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -29,7 +30,11 @@ class LaneStepper(Stepper):
         self._engines = [
             LaneEngine(prepared, readings=self.readings.rows(share)) for share in self._shares
         ]
-        self._pool = ThreadPoolExecutor(len(self._engines))
+        self._start_threads()
+
+    def _start_threads(self) -> None:
+        """Starts a pool of threads for this process: a fork has none of its parent's."""
+        self._pool, self._process = ThreadPoolExecutor(len(self._engines)), os.getpid()
 
     def begin(self, place: int, simulation: GaitSimulation) -> None:
         prepared, (engine, row) = self._first.begun_by(simulation), self._row(place)
@@ -43,6 +48,8 @@ class LaneStepper(Stepper):
             (engine, signals[share], marks[share])
             for engine, share in zip(self._engines, self._shares, strict=True)
         ]
+        if self._process != os.getpid():
+            self._start_threads()
         others = [self._pool.submit(LaneEngine.advance_to_pause, *task) for task in tasks[1:]]
         LaneEngine.advance_to_pause(*tasks[0])
         for other in others:

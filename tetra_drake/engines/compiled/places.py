@@ -67,12 +67,14 @@ def advance(parts: Parts, rounds: int) -> None:
     The robots that wait at first begin together with a round, so that their clearances are due
     together.
     """
-    constants, lanes, log, _, places, _, live = unpacked(parts)
+    constants, lanes, log, _, places, readings, live = unpacked(parts)
     exchange(parts)
     for _ in range(rounds):
         ended = False
         for _ in range(ROUND):
             has_ended = loop.iterate(constants, lanes, log, live)
+            if has_ended and places.marks.shape[0] > 0:
+                read_paused(lanes, log, readings)
             measure_clearance(constants, lanes)
             if has_ended:
                 ended = True
@@ -101,14 +103,12 @@ def measure_clearance(constants: Constants, lanes: LaneState) -> None:
 @functools.partial(compiled, nogil=True)
 def exchange(parts: Parts) -> None:
     """Puts robots that have ended back to their places, and robots that wait in idle lanes."""
-    constants, lanes, log, memory, places, readings, _ = unpacked(parts)
+    constants, lanes, log, memory, places, _, _ = unpacked(parts)
     clock, queue = by_lane(lanes.clock), places.queue
     for lane in range(log.place.size):
         if clock[loop.STATUS, lane] == loop.RUNNING:
             continue
         if clock[loop.STATUS, lane] != loop.IDLE:
-            if places.marks.shape[0] > 0 and clock[loop.STATUS, lane] == loop.DONE:
-                read(lanes, lane, log.place[lane], readings)
             for i in range(places.states.shape[1]):
                 places.states[log.place[lane], i] = memory.states[i, lane]
             clock[loop.STATUS, lane] = loop.IDLE
@@ -151,6 +151,15 @@ def hold(constants: Constants, lanes: LaneState, log: Log, lane: int, places: Pl
     log.passed[place] = 0
     clock[loop.MARK, lane] = places.marks[place, 0]
     clock[loop.STATUS, lane] = loop.RUNNING
+
+
+@inlined
+def read_paused(lanes: LaneState, log: Log, to: Readings) -> None:
+    """Writes the readings of robots that have reached their pause, before the clearance of another
+    lane moves the nodes: its last digits differ."""
+    for lane in range(log.place.size):
+        if by_lane(lanes.clock)[loop.STATUS, lane] == loop.DONE:
+            read(lanes, lane, log.place[lane], to)
 
 
 @inlined
