@@ -43,6 +43,8 @@ _IMPACT_SPEED = 1.0  # m/s
 _POINT = 1e-8
 """Radius (m) of the spheres that touch the floor in place of points. Radii of feet are larger by
 it, and the floor is lower."""
+LEAST_MOMENT = 1e-14
+"""Least principal moment of inertia (kg m²) of a body that MuJoCo takes: mjEPS of its compiler."""
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
 
 
@@ -139,25 +141,31 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
     """Adds the bodies: a site at each node, shown at least as thick as the thinnest strut; a sphere
     at each contact node, its foot; and struts."""
     structure, bodies = robot.structure, robot.model.bodies
-    radii = structure.node_radius.clip(min=structure.strut_radius.min())
+    radii = structure.node_radius.clip(min=structure.least_radius)
     pairs = add_element(model, "contact")
     for i, body_name in enumerate(structure.bodies):
         pos, quat = structure.p_WB[i], structure.q_WB[i]
         body = add_element(world, "body", name=body_name, pos=pos, quat=quat)
         add_element(body, "freejoint")
         mass, inertia = bodies.mass[i], bodies.inertia[i]
+        principal = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())
         nodes = range(structure.first_node[i], structure.first_node[i + 1])
         feet = structure.contact_radius[[node for node in nodes if node in structure.contacts]]
-        if len(nodes) == 2 and not feet.any():
+        is_bar = len(nodes) == 2 and not feet.any()
+        if is_bar:
             # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
             # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
             # above the nodes by half the depth, so friction would soon spin a thin bar.
-            across = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())[-1]
-            moments = {"diaginertia": 3 * [across]}
+            moments = {"diaginertia": 3 * [principal[-1]]}
         elif structure.isotropic:
             moments = {"diaginertia": 3 * [inertia[XX]]}
         else:
             moments = {"fullinertia": inertia}
+        least = principal[-1 if is_bar else 0]
+        if least < LEAST_MOMENT:
+            found = f"'{body_name}' has a moment of inertia of {least:.3g} kg m^2"
+            problem = f"{found}, but mujoco takes at least {LEAST_MOMENT:g}"
+            raise InputError(robot.scenario.name, "robot", problem)
         add_element(body, "inertial", pos="0 0 0", mass=mass, **moments)
         contact = _contact(robot, mass)
         for node in nodes:
@@ -231,7 +239,7 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
     exert their tensions."""
     structure = robot.structure
     tendons, actuators = add_element(model, "tendon"), add_element(model, "actuator")
-    width, motors = structure.strut_radius.min() / 2, motor_names(structure)
+    width, motors = structure.least_radius / 2, motor_names(structure)
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]

@@ -89,9 +89,10 @@ def _body_inertia(
     """Spatial inertia M_BFo_F of a body: struts, and spheres and point masses at its nodes."""
     total = SpatialInertia.Zero()
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
-        total += strut_inertia(p_FN[a], p_FN[b], radius=radius, density=density)
+        if density > 0.0:
+            total += strut_inertia(p_FN[a], p_FN[b], radius=radius, density=density)
     for p, radius, density, mass in zip(p_FN, node_radius, node_density, node_mass, strict=True):
-        if radius > 0.0:
+        if radius > 0.0 and density > 0.0:
             total += node_inertia(p, radius=radius, density=density)
         if mass > 0.0 and len(struts):
             total += SpatialInertia(mass, p, UnitInertia.PointMass(p))

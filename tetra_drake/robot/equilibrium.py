@@ -87,8 +87,10 @@ class Unactuated:
         self.forces = Forces.of(model)
         """Forces at the state that was last computed."""
         self.parts = Packed((self.model, self.forces))
-        self.radius = float(model.bodies.radius.max())
-        """Largest radius (m) of a body, which turns rotations into lengths."""
+        gyration = np.sqrt(model.bodies.inertia.max(axis=1) / model.bodies.mass)
+        self.radius = float(model.bodies.radius.max() or gyration.max())
+        """Largest radius (m) of a body, or of its gyration if all are points. It turns rotations
+        into lengths."""
 
 
 def find_equilibrium(

@@ -199,7 +199,7 @@ class Robot:
             return ""
         radius, contacts = self.structure.contact_radius, self.structure.contacts
         depth = (radius - z)[contacts].max()
-        height = (z + radius).max() - (z - radius).min() or 2.0 * self.structure.strut_radius.max()
+        height = (z + radius).max() - (z - radius).min() or 2.0 * self.structure.least_radius
         if depth <= SINKS * height:
             return ""
         needed = units.shown(ground.stiffness * depth / (BEARS * height), "N/m")
@@ -387,6 +387,7 @@ def equilibrium_of(
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
     """Constants of a structure and its laws, in the form of the kernels."""
+    touching = scenario.strut_contact.law(structure.strut_search)
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,
@@ -403,7 +404,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
             weight=structure.mass * scenario.robot.gravity,
         ),
         struts=structure.strut_table,
-        strut_contact=scenario.strut_contact.law(structure.strut_search),
+        strut_contact=touching._replace(acts=touching.acts and structure.struts.size > 0),
         isotropic=structure.isotropic,
         slack=structure.slack,
     )

@@ -40,6 +40,8 @@ pairs are near; with a smaller one, near pairs are searched more often."""
 PASSAGE = 0.5
 """Distance that a step may carry a strut into another, as a share of the least radius. Struts pass
 through each other at four times this distance."""
+SLENDERNESS = 100.0
+"""Size of a robot without struts, divided by the least radius that is shown."""
 
 
 @dataclass(frozen=True)
@@ -105,10 +107,19 @@ class Structure(Blueprint):
 
     @property
     def strut_search(self) -> Search:
-        """Distances of the search for struts that may touch."""
+        """Distances of the search for struts that may touch; zeros if there are no struts."""
+        if not self.strut_radius.size:
+            return Search(0.0, drift=0.0, passage=0.0, lightest=self.mass.min())
         skin = SKIN * self.strut_table.length.min()
         near, passage = 2.0 * self.strut_radius.max() + skin, PASSAGE * self.strut_radius.min()
         return Search(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
+
+    @property
+    def least_radius(self) -> float:
+        """Radius (m) of the thinnest strut. What is shown is as thick at least, also if there are
+        no struts."""
+        size = float(np.ptp(self.p_WN, axis=0).max())
+        return float(self.strut_radius.min()) if self.strut_radius.size else size / SLENDERNESS
 
     @property
     def radius(self) -> np.ndarray:

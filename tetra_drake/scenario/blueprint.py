@@ -203,10 +203,14 @@ class Blueprint:
 
     def _images_of_cables(self) -> list[int]:
         """Index of the mirror image of each cable; -1 if there is none."""
-        images, placed, least = [], self._ends, self._least_distance
+        placed, least = self._ends, self._least_distance
+        images: list[int] = []
         for ends in placed * [1.0, -1.0, 1.0]:
             forward = np.abs(placed - ends).max(axis=(1, 2))
             backward = np.abs(placed - ends[::-1]).max(axis=(1, 2))
-            nearest = np.minimum(forward, backward)
-            images.append(int(nearest.argmin()) if nearest.min() <= least else -1)
+            found = np.flatnonzero(np.minimum(forward, backward) <= least).tolist()
+            # Of parallel cables, the image is one of the same group.
+            group = self.cable_groups[len(images)]
+            alike = [cable for cable in found if self.cable_groups[cable] == group]
+            images.append((*alike, *found, -1)[0])
         return images

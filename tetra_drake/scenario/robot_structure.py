@@ -32,6 +32,7 @@ from tetra_drake.scenario.quantities import (
 )
 from tetra_drake.scenario.refusals import described, hint, refuse
 from tetra_drake.scenario.robot_tetrahedra import (
+    LIGHTEST,
     LONGEST,
     CableConstants,
     Tetrahedra,
@@ -77,8 +78,8 @@ class StrutGroup(Section):
     """The nodes that each strut joins."""
     diameter: Length = Field(gt=0)
     """Diameter of a strut."""
-    density: Density = Field(gt=0)
-    """Density of struts and spheres."""
+    density: Density = Field(ge=0)
+    """Density of struts and spheres. It may be 0 where other parts of the body have mass."""
     node_diameter: Length = Field(ge=0)
     """Diameter of the spheres; 0 for none. A node has one sphere, from its first strut in the
     file."""
@@ -97,14 +98,15 @@ class StrutGroup(Section):
 
 
 class SphereGroup(Section):
-    """Solid spheres of one make at nodes, in place of the spheres of their struts."""
+    """Solid spheres of one make at nodes, in place of the spheres of their struts. A sphere at a
+    node of no strut is a body of its own."""
 
     nodes: list[str] = Field(min_length=1)
     """The nodes at their centres."""
     diameter: Length = Field(gt=0)
     """Diameter of a sphere."""
-    density: Density = Field(gt=0)
-    """Density of a sphere."""
+    density: Density = Field(ge=0)
+    """Density of a sphere. It may be 0 where other parts of the body have mass."""
     contact_radius: Length | None = Field(default=None, ge=0)
     """Radius with which a sphere touches the ground; by default its own. The default is 0 for nodes
     that anchors hold along z."""
@@ -183,17 +185,18 @@ class StructureFile(Section):
     """Cables never push."""
 
     nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
-    """Coordinates [x, y, z] of each node, near an equilibrium."""
+    """Coordinates [x, y, z] of each node, near an equilibrium. A node that nothing else names is
+    left out."""
     unit: str | None = None
     """Unit of coordinates that are bare numbers, such as cm. A robot in mm is shown in mm."""
-    struts: dict[Name, StrutGroup] = Field(min_length=1)
+    struts: dict[Name, StrutGroup] = Field(default={})
     cables: dict[Name, CableGroup] = Field(default={})
     spheres: dict[Name, SphereGroup] = Field(default={})
     actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, their nodes in either order."""
     masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
-    """Point masses at nodes, such as motors. A node of no strut that only cables hold is a point
-    mass, such as a payload."""
+    """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
+    as a payload that cables hold."""
     loads: dict[str, Annotated[list[Force], Field(min_length=3, max_length=3)]] = Field(default={})
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: dict[str, Annotated[str, pydantic.BeforeValidator(_check_axes)]] = Field(default={})
@@ -227,8 +230,9 @@ class StructureFile(Section):
 
     @property
     def size(self) -> float:
-        """Length (m) of the shortest strut; the unit of `disturbances.start`."""
-        return min(map(self._length, self.all_struts))
+        """Length (m) of the shortest strut, or of the shortest cable if there are no struts; the
+        unit of `disturbances.start`."""
+        return min(map(self._length, self.all_struts or self.all_cables), default=0.0)
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
         """Further changes that follow from `changes` to a base: none."""
@@ -239,6 +243,7 @@ class StructureFile(Section):
         nodes = tuple(self.body_of_node)
         number = {node: place for place, node in enumerate(nodes)}
         struts = sorted(self.all_struts, key=lambda strut: self.body_of_node[strut.nodes[0]])
+        struts_ends = [[number[node] for node in strut.nodes] for strut in struts]
         groups = [self.struts[strut.group] for strut in struts]
         spheres = [self.sphere_of_node.get(node) for node in nodes]
         held = np.array([[axis in self._held(node) for axis in "xyz"] for node in nodes])
@@ -252,7 +257,7 @@ class StructureFile(Section):
             first_node=np.append(0, np.cumsum([len(body) for body in self.bodies])),
             p_WF=np.zeros((self.body_count, 3)),
             p_FN=np.array([self.nodes[node] for node in nodes]),
-            struts=np.array([[number[node] for node in strut.nodes] for strut in struts]),
+            struts=np.array(struts_ends, dtype=int).reshape(-1, 2),
             strut_radius=np.array([group.diameter / 2 for group in groups]),
             strut_density=np.array([group.density for group in groups]),
             strut_stiffness=np.array([group.axial_stiffness or math.inf for group in groups]),
@@ -293,32 +298,50 @@ class StructureFile(Section):
     @cached_property
     def bodies(self) -> tuple[tuple[str, ...], ...]:
         """Nodes of each rigid body. Bodies and nodes are in the order of the struts; then come
-        point masses."""
-        of_struts = _components(self.all_struts)
+        point masses and spheres at other nodes."""
+        of_struts = components(self.all_struts)
         used = {node for body in of_struts for node in body}
-        fixed = {node for node, axes in self.anchors.items() if len(axes) == len("xyz")}
-        return *of_struts, *((node,) for node in self.masses if node not in used | fixed)
+        with_mass = dict.fromkeys([*self.masses, *self._nodes_of_spheres])
+        return *of_struts, *((node,) for node in with_mass if node not in used | self._fixed)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
         """Names of the bodies: the group of struts with the same nodes, the part of a structure of
         NTRT with the same nodes, such as "vertebra1", or the nodes of the body."""
         names: dict[frozenset[str], str] = {}
-        for part in {node.rpartition("/")[0] for node in self.nodes} - {""}:
-            names[frozenset(node for node in self.nodes if node.startswith(f"{part}/"))] = part
+        used = self.body_of_node
+        for part in {node.rpartition("/")[0] for node in used} - {""}:
+            names[frozenset(node for node in used if node.startswith(f"{part}/"))] = part
         for name, group in self.struts.items():
             names[frozenset(node for pair in group.pairs for node in pair)] = name
         return tuple(names.get(frozenset(body), " ".join(body)) for body in self.bodies)
 
     @cached_property
     def body_of_node(self) -> dict[str, int]:
-        """Index of the body of each node; fixed nodes come last and have WORLD."""
+        """Index of the body of each node that is used; fixed nodes come last and have WORLD."""
         of_bodies = {node: body for body, nodes in enumerate(self.bodies) for node in nodes}
-        return of_bodies | {node: WORLD for node in self.nodes if node not in of_bodies}
+        fixed = [node for node in self.nodes if node in self._fixed and node not in of_bodies]
+        return of_bodies | dict.fromkeys(fixed, WORLD)
+
+    @cached_property
+    def unused(self) -> tuple[str, ...]:
+        """Nodes that nothing uses, which are left out."""
+        named = {node for cable in self.all_cables for node in cable.nodes}
+        named |= {*self.body_of_node, *self.anchors}
+        return tuple(node for node in self.nodes if node not in named)
+
+    @property
+    def _fixed(self) -> set[str]:
+        """Nodes with an anchor along all axes."""
+        return {node for node, axes in self.anchors.items() if len(axes) == len("xyz")}
+
+    @property
+    def _nodes_of_spheres(self) -> list[str]:
+        return [node for group in self.spheres.values() for node in group.nodes]
 
     @cached_property
     def sphere_of_node(self) -> dict[str, Sphere]:
-        """Sphere of each node of a strut: its own one, or by the node's first strut."""
+        """Sphere of each node with one: its own one, or by the node's first strut."""
         spheres: dict[str, Sphere] = {}
         for strut in reversed(self.all_struts):
             group = self.struts[strut.group]
@@ -368,7 +391,8 @@ class StructureFile(Section):
     def contact_nodes(self) -> tuple[str, ...]:
         """Names of the nodes that the ground can touch, in the order of `nodes`."""
         if self.contacts == "all":
-            return tuple(node for node in self.nodes if self.body_of_node[node] != WORLD)
+            moving = {node for body in self.bodies for node in body}
+            return tuple(node for node in self.nodes if node in moving)
         return tuple(node for node in self.nodes if node in self.contacts)
 
     def _held(self, node: str) -> str:
@@ -426,41 +450,65 @@ class StructureFile(Section):
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
+        self._check_names()
         self._check_pairs()
-        for node in self.masses:
-            self._check_moving(f"masses.{node}", node)
+        self._check_nodes()
         self._check_sizes()
+        self._check_inertia()
         self._check_places()
         self._check_bodies()
         self._check_elastic_struts()
         self._check_tensions()
         self._check_actuated()
         self._check_anchors()
-        for node in self.loads:
-            self._check_moving(f"loads.{node}", node)
-        if self.contacts != "all":
-            for place, node in enumerate(self.contacts):
-                self._check_moving(f"contacts[{place}]", node)
-        for name, group in self.spheres.items():
-            for place, node in enumerate(group.nodes):
-                self._check_moving(f"spheres.{name}.nodes[{place}]", node)
         if not self.contact_nodes:
             refuse("contacts", "found none, expected one node at least")
         check_one_per_body("offsets", self.offsets, self.body_count)
         return self
 
-    def _check_node(self, key: str, node: str) -> None:
-        if node not in self.nodes:
-            refuse(key, f"found unknown node '{node}'; {hint(node, self.nodes)}")
+    def _check_names(self) -> None:
+        """Refuses unknown nodes."""
+        ends = [(member.key, node) for member in self._all_members for node in member.nodes]
+        anchors = [(f"anchors.{node}", node) for node in self.anchors]
+        for key, node in (*ends, *anchors, *self._moving_nodes):
+            if node not in self.nodes:
+                refuse(key, f"found unknown node '{node}'; {hint(node, self.nodes)}")
 
-    def _check_moving(self, key: str, node: str) -> None:
-        self._check_node(key, node)
-        if self.body_of_node[node] == WORLD:
-            refuse(key, f"found the fixed node '{node}', expected one that can move")
+    @property
+    def _all_members(self) -> tuple[Member, ...]:
+        """Struts and cables, in the order of the file."""
+        return *self.all_struts, *_members("cables", self.cables)
+
+    @property
+    def _moving_nodes(self) -> Iterator[tuple[str, str]]:
+        """Keys and nodes that must be able to move."""
+        for node in self.masses:
+            yield f"masses.{node}", node
+        for name, group in self.spheres.items():
+            yield from ((f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes))
+        for node in self.loads:
+            yield f"loads.{node}", node
+        if self.contacts != "all":
+            yield from ((f"contacts[{i}]", node) for i, node in enumerate(self.contacts))
+
+    def _check_nodes(self) -> None:
+        """Refuses nodes that neither belong to a body nor are fixed, and bodies that nothing
+        holds."""
+        ends = {node: None for member in self._all_members for node in member.nodes}
+        for node in ends | self.anchors:
+            if node not in self.body_of_node:
+                expected = "a node of a strut, an anchor along xyz, a mass or a sphere"
+                refuse(f"nodes.{node}", f"is on no strut, expected {expected}")
+        for key, node in self._moving_nodes:
+            if self.body_of_node.get(node, WORLD) == WORLD:
+                what = "unused" if node in self.unused else "fixed"
+                refuse(key, f"found the {what} node '{node}', expected one that can move")
+        if not self.bodies:
+            refuse("nodes", "none can move, expected struts, masses or spheres")
+        for node in (node for node, *others in self.bodies if not others and node not in ends):
+            refuse(f"nodes.{node}", "is on no strut and no cable, expected a cable to it")
 
     def _check_anchors(self) -> None:
-        for node in self.anchors:
-            self._check_node(f"anchors.{node}", node)
         if not any(map(self._can_move, self.bodies)):
             refuse("anchors", "hold every body, expected one that can move")
 
@@ -474,15 +522,15 @@ class StructureFile(Section):
         return bool(np.linalg.matrix_rank(motions[held], tol=LEAST_DISTANCE) < ways)
 
     def _check_pairs(self) -> None:
-        keys: dict[frozenset[str], str] = {}
-        for member in (*self.all_struts, *_members("cables", self.cables)):
-            for node in member.nodes:
-                self._check_node(member.key, node)
+        keys: dict[object, str] = {}
+        for member in self._all_members:
             if self._length(member) == 0.0:
                 refuse(member.key, "has length 0, expected nodes at two places")
-            earlier = keys.setdefault(frozenset(member.nodes), member.key)
+            is_cable, nodes = member.key.startswith("cables."), frozenset(member.nodes)
+            earlier = keys.setdefault((member.group, nodes) if is_cable else nodes, member.key)
             if earlier != member.key:
-                refuse(member.key, f"found the nodes of {earlier}, expected each pair once")
+                expected = "each pair once" + is_cable * " in a group of cables"
+                refuse(member.key, f"found the nodes of {earlier}, expected {expected}")
 
     def _check_sizes(self) -> None:
         for node, place in self.nodes.items():
@@ -493,9 +541,28 @@ class StructureFile(Section):
             group, length = self.struts[strut.group], self._length(strut)
             check_strut(strut.key, length=length, diameter=group.diameter, density=group.density)
 
+    def _check_inertia(self) -> None:
+        """Refuses bodies of several nodes without struts or spheres that have mass, and others
+        without mass."""
+        mass = np.zeros(self.body_count)
+        for strut in self.all_struts:
+            group, body = self.struts[strut.group], self.body_of_node[strut.nodes[0]]
+            mass[body] += math.pi / 4 * group.diameter**2 * group.density * self._length(strut)
+        for node, sphere in self.sphere_of_node.items():
+            mass[self.body_of_node[node]] += math.pi / 6 * sphere.diameter**3 * sphere.density
+        for node, own in self.masses.items():
+            body = self.body_of_node[node]
+            mass[body] += own if len(self.bodies[body]) == 1 else 0.0
+        if mass.min() < LIGHTEST:
+            node = self.bodies[int(mass.argmin())][0]
+            without = "without point masses " * (node not in self.masses)
+            problem = f"is on a body whose mass {without}is {mass.min():.3g} kg"
+            refuse(f"nodes.{node}", f"{problem}, expected at least {LIGHTEST:g} kg")
+
     def _check_places(self) -> None:
         least = LEAST_DISTANCE * self.size
-        names, p_WN = list(self.nodes), np.array(list(self.nodes.values()))
+        names = list(self.body_of_node)
+        p_WN = np.array([self.nodes[node] for node in names])
         for i in range(1, len(names)):
             distances = np.linalg.norm(p_WN[:i] - p_WN[i], axis=1)
             if distances.min() < least:
@@ -503,14 +570,6 @@ class StructureFile(Section):
                 refuse(f"nodes.{names[i]}", f"{problem}, expected nodes {least:.3g} m apart")
 
     def _check_bodies(self) -> None:
-        for node, body in self.body_of_node.items():
-            if body == WORLD and len(self.anchors.get(node, "")) < len("xyz"):
-                expected = "a node of a strut, an anchor along xyz, or a mass"
-                refuse(f"nodes.{node}", f"is on no strut, expected {expected}")
-        ends = {node for cable in self.all_cables for node in cable.nodes}
-        for node in self.masses:
-            if self.bodies[self.body_of_node[node]] == (node,) and node not in ends:
-                refuse(f"masses.{node}", "is on no strut and no cable, expected a cable to it")
         for cable in self.all_cables:
             first, second = self._bodies_joined(cable)
             if first == second == WORLD:
@@ -520,8 +579,8 @@ class StructureFile(Section):
                 refuse(cable.key, f"{problem}, expected nodes of two bodies")
         # Anchored nodes are joined by the world.
         anchored = [Member("", "", pair) for pair in itertools.pairwise(self.anchors)]
-        components = _components((*self.all_struts, *self.all_cables, *anchored))
-        joined = [nodes for nodes in components if self.body_of_node[nodes[0]] != WORLD]
+        groups = components((*self.all_struts, *self.all_cables, *anchored))
+        joined = [nodes for nodes in groups if self.body_of_node[nodes[0]] != WORLD]
         if len(joined) > 1:
             one, other = (self.body_names[self.body_of_node[nodes[0]]] for nodes in joined[:2])
             problem = f"no cables lead from the body '{other}' to '{one}'"
@@ -569,7 +628,7 @@ def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterato
             yield Member(f"{key}.{name}.pairs[{place}]", name, (first, second))
 
 
-def _components(members: Iterable[Member]) -> tuple[tuple[str, ...], ...]:
+def components(members: Iterable[Member]) -> tuple[tuple[str, ...], ...]:
     """Groups of nodes connected by members, in the order of the members."""
     first_node: dict[str, str] = {}
     for member in members:

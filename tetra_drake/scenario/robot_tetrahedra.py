@@ -88,7 +88,7 @@ def check_strut(key: str, *, length: float, diameter: float, density: float) -> 
         thick = f"is {diameter:.3g} m thick and {length:.3g} m long"
         refuse(key, f"{thick}, expected a diameter of at least {THINNEST:g} of the length")
     mass = 0.25 * math.pi * diameter**2 * length * density
-    if mass < LIGHTEST:
+    if density and mass < LIGHTEST:
         refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from pathlib import Path
 from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
-from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
+from tetra_drake.scenario.ntrt import ntrt_tree
+from tetra_drake.scenario.ntrt_assembly import MOST_BYTES
+from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.refusals import TAG, described, no_such
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.section import Tree, keys_of
@@ -16,6 +19,7 @@ from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_
 from tetra_drake.scenario.units import given_quantity
 from tetra_drake.scenario.yaml_text import read_mapping
 
+_LOG = logging.getLogger("tetra_drake")
 _KIND = StructureFile.tag
 
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
@@ -35,7 +39,7 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
         problem = no_such("structure file", str(name_or_file), shipped_structures())
         raise InputError(name_or_file, "", problem)
     content = _tree_of_file(file, unit, source=file, key="unit")
-    return StructureFile.from_tree(content | ({"unit": unit} if unit else {}), file)
+    return _structure(content | ({"unit": unit} if unit else {}), file)
 
 
 def names_scenario(name_or_file: str | Path) -> bool:
@@ -77,8 +81,17 @@ def with_structure(tree: Tree, source: object) -> Tree:
         raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
-    StructureFile.from_tree(content, file)
+    _structure(content, file)
     return tree | {"robot": {TAG: _KIND} | merged(content, changes, "robot")}
+
+
+def _structure(content: Any, file: Path) -> StructureFile:
+    """The structure of a file's content. Nodes that are left out are noted in the log."""
+    structure = StructureFile.from_tree(content, file)
+    if structure.unused:
+        names = ", ".join(structure.unused)
+        _LOG.warning("%s: nodes that nothing uses are left out: %s", file, names)
+    return structure
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:

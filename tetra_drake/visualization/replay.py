@@ -32,6 +32,7 @@ from tetra_drake.visualization.scene import (
     cable_paths,
     cable_radii,
     drawn_radii,
+    least_drawn_radius,
     node_colours,
     node_paths,
     radius_per_newton,
@@ -109,7 +110,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     structure = robot.structure
     bodies, contacts = structure.bodies, structure.contacts
     paths = node_paths(structure)
-    strut_radius, node_radius = drawn_radii(structure)
+    _, node_radius = drawn_radii(structure)
     tension, force = frames["tension"].values, ground_forces(robot, frames)
     greatest = np.percentile(tension, _USUAL) if tension.size else 0.0
     per_newton = radius_per_newton(structure, greatest)
@@ -145,7 +146,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "contacts": contacts.tolist(),
         "colours": COLOURS,
         "anchored": bool(structure.held.any()),
-        "strut": float(strut_radius.min()),
+        "strut": least_drawn_radius(structure),
         "length": {"size": units.length, "name": units.length_name},
         "dark": units.squares * units.square,
         "poses": _steps(poses),

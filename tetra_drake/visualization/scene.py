@@ -134,22 +134,26 @@ def cable_paths(structure: Structure) -> list[str]:
 def drawn_radii(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
     """Drawn radii of struts (struts,) and nodes (nodes,), in m. A node is at least 1.8 times as
     thick as the thinnest strut."""
-    ends = structure.p_BN[structure.struts]
-    least = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() / SLENDERNESS
-    strut_radius = structure.strut_radius.clip(min=least)
-    return strut_radius, structure.node_radius.clip(min=1.8 * strut_radius.min())
+    least = least_drawn_radius(structure)
+    return structure.strut_radius.clip(min=least), structure.node_radius.clip(min=1.8 * least)
+
+
+def least_drawn_radius(structure: Structure) -> float:
+    """Drawn radius (m) of the thinnest strut."""
+    longest = structure.strut_table.length.max(initial=0.0)
+    return max(structure.least_radius, float(longest) / SLENDERNESS)
 
 
 def radius_per_newton(structure: Structure, tension: float) -> float:
     """Scale from tension to the drawn radius of a cable. The radius for `tension` (N) is
     THICKEST."""
-    return float(THICKEST * drawn_radii(structure)[0].min() / max(tension, 1e-9))
+    return THICKEST * least_drawn_radius(structure) / max(tension, 1e-9)
 
 
 def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float) -> np.ndarray:
     """Drawn radii of cables (frames, cables) in m: proportional to tension, between a least and a
     greatest radius."""
-    strut = drawn_radii(structure)[0].min()
+    strut = least_drawn_radius(structure)
     radii: np.ndarray = (per_newton * frames["tension"].values).clip(
         min=THINNEST * strut, max=1.3 * THICKEST * strut
     )

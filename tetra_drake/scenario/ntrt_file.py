@@ -1,0 +1,183 @@
+"""Sections of the YAML files of NTRT, the NASA Tensegrity Robotics Toolkit."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import pydantic
+from pydantic import Field
+
+from tetra_drake.scenario.refusals import described, hint, refuse
+from tetra_drake.scenario.robot_structure import Pair
+from tetra_drake.scenario.section import Section
+from tetra_drake.scenario.units import LARGEST
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Point = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST)]
+
+
+class Rotation(Section):
+    """A rotation of a substructure about a point, the centre of its nodes if not given."""
+
+    axis: Point
+    """A vector of any length but 0."""
+    angle: Number
+    """Angle in degrees."""
+    reference: Point | None = None
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Rotation:
+        if not any(self.axis):
+            refuse("axis", "found a vector of length 0, expected a direction")
+        return self
+
+
+class Substructure(Section):
+    """File that is one part of a structure, or several equal parts (a name such as a/b/c).
+
+    Without a path, the entry turns, scales and moves a part that another entry has, also a nested
+    one.
+    """
+
+    path: str | None = None
+    rotation: Rotation | None = None
+    scale: Positive = 1.0
+    offset: Point = Field(default=[0.0, 0.0, 0.0])
+    """Displacement from each of several equal parts to the next."""
+    translation: Point = Field(default=[0.0, 0.0, 0.0])
+
+
+class Parameters(Section):
+    """Parameters of a builder, with NTRT's defaults. Those of type Any have no effect: the scenario
+    has its own friction, ground and actuators."""
+
+    @property
+    def ignored(self) -> list[str]:
+        """Names of the given parameters that have no effect."""
+        fields = type(self).model_fields.items()
+        return [name for name, one in fields if one.annotation is Any and name in self.given]
+
+    @property
+    def given(self) -> set[str]:
+        """Names of the given parameters."""
+        return self.model_fields_set
+
+
+class RigidParameters(Parameters):
+    """Parameters of a rigid part."""
+
+    density: NotNegative = 1.0
+    friction: Any = None
+    roll_friction: Any = None
+    restitution: Any = None
+
+
+class RoundParameters(RigidParameters):
+    """Parameters of a rod or a sphere."""
+
+    radius: Positive = 0.5
+
+
+class BoxParameters(RigidParameters):
+    """Parameters of a box along the line between two nodes."""
+
+    width: Positive = 1.0
+    """Half of the width, as NTRT takes it."""
+    height: Positive = 1.0
+    """Half of the height."""
+
+    @property
+    def radius(self) -> float:
+        """Radius of the rod with the same cross-section area."""
+        return math.sqrt(4.0 * self.width * self.height / math.pi)
+
+
+class CableParameters(Parameters):
+    """Parameters of a cable."""
+
+    stiffness: Positive = 1000.0
+    damping: NotNegative = 10.0
+    pretension: NotNegative = 0.0
+    rotation: Any = None
+    history: Any = None
+    max_tension: Any = None
+    target_velocity: Any = None
+    min_actual_length: Any = None
+    min_rest_length: Any = None
+
+
+class BasicCableParameters(CableParameters):
+    """Parameters of a cable whose length is set."""
+
+    moveCablePointAToEdge: Any = None
+    moveCablePointBToEdge: Any = None
+
+
+class KinematicCableParameters(CableParameters):
+    """Parameters of a cable with a motor."""
+
+    radius: Positive = 1.0
+    """Radius of the spool, which is not used."""
+    motor_friction: Any = None
+    motor_inertia: Any = None
+    back_drivable: Any = None
+
+
+CLASSES: dict[str, type[Parameters]] = {
+    "tgRodInfo": RoundParameters,
+    "tgBoxInfo": BoxParameters,
+    "tgSphereInfo": RoundParameters,
+    "tgBasicActuatorInfo": BasicCableParameters,
+    "tgBasicContactCableInfo": BasicCableParameters,
+    "tgKinematicActuatorInfo": KinematicCableParameters,
+    "tgKinematicContactCableInfo": KinematicCableParameters,
+}
+"""Parameters by the class of their builder."""
+
+
+class Builder(Section):
+    """Class and parameters for the pairs with some tags; of spheres, for the nodes with them."""
+
+    made_as: str = Field(alias="class")
+    parameters: Any = Field(default=None, validate_default=True)
+
+    @pydantic.field_validator("made_as")
+    @classmethod
+    def _check_class(cls, name: str) -> str:
+        if name not in CLASSES:
+            refuse("", f"found {described(name)}; {hint(name, CLASSES)}")
+        return name
+
+    @pydantic.field_validator("parameters")
+    @classmethod
+    def _read_parameters(cls, given: Any, info: pydantic.ValidationInfo) -> Any:
+        of_class = CLASSES.get(info.data.get("made_as", ""))
+        return of_class.model_validate({} if given is None else given) if of_class else given
+
+    @property
+    def is_sphere(self) -> bool:
+        """True for the builder of a sphere at a node."""
+        return self.made_as == "tgSphereInfo"
+
+    @property
+    def is_rigid(self) -> bool:
+        """True for the builder of a rod or a box between two nodes."""
+        return self.made_as in ("tgRodInfo", "tgBoxInfo")
+
+
+class NtrtFile(Section):
+    """Content of a file, in NTRT's axes and unit of length."""
+
+    nodes: dict[str, Point] = Field(default={})
+    """Nodes. A key is the tags of its node, separated by blanks."""
+    pair_groups: dict[str, list[Pair]] = Field(default={})
+    """Lists of pairs of nodes. A key is the tags of its pairs, separated by blanks."""
+    builders: dict[str, Builder] = Field(default={})
+    """Builders. A key is the tags that a pair or a node must have, separated by blanks."""
+    substructures: dict[str, Substructure] = Field(default={})
+    bond_groups: dict[str, dict[str, list[Pair]]] = Field(default={})
+    """Lists of pairs of nodes, by their tags and the bond of two parts (outer key and inner key, in
+    either order)."""
