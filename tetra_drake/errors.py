@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import re
 from typing import Any, Self
 
@@ -52,6 +53,8 @@ def _cut(text: str, length: int) -> str:
 class SimulationFailure(RuntimeError):
     """A simulation that failed at `time` (s) for a `reason`."""
 
+    fitness = -math.inf
+    """Fitness of what failed, for optimisers."""
     wall_time = 0.0
     """Wall time of the simulation in s; 0 if the engine does not measure it."""
     scenario: Any = None
