@@ -111,8 +111,10 @@ class Gait:
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """Parameter space of a scenario's gaits, for a search of your own. A vector has the weights, the
-    feedback gains (if the scenario has feedback), tau_A and tau_B (s).
+    """Parameter space of a scenario's gaits, for a search of your own.
+
+    A vector has the weights, the feedback gains (if the scenario has feedback), tau_A and tau_B
+    (s).
 
     >>> space = td.ParameterSpace.of("thesis")
     >>> vector = space.repair(0.5 * (space.low + space.high))
