@@ -14,9 +14,10 @@ Functions, and the main attributes of their results:
     load_scenario       with_changes({key: value}), to_yaml()
     load_gait           a gait from a file
     seeded_gait         a random gait
-    simulate            metrics, recorded (the trajectory, an xarray.Dataset), show(),
+    simulate            metrics, trajectory (an xarray.Dataset, with record=True), show(),
                         save_replay(file)
     simulate_many       simulates many gaits on all cores
+    ParameterSpace      the vectors of a scenario's gaits, for an optimiser of your own
     sweep               metrics of gaits on a grid of changed scenarios, an xarray.Dataset
     load_result         the result in a folder of the command `tetra-drake simulate`
     evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (pandas tables)
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from tetra_drake.experiment import fit as fit
     from tetra_drake.prototype.command_file import load_command as load_command
     from tetra_drake.report.result_folder import load_result as load_result
+    from tetra_drake.robot.gait import ParameterSpace as ParameterSpace
     from tetra_drake.robot.gait import load_gait as load_gait
     from tetra_drake.robot.gait import seeded_gait as seeded_gait
     from tetra_drake.scenario.load import load_scenario as load_scenario
@@ -68,6 +70,7 @@ __version__ = "0.4.0"
 _HOMES = {
     "Simulation": "tetra_drake.engines.simulation",
     "MotionCapture": "tetra_drake.analysis.measurements",
+    "ParameterSpace": "tetra_drake.robot.gait",
     "Rest": "tetra_drake.analysis.measurements",
     "compare": "tetra_drake.analysis.comparison",
     "evolve": "tetra_drake.experiment",

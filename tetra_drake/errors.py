@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import numbers
 import re
 from typing import Any, Self
@@ -63,6 +64,8 @@ def check_whole(
 class SimulationFailure(RuntimeError):
     """A simulation that failed at `time` (s) for a `reason`."""
 
+    fitness = -math.inf
+    """Fitness of what failed, for optimisers."""
     wall_time = 0.0
     """Wall time of the simulation in s; 0 if the engine does not measure it."""
     scenario: Any = None

@@ -25,5 +25,5 @@ def result_of(
         integrator=unknown,
         engine="none",
         path=unknown,
-        recorded=trajectory,
+        recorded=trajectory.assign_attrs(title=name),
     )

@@ -289,15 +289,17 @@ def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized
 
 def forces_of_motion(
     robot: Model, states: np.ndarray, modes: np.ndarray, signals: np.ndarray, drives: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Tables `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces`
-    (k, contacts, GROUND_FORCE_COLUMNS) of a motion with k samples; see forces_along()."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Tables `nodes` (k, nodes, NODE_COLUMNS), without the rows of feet, `cable_forces`
+    (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS) of a
+    motion with k samples; see forces_along()."""
     forces, samples = Forces.of(robot), len(states)
+    nodes = np.empty((samples, len(robot.p_BN), kinematics.NODE_COLUMNS))
     cable_forces = np.empty((samples, *forces.cable_forces.shape))
     ground_forces = np.empty((samples, *forces.ground_forces.shape))
     given = states, modes, signals, drives
-    forces_along(Packed((robot, forces)), *given, cable_forces, ground_forces)
-    return cable_forces, ground_forces
+    forces_along(Packed((robot, forces)), *given, nodes, cable_forces, ground_forces)
+    return nodes, cable_forces, ground_forces
 
 
 @compiled
@@ -307,11 +309,12 @@ def forces_along(
     modes: Table,
     signals: Table,
     drives: Table,
+    nodes: Table,
     cable_forces: Table,
     ground_forces: Table,
 ) -> None:
-    """Writes the forces of a motion with k samples: `cable_forces` (k, cables, CABLE_FORCE_COLUMNS)
-    and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
+    """Writes the tables `nodes`, `cable_forces` and `ground_forces` of a motion with k samples; see
+    forces_of_motion().
 
     The motion has states (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m) in N,
     and drives (k, drives).
@@ -323,9 +326,14 @@ def forces_along(
         for i in range(drives.shape[1]):
             forces.drives[i, actuator.DRIVE] = drives[k, i]
         compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
-        for i in range(cable_forces.shape[1]):
-            for c in range(cable_forces.shape[2]):
-                cable_forces[k, i, c] = forces.cable_forces[i, c]
-        for i in range(ground_forces.shape[1]):
-            for c in range(ground_forces.shape[2]):
-                ground_forces[k, i, c] = forces.ground_forces[i, c]
+        copy_rows(forces.nodes, nodes[k])
+        copy_rows(forces.cable_forces, cable_forces[k])
+        copy_rows(forces.ground_forces, ground_forces[k])
+
+
+@inlined
+def copy_rows(table: Table, rows: Table) -> None:
+    """Writes the first rows of a table."""
+    for i in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            rows[i, c] = table[i, c]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import html
 import json
 import tempfile
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tetra_drake import __version__
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.formatting import heading_html
@@ -23,6 +25,7 @@ from tetra_drake.robot.path import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.common_sections import SimulationSection
+from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.metrics import UNITS, Metrics
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Section
@@ -69,7 +72,7 @@ class SimulationResult:
     path: CentrePath = field(repr=False, compare=False)
     """Path of the robot's centre from start to end, in steps of robot.path.PERIOD."""
     recorded: xarray.Dataset | None = field(default=None, repr=False)
-    """Trajectory (see results.trajectory.make_dataset); None if it was not recorded."""
+    """Data of the trajectory (see results.trajectory.make_dataset); None if it was not recorded."""
 
     def __str__(self) -> str:
         kept = "not recorded" if self.recorded is None else "recorded"
@@ -86,13 +89,23 @@ class SimulationResult:
         about = f"scenario {self.scenario.name}, engine {self.engine}, fitness {self.fitness:.4g}"
         return heading_html(f"{self.title}\n{about}") + self.metrics._repr_html_()
 
-    @property
+    @functools.cached_property
     def trajectory(self) -> xarray.Dataset:
-        """The trajectory. Raises InputError if it was not recorded."""
+        """The trajectory. Its attributes say where it comes from: title, source, scenario (YAML)
+        and, unless a command was played, gait (JSON). Raises InputError if it was not recorded."""
         if self.recorded is None:
             problem = "was not recorded; simulate with record=True"
             raise InputError(f"result of {self.name}", "trajectory", problem)
-        return self.recorded
+        if self.recorded.attrs:  # of a file
+            return self.recorded
+        gait = {"gait": json.dumps(self.gait.to_json(self.scenario))} if self.gait else {}
+        return self.recorded.assign_attrs(
+            Conventions="CF-1.11",
+            title=self.title,
+            source=f"tetra_drake {__version__}, engine {self.engine}",
+            scenario=dump_scenario(self.scenario),
+            **gait,
+        )
 
     @property
     def title(self) -> str:

@@ -110,8 +110,16 @@ class Gait:
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """Parameter space of a scenario's gaits. A vector has the weights, the feedback gains (if the
-    scenario has feedback), tau_A and tau_B (s)."""
+    """Parameter space of a scenario's gaits, for a search of your own.
+
+    A vector has the weights, the feedback gains (if the scenario has feedback), tau_A and tau_B
+    (s).
+
+    >>> space = td.ParameterSpace.of("thesis")
+    >>> vector = space.repair(0.5 * (space.low + space.high))
+    >>> space.gait(vector, name="middle")
+    <Gait middle>
+    """
 
     names: tuple[str, ...]
     """Names such as "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
@@ -132,11 +140,12 @@ class ParameterSpace:
     """Steering of all gaits; see Gait.turn."""
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Self:
-        """The parameter space of a scenario.
+    def of(cls, scenario: GivenScenario) -> Self:
+        """The parameter space of a scenario, given by its name or file, or by a run.
 
         A parameter with equal bounds is fixed. The bounds of tau_B are twice the bounds of tau_A.
         """
+        scenario = given_scenario(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
         images = np.arange(len(weights.images))
         if bounds.mirrored:
@@ -162,8 +171,17 @@ class ParameterSpace:
             turn=bounds.turn,
         )
 
-    def gait(self, vector: Vector, *, name: str) -> Gait:
-        """The gait with the parameters of a vector."""
+    def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
+        """The gait with the parameters of a vector. Raises InputError for a vector of another size,
+        a number that is not finite, a weight below 0, or a time constant that is not above 0."""
+        vector = self._numbers(vector)
+        wrong = ~np.isfinite(vector) | (vector < 0.0) & np.isfinite(self.floors)
+        wrong[TAU_A:] |= vector[TAU_A:] == 0.0
+        if wrong.any():
+            first = int(wrong.argmax())
+            expected = "a finite number, for a weight 0 or more, for a time constant above 0"
+            problem = f"found {vector[first]}, expected {expected}"
+            raise InputError("ParameterSpace", self.names[first], problem)
         first_gain = len(self.names) - 2 - len(self.pathways)
         gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
         return Gait(
@@ -177,7 +195,11 @@ class ParameterSpace:
         )
 
     def vector(self, gait: Gait) -> Vector:
-        """The vector of a gait. If weights are mirrored, the first of each pair is used."""
+        """The vector of a gait. If weights are mirrored, the first of each pair is used. Raises
+        InputError if the gait has another number of weights."""
+        if len(gait.weights) != len(self.weights):
+            problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
+            raise InputError("ParameterSpace", f"gait {gait.name}", problem)
         _, first = np.unique(self.weights, return_index=True)
         weights = np.array(gait.weights)[first]
         gains = [getattr(gait.gains, name) for name in self.pathways]
@@ -188,12 +210,24 @@ class ParameterSpace:
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
-    def repair(self, vector: Vector) -> Vector:
-        """A copy of the vector with tau_B = 2 tau_A, unless tau_B is independent."""
-        repaired = vector.copy()
+    def repair(self, vector: npt.ArrayLike) -> Vector:
+        """A copy of the vector with tau_B = 2 tau_A, unless tau_B is independent. Raises InputError
+        for a vector of another size."""
+        repaired = self._numbers(vector)
         if self.couples_tau_b:
-            repaired[TAU_B] = TAU_B_PER_TAU_A * vector[TAU_A]
+            repaired[TAU_B] = TAU_B_PER_TAU_A * repaired[TAU_A]
         return repaired
+
+    def _numbers(self, vector: npt.ArrayLike) -> Vector:
+        """A copy of a vector. Raises InputError unless it has a number for each name."""
+        try:
+            given = np.array(vector)
+        except ValueError:  # rows of different lengths
+            given = np.array(None)
+        if given.shape != self.low.shape or given.dtype.kind not in "iuf":
+            problem = f"found {vector!r:.60}, expected {len(self.names)} numbers"
+            raise InputError("ParameterSpace", "vector", problem)
+        return given.astype(np.float64)
 
 
 WALKING_SEED = 80

@@ -124,7 +124,7 @@ def readings_at(
         drives: states of the actuators (drives,).
         ground_forces: table `ground_forces` of an engine with its own law of contact.
     """
-    cables, ground = forces_of_motion(
+    _, cables, ground = forces_of_motion(
         robot.model, state[np.newaxis], modes[np.newaxis], signals[np.newaxis], drives[np.newaxis]
     )
     return Readings.of(
