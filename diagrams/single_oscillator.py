@@ -163,7 +163,8 @@ def main(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tau", type=quantity("s", "0.2 s"), default=TAU_A, help="such as '0.2 s'")
+    tau = quantity("s", "0.2 s", least="1 ms", most="100 s")
+    parser.add_argument("--tau", type=tau, default=TAU_A, help="such as '0.2 s'")
     weights, ratios = "weights of mutual inhibition", "ratios of the two time constants"
     parser.add_argument("--weights", type=float, nargs="+", default=WEIGHTS, help=weights)
     parser.add_argument("--ratios", type=float, nargs="+", default=RATIOS, help=ratios)

@@ -127,7 +127,8 @@ def main(
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    speed, slope = quantity("m/s", "10 in/s"), quantity("rad", "5 deg")
+    speed = quantity("m/s", "10 in/s", least="-10 m/s", most="10 m/s")
+    slope = quantity("rad", "5 deg", least="-45 deg", most="45 deg")
     parser.add_argument("--speed", type=speed, default=INITIAL_SPEED, help="such as '10 in/s'")
     parser.add_argument("--slope", type=slope, default=0.0, help="of the ground, such as '5 deg'")
     law = "friction of a scenario, such as '!Coulomb' (default: %(default)s)"

@@ -7,7 +7,6 @@ import itertools
 import os
 import shlex
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,9 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tetra_drake import __version__
 from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import check_file, check_folder, write_whole
+from tetra_drake.files import check_folder, file_names, write_whole
 from tetra_drake.interrupts import heeding_interrupts
-from tetra_drake.options import BAD_INPUT, Command, Option, integer, positive, quantity, size
+from tetra_drake.options import BAD_INPUT, Command, Option, integer, number, quantity, size
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.units import INCH, SYSTEMS, shown_in
 
@@ -101,11 +100,22 @@ Folder = Annotated[Path, Option(metavar="DIR", type=Path)]
 File = Annotated[Path, Option(metavar="FILE", type=Path)]
 Count = Annotated[int, Option(metavar="N", type=integer(1))]
 Seed = Annotated[int, Option(metavar="N", type=integer(0))]
-Rate = Annotated[float, Option(metavar="RATE", type=quantity("Hz", "100 Hz"))]
-Length = Annotated[float, Option(metavar="LENGTH", type=quantity("m", "3.4 in"))]
+Rate = Annotated[
+    float,
+    Option(metavar="RATE", type=quantity("Hz", "100 Hz", least="0.001 Hz", most="1 MHz")),
+]
+Reach = Annotated[
+    float,
+    Option(metavar="LENGTH", type=quantity("m", "14.34 in", least="0.001 mm", most="1000 km")),
+]
+Width = Annotated[
+    float, Option(metavar="LENGTH", type=quantity("m", "3.4 in", least="2 in", most="40 in"))
+]
 Unit = Annotated[str, Option(metavar="UNIT")]
 Size = Annotated[tuple[int, int], Option(metavar="WxH", type=size)]
-Number = Annotated[float, Option(metavar="X", type=positive)]
+FontSize = Annotated[float, Option(metavar="X", type=number(2, 40))]
+FrameRate = Annotated[float, Option(metavar="X", type=number(0.01, 240))]
+Speed = Annotated[float, Option(metavar="X", type=number(0.001, 1000))]
 View = Annotated[str, Option(choices=("free", "side", "front", "top"))]
 Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
 Labels = Annotated[list[str], Option(metavar="NAME", nargs="+")]
@@ -332,9 +342,9 @@ def _video(
     *,
     scenario: ScenarioName | None = None,
     size: Size = (1920, 1080),
-    fps: Number = 30.0,
+    fps: FrameRate = 30.0,
     view: View = "free",
-    speed: Number = 1.0,
+    speed: Speed = 1.0,
     out: File,
 ) -> None:
     """Write a video of a gait, for talks.
@@ -354,23 +364,21 @@ def _video(
 
     Example: tetra-drake video runs/champion --out talk.mp4 --view side
     """
-    from tetra_drake.report.replay_page import write_replay
+    from tetra_drake.report.replay_page import load_or_simulate
     from tetra_drake.visualization.video import check_video, make_video
 
-    check_video(out)
-    check_file(out)
-    with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder, "replay.html")
-        title = write_replay(source, page, scenario=scenario, warn=_warn)
-        make_video(page, out, size=size, fps=fps, view=view, speed=speed, say=_say)
-    print(f"{title}\nwrote {out}")
+    check_video(out, fps=fps)
+    result = load_or_simulate(source, scenario=scenario, warn=_warn)
+    page = result.replay_page()
+    make_video(page, out, size=size, fps=fps, view=view, speed=speed, say=_say)
+    print(f"{result.title}\nwrote {out}")
 
 
 def _figures(
     source: RunOrResult,
     *,
-    width: Length = 7.0 * INCH,
-    font: Number = 9.0,
+    width: Width = 7.0 * INCH,
+    font: FontSize = 9.0,
     title: bool = True,
     pdf: bool = False,
     out: Folder | None = None,
@@ -443,9 +451,9 @@ def _compare(
     *,
     labels: Labels | None = None,
     scenarios: bool = False,
-    reach: Length | None = None,
-    width: Length = 7.0 * INCH,
-    font: Number = 9.0,
+    reach: Reach | None = None,
+    width: Width = 7.0 * INCH,
+    font: FontSize = 9.0,
     title: bool = True,
     pdf: bool = False,
     out: Folder | None = None,
@@ -474,20 +482,21 @@ def _compare(
     from tetra_drake.analysis.comparison import compare, compare_scenarios, improvement_over
     from tetra_drake.report.analysis_text import comparison_text, improvement_text
 
+    printed = _print(width, font, title=title, pdf=pdf)
     if out:
         check_folder(out)
     if scenarios:
         by_scenario = compare_scenarios(runs, reach=reach, labels=labels)
     else:
         by_scenario = {"": compare(runs, reach=reach, labels=labels)}
+    folders = file_names(by_scenario) if scenarios else {"": ""}
     for name, compared in by_scenario.items():
         print(f"\nScenario {name}:\n" if name else "", comparison_text(compared), sep="")
         if out:
             from tetra_drake.figures.comparison import save_comparison
 
-            printed = _print(width, font, title=title, pdf=pdf)
-            written = save_comparison(compared, out / name, printed)
-            print(f"wrote {', '.join(written)} to {out / name}/")
+            written = save_comparison(compared, out / folders[name], printed)
+            print(f"wrote {', '.join(written)} to {out / folders[name]}/")
     if len(by_scenario) > 1:
         means = improvement_over(compared.trials for compared in by_scenario.values())
         print(f"\nMean over {len(by_scenario)} scenarios:\n\n{improvement_text(means)}")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import itertools
 import json
 import math
 import os
 import re
 import stat
 import tempfile
-from collections.abc import Iterator
+import unicodedata
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,9 @@ from tetra_drake.errors import InputError
 
 MOST_BYTES = 64 * 2**20
 """Default limit for the size of a file that is read into memory."""
+
+_LONGEST_NAME = 60
+"""Characters of a name of file_names(). File systems take 255 bytes."""
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Error numbers of a full or broken disk."""
@@ -80,6 +85,21 @@ def given_path(path: str | Path, source: str, what: str) -> Path:
     if not isinstance(path, (str, Path)):
         raise InputError(source, what, f"found {path!r:.60}, expected a path")
     return Path(path)
+
+
+def file_names(names: Iterable[str]) -> dict[str, str]:
+    """Names for files or folders, by names that may be any texts, such as those from a file. They
+    are no paths, and different even where upper and lower case are the same."""
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in names:
+        plain = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFKC", name))[:_LONGEST_NAME]
+        plain = plain.strip("._-") or "unnamed"
+        numbered = (f"{plain}_{number}" for number in itertools.count(2))
+        free = (one for one in itertools.chain([plain], numbered) if one.casefold() not in taken)
+        found[name] = next(free)
+        taken.add(found[name].casefold())
+    return found
 
 
 def make_folder(folder: Path, *, source: Path | None = None) -> None:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import inspect
-import math
 import re
 import typing
 from collections.abc import Callable, Sequence
@@ -115,24 +114,34 @@ def integer(least: int) -> Callable[[str], int]:
 
 def size(text: str) -> tuple[int, int]:
     """Width and height in pixels from a text, such as "1920x1080". Both are even."""
-    found = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text)
-    if found is None or int(found[1]) % 2 or int(found[2]) % 2:
-        problem = f"found '{text}', expected two even numbers, such as 1920x1080"
-        raise argparse.ArgumentTypeError(problem)
-    return int(found[1]), int(found[2])
+    found = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text, re.ASCII)
+    width, height = map(int, found.groups()) if found else (0, 0)
+    least, most = _PIXELS
+    if width % 2 or height % 2 or not (least <= width <= most and least <= height <= most):
+        expected = f"expected two even numbers of {least} to {most}, such as 1920x1080"
+        raise argparse.ArgumentTypeError(f"found '{text}', {expected}")
+    return width, height
 
 
-def positive(text: str) -> float:
-    """A positive number."""
-    with contextlib.suppress(ValueError):
-        if 0.0 < float(text) < math.inf:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"found '{text}', expected a number above 0")
+_PIXELS = 64, 4096
+"""Limits of the size of a picture."""
 
 
-def quantity(unit: str, example: str) -> Callable[[str], float]:
-    """Function that reads a quantity as a number in an SI unit. Errors name the `example`, or its
-    unit."""
+def number(least: float, most: float) -> Callable[[str], float]:
+    """Function that reads a number between limits."""
+
+    def read(text: str) -> float:
+        with contextlib.suppress(ValueError):
+            if least <= float(text) <= most:
+                return float(text)
+        raise argparse.ArgumentTypeError(f"found '{text}', expected a number, {least} to {most}")
+
+    return read
+
+
+def quantity(unit: str, example: str, *, least: str, most: str) -> Callable[[str], float]:
+    """Function that reads a quantity between limits as a number in an SI unit. Errors name the
+    `example`, or its unit."""
 
     def read(text: str) -> float:
         from tetra_drake.scenario.units import quantity_to_si
@@ -141,8 +150,11 @@ def quantity(unit: str, example: str) -> Callable[[str], float]:
             advice = f"did you mean '{text} {example.split()[1]}'?"
             raise argparse.ArgumentTypeError(f"found '{text}' without a unit; {advice}")
         try:
-            return quantity_to_si(text, unit)
+            found = quantity_to_si(text, unit)
         except ValueError as error:
             raise argparse.ArgumentTypeError(f"{error}, such as '{example}'") from error
+        if not quantity_to_si(least, unit) <= found <= quantity_to_si(most, unit):
+            raise argparse.ArgumentTypeError(f"found '{text}', expected {least} to {most}")
+        return found
 
     return read

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat
+from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
@@ -21,6 +21,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from tetra_drake.errors import SimulationFailure
 from tetra_drake.physics.cable import CableLaw
 from tetra_drake.physics.contact import NormalForce
 from tetra_drake.robot.gait import seeded_gait
@@ -36,6 +37,7 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 MASS, LENGTH, GRAVITY = 0.5, 0.4, 9.81  # of a uniform rod on a hinge at the origin
 LAW = CableLaw(stiffness=60.0, damping=8.0, free_length=0.0)
+WINCH = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
 LEFT, RIGHT = np.array([-0.2, 0.0, 0.5]), np.array([0.6, 0.0, 0.3])  # anchors of two tendons
 
 
@@ -147,14 +149,12 @@ def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
         builder.Connect(signal.get_output_port(), network.GetInputPort("signals"))
         return float(state_at(builder.Build(), 4.0)[0])
 
-    winch = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
-    assert angle(winch) == pytest.approx(angle(None), abs=1e-6)
+    assert angle(WINCH) == pytest.approx(angle(None), abs=1e-6)
 
 
 @pytest.mark.parametrize(
     ("constants", "key", "fact"),
     [
-        ({}, "actuated.pull", "'right'"),
         ({"stiffness": -1.0}, "cables.left.stiffness", "-1.0"),
         ({"free_length": math.nan}, "cables.left.free_length", "nan"),
         ({"stiffness": "60 N/m"}, "cables.left.stiffness", "60 N/m"),
@@ -163,26 +163,85 @@ def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
 def test_cables_that_cannot_be_are_refused(constants, key, fact, refused):
     builder, plant, _, cables = rod_with_tendons(**constants)
     with refused("AddCables", key, fact):
-        AddCables(builder, plant, cables=cables, actuated={"pull": ["rigth"]})
+        AddCables(builder, plant, cables=cables)
 
 
-def test_two_cables_of_one_name_are_refused(refused):
+@pytest.mark.parametrize(
+    ("given", "key", "fact"),
+    [
+        ({"actuated": {"pull": ["rigth"]}}, "actuated.pull", "'right'"),
+        ({"actuated": {"a": ["left"], "b": ["left"]}}, "actuated.b", "'left'"),
+        ({"actuation": 3}, "actuation", "3"),
+        ({"drives": [0.1]}, "drives", "0.1"),
+        ({"actuated": {"a": ["left"]}, "actuation": WINCH, "drives": [1, 2]}, "drives", "1"),
+        ({"scene_graph": SceneGraph()}, "scene_graph", "builder"),
+        ({"name": "plant"}, "name", "plant"),
+        ({"plant": MultibodyPlant(0.0)}, "plant", "builder"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_refused(given, key, fact, refused):
     builder, plant, _, cables = rod_with_tendons()
-    with refused("AddCables", "cables.left", "twice"):
-        AddCables(builder, plant, cables=[*cables, cables[0]])
+    with refused("AddCables", key, fact):
+        AddCables(builder, **{"plant": plant, "cables": cables} | given)
+
+
+def test_cables_between_wrong_places_are_refused_by_name(refused):
+    builder, plant, tip, (left, _) = rod_with_tendons()
+    _, other, far, _ = rod_with_tendons()
+    for key, fact, cables in (
+        ("cables.left", "twice", [left, left]),
+        ("cables.a", "length of 0 m", [Cable("a", tip, tip, LAW)]),
+        ("cables.a.frame_a", "'tip' of another plant", [Cable("a", far, tip, LAW)]),
+        (
+            "cables.a.frame_b",
+            "'world' of another plant",
+            [Cable("a", tip, other.world_frame(), LAW)],
+        ),
+    ):
+        with refused("AddCables", key, fact):
+            AddCables(builder, plant, cables=cables)
+
+
+def test_a_plant_that_cannot_move_is_refused(refused):
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    plant.AddRigidBody("ghost", SpatialInertia.Zero())
+    with refused("AddCables", "plant", "finalized"):
+        AddCables(builder, plant, cables=[])
+    plant.Finalize()
+    with refused("AddCables", "plant", "ghost"):
+        AddCables(builder, plant, cables=[])
+
+
+def test_a_cable_whose_ends_meet_is_named():
+    builder, plant, tip, _ = rod_with_tendons()
+    AddCables(builder, plant, cables=[Cable("loop", plant.world_frame(), tip, LAW)])
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    network = diagram.GetSubsystemByName("cables")
+    tensions = network.GetOutputPort("tensions")
+    state = np.zeros(13)
+    state[[0, 4]] = 1.0, -LENGTH  # the rod's end at the origin
+    context = network.GetMyMutableContextFromRoot(root)
+    network.GetInputPort("state").FixValue(context, state)
+    with pytest.raises(SimulationFailure, match="'loop'"):
+        tensions.Eval(context)
 
 
 def test_ground_that_cannot_be_is_refused(refused):
     builder, plant, tip, cables = rod_with_tendons()
     ground = make_surface(GroundSection(stiffness=1e3, damping=0.0), Coulomb(), Flat())
-    with refused("AddGroundContact", "frames", "world"):
-        AddGroundContact(builder, plant, frames=[cables[0].frame_a], ground=ground)
     wrong = ground._replace(normal=np.array(NormalForce(1e3, math.nan)))
-    with refused("AddGroundContact", "ground.damping"):
-        AddGroundContact(builder, plant, frames=[tip], ground=wrong)
-    for radius in (-0.1, [0.1, 0.1], math.inf, "1 m"):
-        with refused("AddGroundContact", "radius", "0 or more"):
-            AddGroundContact(builder, plant, frames=[tip], ground=ground, radius=radius)
+    for key, given in (
+        ("frames[0]", {"frames": [cables[0].frame_a]}),
+        ("frames[0]", {"frames": [rod_with_tendons()[2]]}),
+        ("frames[1]", {"frames": [tip, tip]}),
+        ("ground", {"ground": 3}),
+        ("ground.damping", {"ground": wrong}),
+        *(("radius", {"radius": radius}) for radius in (-0.1, [0.1, 0.1], math.inf, "1 m")),
+    ):
+        with refused("AddGroundContact", key, ""):
+            AddGroundContact(builder, plant, **{"frames": [tip], "ground": ground} | given)
 
 
 def test_forces_add_to_what_is_connected_to_the_plant():

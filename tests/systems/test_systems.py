@@ -47,7 +47,7 @@ def test_the_friction_brings_no_continuous_state(scenario, robot, gait):
 @pytest.mark.parametrize(("slack", "least"), [(True, 0.0), (False, -97.4)])
 def test_slack_cables_do_not_push(scenario, slack, least):
     robot = Robot.of(scenario.with_changes({"robot.cables.slack": slack}))
-    cables = CableNetwork(robot.model, signals=4)
+    cables = CableNetwork(robot.model, names=robot.structure.cable_names, signals=4)
     context = cables.CreateDefaultContext()
     cables.GetInputPort("state").FixValue(context, robot.structure.initial_state)
     cables.GetInputPort("signals").FixValue(context, np.full(4, -100.0))

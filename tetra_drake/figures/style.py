@@ -69,6 +69,17 @@ class Look:
     font_size: float = 9.0
     title: bool = True
 
+    def __post_init__(self) -> None:
+        """Raises InputError if the axes would have no room."""
+        most = _MOST_PER_INCH * self.width_in
+        if not 0.0 < self.font_size <= most <= _MOST_PER_INCH * _WIDEST:
+            expected = f"a width up to {_WIDEST:g} in, and per inch letters up to {_MOST_PER_INCH}"
+            found = f"found {self.font_size:g} points in {self.width_in:g} in"
+            raise InputError("figure", "font_size", f"{found}, expected {expected} points")
+
+
+_WIDEST, _MOST_PER_INCH = 40.0, 4.5
+"""Greatest width of figures in inches, and greatest size of letters in points per inch of it."""
 
 USUAL = Look()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import html
 import json
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -114,10 +113,14 @@ class SimulationResult:
 
     def show(self, *, height: int = 480) -> ReplayFrame:
         """The replay as a value that a notebook shows. `height` is in pixels."""
-        with tempfile.TemporaryDirectory() as folder:
-            page = Path(folder, "replay.html")
-            self.save_replay(page)
-            return ReplayFrame(page.read_text(encoding="utf-8"), height)
+        return ReplayFrame(self.replay_page(), height)
+
+    def replay_page(self) -> str:
+        """The HTML page that save_replay() writes."""
+        from tetra_drake.visualization.replay import replay_page
+
+        given = {"robot": self.robot, "trajectory": self.trajectory, "title": self.title}
+        return replay_page(**given)[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
         """Writes a page that plays the motion; see visualization.replay.save_replay()."""

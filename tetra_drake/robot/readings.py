@@ -26,19 +26,19 @@ class Readings(NamedTuple):
     """Time (N,)."""
     lengths: Annotated[Any, "robots", "cables"]
     """Lengths of the cables (N, cables)."""
-    rates: Annotated[Any, "robots", "cables"]
+    rates: Annotated[np.ndarray, "robots", "cables"]
     """Rates of the lengths (N, cables)."""
-    tensions: Annotated[Any, "robots", "cables"]
+    tensions: Annotated[np.ndarray, "robots", "cables"]
     """Tensions of the cables (N, cables)."""
-    normal_forces: Annotated[Any, "robots", "contacts"]
+    normal_forces: Annotated[np.ndarray, "robots", "contacts"]
     """Loads of the contact nodes (N, contacts), along the normal of the ground."""
-    q_WB: Annotated[Any, "robots", "bodies", 4]
+    q_WB: Annotated[np.ndarray, "robots", "bodies", 4]
     """Orientations of the bodies (N, bodies, 4): quaternions, w first."""
-    w_WB: Annotated[Any, "robots", "bodies", 3]
+    w_WB: Annotated[np.ndarray, "robots", "bodies", 3]
     """Angular velocities of the bodies (N, bodies, 3)."""
-    p_WN: Annotated[Any, "robots", "nodes", 3]
+    p_WN: Annotated[np.ndarray, "robots", "nodes", 3]
     """Positions of the nodes (N, nodes, 3)."""
-    v_WN: Annotated[Any, "robots", "nodes", 3]
+    v_WN: Annotated[np.ndarray, "robots", "nodes", 3]
     """Velocities of the nodes (N, nodes, 3)."""
 
     @classmethod

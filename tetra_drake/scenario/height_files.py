@@ -90,6 +90,7 @@ def _read_heights(path: str) -> np.ndarray:
     except InputError as error:
         refuse("", f"'{path}': {error.problem}")
     except (ValueError, TypeError, MemoryError, tokenize.TokenError) as error:
-        # The file may be a private one, so the error does not show its content.
-        problem = re.sub("string '.*' to float64", "text to a number", str(error))
-        refuse("", f"'{path}' cannot be read as heights: {problem}")
+        # The file may be a private one, so the error shows a place of NumPy's error, never a text.
+        places = re.findall(r" at row \d+(?:, column \d+)?", str(error))
+        expected = "expected numbers, equally many in each row"
+        refuse("", f"'{path}' cannot be read as heights{''.join(places[-1:])}: {expected}")

@@ -7,12 +7,14 @@ generalized force; otherwise BodyStates and BodyForces translate.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import numbers
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.common.value import AbstractValue
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
@@ -138,13 +140,79 @@ def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
     return applied
 
 
+def check_type(source: str, key: str, value: object, *kinds: type) -> None:
+    """Raises InputError that names `source` and `key` unless a value is of one of the kinds."""
+    if not isinstance(value, kinds):
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise InputError(source, key, f"found {value!r:.60}, expected {expected}")
+
+
+def checked_numbers(
+    source: str,
+    key: str,
+    given: npt.ArrayLike | numbers.Real,
+    *,
+    count: int,
+    least: float = -math.inf,
+) -> np.ndarray:
+    """Numbers (count,) from a number for all, or a number for each. Raises InputError that names
+    `source` and `key` unless they are finite and at least `least`."""
+    found = np.full(count, np.nan)
+    with contextlib.suppress(TypeError, ValueError):
+        found[:] = given
+    if not (np.isfinite(found) & (found >= least)).all():
+        bound = "" if least == -math.inf else f" of {least:g} or more"
+        expected = f"expected a number{bound}, or {count} of them"
+        raise InputError(source, key, f"found {given!r:.60}, {expected}")
+    return found
+
+
 def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None:
     """Raises InputError that names `source` and `key` unless the constants of a law are numbers
     that it can have: finite and not negative."""
     for name, value in constants.items():
-        is_number = isinstance(value, numbers.Real) and math.isfinite(value)
-        if not is_number or value < 0.0:
-            raise InputError(source, f"{key}.{name}", f"found {value!r}, expected 0 or more")
+        if not isinstance(value, numbers.Real):
+            problem = f"found {value!r:.60}, expected a number"
+            raise InputError(source, f"{key}.{name}", problem)
+        checked_numbers(source, f"{key}.{name}", value, count=1, least=0.0)
+
+
+def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:
+    """Raises InputError that names `source` unless a system called `name` can be attached to a
+    plant: a finalized one of the builder, with a mass matrix that can be inverted."""
+    check_type(source, "builder", builder, DiagramBuilder)
+    check_type(source, "plant", plant, MultibodyPlant)
+    check_type(source, "name", name, str)
+    if builder.already_built():
+        raise InputError(source, "builder", "has built its diagram already")
+    check_part(source, "plant", builder, plant)
+    if not plant.is_finalized():
+        raise InputError(source, "plant", "is not finalized; call plant.Finalize() first")
+    for taken in (name, f"{name}_actuators", f"{name}_geometry", f"forces_of_{name}"):
+        if not name or builder.HasSubsystemNamed(taken):
+            raise InputError(source, "name", f"found '{name}', which is empty or taken")
+    try:
+        np.linalg.cholesky(plant.CalcMassMatrix(plant.CreateDefaultContext()))
+    except np.linalg.LinAlgError as error:
+        bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
+        light = ", ".join(body.name() for body in bodies if not body.default_mass() > 0.0)
+        problem = "has a body that moves without mass or moments of inertia"
+        raise InputError(source, "plant", f"{problem}: {light}".removesuffix(": ")) from error
+
+
+def check_part(source: str, key: str, builder: DiagramBuilder, system: System) -> None:
+    """Raises InputError that names `source` and `key` unless a system is one of the builder's."""
+    if not any(part is system for part in builder.GetSystems()):
+        raise InputError(source, key, "is no system of the builder; add it first")
+
+
+def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> None:
+    """Raises InputError that names `source` and `key` unless a frame is one of the plant's."""
+    check_type(source, key, frame, Frame)
+    if frame.GetParentPlant() is not plant:
+        raise InputError(source, key, f"found frame '{frame.name()}' of another plant")
+    if not np.isfinite(frame.GetFixedPoseInBodyFrame().translation()).all():
+        raise InputError(source, key, f"found frame '{frame.name()}' at a place that is not finite")
 
 
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:

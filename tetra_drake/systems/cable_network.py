@@ -6,22 +6,35 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import Integrator
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.physics import actuator, cable, kinematics
 from tetra_drake.physics.forces import Forces, compute_cable_forces
 from tetra_drake.physics.model import Model
-from tetra_drake.scenario.actuator_kinds import Actuation, DrivenCables, Force
+from tetra_drake.scenario.actuator_kinds import Actuation, ActuatorKind, DrivenCables, Force
 from tetra_drake.scenario.refusals import hint
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
-from tetra_drake.systems.attachment import Attach, Nodes, check_constants
+from tetra_drake.systems.attachment import (
+    Attach,
+    Nodes,
+    check_constants,
+    check_frame,
+    check_host,
+    check_part,
+    check_type,
+    checked_numbers,
+)
 from tetra_drake.systems.cable_geometry import AddCableGeometry
+
+_LEAST_LENGTH = 1e-9
+"""Least length (m) of a cable at the start. The direction of a shorter one is not known."""
 
 
 class CableNetwork(LeafSystem):
@@ -43,11 +56,13 @@ class CableNetwork(LeafSystem):
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
     loop. Where the model is `slack`, a cable goes slack instead of pushing. The port `signals`
     exists only if there are any, `drives` and `drive_rates` only if the kind of actuators has
-    states.
+    states. A cable whose ends meet has no direction: the outputs raise SimulationFailure.
     """
 
-    def __init__(self, model: Model, *, signals: int) -> None:
+    def __init__(self, model: Model, *, names: Sequence[str], signals: int) -> None:
+        """`names` are of the cables; `signals` is the number of signals."""
         super().__init__()
+        self._names = names
         bodies, count = model.bodies.mass.size, model.cables.signal.size
         # The kernel writes to these arrays at every call.
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
@@ -74,6 +89,7 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, motion)
         self.DeclareVectorOutputPort("rates", count, self._calc_rates, motion)
         size = self._forces.cable_forces.size
+        self._zeros = np.zeros(size)
         self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
         self.DeclareVectorOutputPort("ends", 6 * count, self._calc_ends, motion)
 
@@ -82,13 +98,24 @@ class CableNetwork(LeafSystem):
         if self._drives is not None:
             self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
         signals = self._no_signals if self._signals is None else self._signals.Eval(context)
-        self._compute_forces(self._parts, self._state.Eval(context), signals, force)
+        self._fill(context, signals, force)
 
     def _move(self, context: Context) -> np.ndarray:
         """The table `cable_forces`; only lengths and rates are valid."""
-        state = self._state.Eval(context)
-        self._compute_forces(self._parts, state, self._no_signals, self._force)
+        self._fill(context, self._no_signals, self._force)
         return self._forces.cable_forces
+
+    def _fill(self, context: Context, signals: np.ndarray, force: np.ndarray) -> None:
+        """Writes the generalized force to `force`, and the table `cable_forces`. Raises
+        SimulationFailure if a number of a cable is not finite although the state is."""
+        state, table = self._state.Eval(context), self._forces.cable_forces
+        self._compute_forces(self._parts, state, signals, force)
+        # The product is NaN if a number is not finite. It is the fastest way to see that.
+        if self._zeros.dot(table.ravel()) == 0.0 or not np.isfinite(state).all():
+            return
+        place = int(np.argmin(np.isfinite(table).all(axis=1)))
+        reason = f"the ends of cable '{self._names[place]}' meet, or its forces are too large"
+        raise SimulationFailure(time=context.get_time(), reason=reason)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._compute(context, output.get_mutable_value())
@@ -135,7 +162,7 @@ def AddCables(
     cables: Sequence[Cable],
     actuated: Mapping[str, Sequence[str]] | None = None,
     actuation: Actuation | None = None,
-    drives: np.ndarray | None = None,
+    drives: npt.ArrayLike | None = None,
     slack: bool = True,
     scene_graph: SceneGraph | None = None,
     name: str = "cables",
@@ -156,12 +183,32 @@ def AddCables(
         name: name of the system.
 
     Raises:
-        InputError: `actuated` has an unknown cable, two cables have one name, or a constant of a
-            cable is negative or not finite.
+        InputError: an argument is of a wrong type or size; a frame is of another plant; the ends of
+            a cable are at one place at the plant's default positions; two cables or systems have
+            one name; a constant is negative or not finite; `actuated` has an unknown cable.
     """
-    actuated, actuation = actuated or {}, actuation or Force()
+    actuated = {} if actuated is None else actuated
+    actuation = Force() if actuation is None else actuation
+    check_host("AddCables", builder, plant, name=name)
+    _check_cables(plant, cables)
+    check_type("AddCables", "actuated", actuated, Mapping)
+    check_type("AddCables", "actuation", actuation, ActuatorKind)
+    check_type("AddCables", "slack", slack, bool)
+    lengths = _default_lengths(plant, cables)
     nodes = Nodes.of(plant, (frame for one in cables for frame in (one.frame_a, one.frame_b)))
     table = _cable_table(cables, actuated, nodes)
+    driven = np.flatnonzero(table["signal"] != cable.PASSIVE)
+    law, signals = cable.CableLaw.of(table[driven]), np.zeros(driven.size)
+    default = actuation.drives(DrivenCables.at_rest(law, lengths[driven], signals))
+    if drives is None:
+        drives = default
+    elif not len(default) and np.size(drives):
+        raise InputError("AddCables", "drives", f"found {drives!r:.60}, expected none")
+    drives = checked_numbers("AddCables", "drives", drives, count=len(default))
+    names = [one.name for one in cables]
+    if scene_graph is not None:
+        check_type("AddCables", "scene_graph", scene_graph, SceneGraph)
+        check_part("AddCables", "scene_graph", builder, scene_graph)
     model = Model.of_nodes(
         nodes.p_BN,
         nodes.first_node,
@@ -169,32 +216,41 @@ def AddCables(
         actuator=actuation.actuator(),
         slack=slack,
     )
-    network = builder.AddNamedSystem(name, CableNetwork(model, signals=len(actuated)))
+    network = CableNetwork(model, names=names, signals=len(actuated))
+    builder.AddNamedSystem(name, network)
     Attach(builder, plant, network)
-    lengths = _default_lengths(plant, cables)
-    if drives is None:
-        driven = np.flatnonzero(table["signal"] != cable.PASSIVE)
-        law, signals = cable.CableLaw.of(table[driven]), np.zeros(driven.size)
-        drives = actuation.drives(DrivenCables.at_rest(law, lengths[driven], signals))
     if len(drives):
         actuators = builder.AddNamedSystem(f"{name}_actuators", Integrator(drives))
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
-    if scene_graph is not None:
-        shown = dict(zip((one.name for one in cables), lengths, strict=True))
+    if scene_graph is not None and names:
+        shown = dict(zip(names, lengths, strict=True))
         AddCableGeometry(builder, scene_graph, network.GetOutputPort("ends"), lengths=shown)
     return network
+
+
+def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
+    """Raises InputError unless the cables can be between frames of a plant."""
+    check_type("AddCables", "cables", cables, Sequence)
+    names: set[str] = set()
+    for place, one in enumerate(cables):
+        check_type("AddCables", f"cables[{place}]", one, Cable)
+        check_type("AddCables", f"cables[{place}].name", one.name, str)
+        key = f"cables.{one.name}"
+        if one.name in names:
+            raise InputError("AddCables", key, "is given twice")
+        names.add(one.name)
+        check_type("AddCables", f"{key}.law", one.law, cable.CableLaw)
+        check_constants("AddCables", key, one.law._asdict())
+        for end in ("frame_a", "frame_b"):
+            check_frame("AddCables", f"{key}.{end}", plant, getattr(one, end))
 
 
 def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
     """Records of the cables, of dtype CABLE."""
-    places: dict[str, int] = {}
-    for place, one in enumerate(cables):
-        check_constants("AddCables", f"cables.{one.name}", one.law._asdict())
-        if places.setdefault(one.name, place) != place:
-            raise InputError("AddCables", f"cables.{one.name}", "is given twice")
+    places = {one.name: place for place, one in enumerate(cables)}
     table = np.zeros(len(cables), dtype=cable.CABLE)
     table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]
     table["node_b"] = [nodes.of_frame[one.frame_b.index()] for one in cables]
@@ -202,17 +258,27 @@ def _cable_table(
     for constant in cable.CableLaw._fields:
         table[constant] = [getattr(one.law, constant) for one in cables]
     for signal, (group, driven) in enumerate(actuated.items()):
+        key = f"actuated.{group}"
+        check_type("AddCables", key, driven, list, tuple)
         for cable_name in driven:
             if cable_name not in places:
                 problem = f"found unknown cable '{cable_name}'; {hint(cable_name, [*places])}"
-                raise InputError("AddCables", f"actuated.{group}", problem)
+                raise InputError("AddCables", key, problem)
+            if table["signal"][places[cable_name]] != cable.PASSIVE:
+                raise InputError("AddCables", key, f"cable '{cable_name}' has a signal already")
             table["signal"][places[cable_name]] = signal
     return table
 
 
 def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> np.ndarray:
-    """Lengths of cables (cables,) in m at the plant's default positions."""
+    """Lengths of cables (cables,) in m at the plant's default positions. Raises InputError if the
+    ends of a cable are at one place."""
     context = plant.CreateDefaultContext()
-    return np.array(
-        [np.linalg.norm(one.frame_b.CalcPose(context, one.frame_a).translation()) for one in cables]
-    )
+    offsets = [one.frame_b.CalcPose(context, one.frame_a).translation() for one in cables]
+    lengths: np.ndarray = np.linalg.norm(np.reshape(offsets, (-1, 3)), axis=1)
+    for one, length in zip(cables, lengths, strict=True):
+        if not _LEAST_LENGTH <= length < np.inf:
+            expected = "expected its ends apart at the plant's default positions"
+            problem = f"found a length of {length:.3g} m, {expected}"
+            raise InputError("AddCables", f"cables.{one.name}", problem)
+    return lengths

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import weakref
 from collections.abc import Sequence
 
@@ -27,7 +26,15 @@ from tetra_drake.physics.mode_change import mode_margin, modes_after_step, next_
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.packed import Packed
-from tetra_drake.systems.attachment import Attach, Nodes, check_constants
+from tetra_drake.systems.attachment import (
+    Attach,
+    Nodes,
+    check_constants,
+    check_frame,
+    check_host,
+    check_type,
+    checked_numbers,
+)
 
 
 class GroundContact(LeafSystem):
@@ -167,33 +174,31 @@ def AddGroundContact(
     >>> tip = AddFrame(plant, "tip", link, [0.0, 0.0, -1.0])  # before plant.Finalize()
     >>> AddGroundContact(builder, plant, frames=[tip], ground=surface)
 
-    Raises InputError for a frame of the world, and for a radius or a constant of the normal force
-    that is negative or not finite.
+    Raises InputError if an argument is of a wrong type or size, a frame is of the world, of another
+    plant or given twice, another system has the name, or a number is negative or not finite.
     """
+    check_host("AddGroundContact", builder, plant, name=name)
+    check_type("AddGroundContact", "frames", frames, Sequence)
+    check_type("AddGroundContact", "ground", ground, contact.Ground)
+    check_type("AddGroundContact", "witness", witness, bool)
     normal = contact.NormalForce(*ground.normal.tolist())
     check_constants("AddGroundContact", "ground", normal._asdict())
-    if any(frame.body() is plant.world_body() for frame in frames):
-        raise InputError("AddGroundContact", "frames", "found a frame of the world")
+    for place, frame in enumerate(frames):
+        key = f"frames[{place}]"
+        check_frame("AddGroundContact", key, plant, frame)
+        if frame.body() is plant.world_body():
+            raise InputError("AddGroundContact", key, "found a frame of the world")
+        if any(frame is earlier for earlier in frames[:place]):
+            raise InputError("AddGroundContact", key, f"frame '{frame.name()}' is given twice")
     nodes = Nodes.of(plant, frames)
     contacts = np.array([nodes.of_frame[frame.index()] for frame in frames], dtype=np.int64)
     placed = ground.under(
         contacts,
         carriers=nodes.carriers[contacts],
-        radius=_radii(radius, count=len(frames)),
+        radius=checked_numbers("AddGroundContact", "radius", radius, count=len(frames), least=0.0),
         nodes=len(nodes.p_BN),
     )
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
     system = builder.AddNamedSystem(name, GroundContact(model, witness=witness))
     Attach(builder, plant, system)
     return system
-
-
-def _radii(radius: float | Sequence[float], *, count: int) -> np.ndarray:
-    """Radii of feet (count,) in m. Raises InputError if they are not numbers of 0 or more."""
-    radii = np.full(count, np.nan)
-    with contextlib.suppress(TypeError, ValueError):
-        radii[:] = radius
-    if not (np.isfinite(radii) & (radii >= 0.0)).all():
-        problem = f"found {radius!r:.60}, expected a number of 0 or more, or {count} of them"
-        raise InputError("AddGroundContact", "radius", problem)
-    return radii

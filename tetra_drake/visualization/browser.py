@@ -29,19 +29,23 @@ def find_browser() -> str | None:
 def launch_browser() -> Iterator[Browser]:
     """A headless browser that draws WebGL without a graphics card.
 
-    Raises InputError if none is installed, or without playwright.
+    Raises InputError if none is installed, without playwright, or if the browser fails.
     """
     check_package("playwright", extra="video", source="browser")
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import Error, sync_playwright
 
     path = find_browser()
     if path is None:
         expected = f"expected one of {', '.join(_NAMES)}; install it by: apt install chromium"
         raise InputError("browser", "", f"none is installed, {expected}")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=_SOFTWARE_WEBGL)
-        with contextlib.closing(browser):
-            yield browser
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=path, args=_SOFTWARE_WEBGL)
+            with contextlib.closing(browser):
+                yield browser
+    except Error as error:
+        problem = f"{path} did not start, or failed: {error.message.splitlines()[0]}"
+        raise InputError("browser", "", problem) from error
 
 
 def picture_of(page: Page) -> Image.Image:

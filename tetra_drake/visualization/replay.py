@@ -87,18 +87,30 @@ def save_replay(
     Raises:
         InputError: if a file cannot be written, or `viewer` has another content.
     """
+    address = ""
+    if viewer is not None:
+        address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
+    page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
+    if viewer is not None:
+        _write_once(Path(viewer), script)
+    write_whole(path, page)
+
+
+def replay_page(
+    *, robot: Robot, trajectory: xarray.Dataset, title: str, address: str = ""
+) -> tuple[str, str]:
+    """A page that replays a trajectory, as HTML, and Meshcat's script, which is only in the page if
+    it is not read from an `address`. See save_replay()."""
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     p_WN = trajectory["p_WN"].values
     add_robot(meshcat, robot.structure)
     set_surroundings(meshcat, robot, p_WN, seen=p_WN[0])
-    page = meshcat.StaticHtml()
-    if viewer is not None:
-        address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
+    page, script = meshcat.StaticHtml(), ""
+    if address:
         page, script = _without_viewer(page, address=address)
-        _write_once(Path(viewer), script)
     page = _with_overlay(page, title, film_of(robot, frames))
-    write_whole(path, pack_page(page, title=title))
+    return pack_page(page, title=title), script
 
 
 def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
@@ -255,7 +267,8 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
     named = f"<title>{html.escape(title)}</title>{_IN_HEAD}"
     page = page.replace("<html>", '<html lang="en">', 1)
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
-    return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
+    page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
+    return "</main></body>".join(page.rsplit("</body>", 1))
 
 
 def _without_viewer(page: str, *, address: str) -> tuple[str, str]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import subprocess
+import tempfile
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import whole_file
+from tetra_drake.files import check_file, whole_file
 from tetra_drake.formatting import Say, silent
 from tetra_drake.machine import check_package
 from tetra_drake.visualization.browser import (
@@ -17,6 +21,9 @@ from tetra_drake.visualization.browser import (
     picture_of,
     wait_until_loaded,
 )
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 VIEWS = {
     "free": None,
@@ -29,28 +36,33 @@ VIEWS = {
 _GIF = "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=none"
 """Filter of ffmpeg: colours of the video itself. Dithered frames would be twice as large."""
 
-KINDS: dict[str, Any] = {
-    ".mp4": {"codec": "libx264", "quality": 8},
-    ".gif": {
-        "codec": "gif",
-        "pix_fmt_out": "pal8",
-        "ffmpeg_log_level": "error",  # else a line for every equal pair of colours
-        "output_params": ["-filter_complex", _GIF],
-    },
+KINDS = {
+    ".mp4": ["-codec", "libx264", "-pix_fmt", "yuv420p", "-crf", "10"],
+    ".gif": ["-filter_complex", _GIF],
 }
-"""Settings of ffmpeg by suffix of the file."""
+"""Options of ffmpeg by suffix of the file."""
+
+MOST_FRAMES = 100_000
+_MOST_FPS_OF_GIF = 50.0
+"""Frames per second of a GIF, at most. Browsers show frames of less than 0.02 s for 0.1 s."""
 
 
-def check_video(path: Path) -> None:
-    """Raises InputError if a video cannot be written: its suffix is not one of KINDS, or a package
-    is missing."""
+def check_video(path: Path, *, fps: float) -> None:
+    """Raises InputError if a video cannot be written: its suffix is not one of KINDS, a GIF has too
+    many frames per second, or a package is missing."""
+    check_file(path)
     if path.suffix not in KINDS:
         raise InputError(path, "", f"expected a file that ends in {' or '.join(KINDS)}")
+    if path.suffix == ".gif" and fps > _MOST_FPS_OF_GIF:
+        problem = (
+            f"found {fps:g} frames per second, expected {_MOST_FPS_OF_GIF:g} at most for a GIF"
+        )
+        raise InputError("video", "fps", problem)
     check_package("imageio_ffmpeg", extra="video", source="video")
 
 
 def make_video(
-    replay: Path,
+    replay: str,
     path: Path,
     *,
     size: tuple[int, int] = (1920, 1080),
@@ -62,7 +74,8 @@ def make_video(
     """Writes a video of a replay page: an MP4 or a GIF, by the suffix of `path`.
 
     Args:
-        replay: the page, see replay.save_replay().
+        replay: the page as HTML, see replay.replay_page().
+        path: the file to write.
         size: width and height in pixels; both are even.
         fps: frames per second.
         view: a name in VIEWS. The camera follows the robot.
@@ -70,24 +83,72 @@ def make_video(
         say: is told the progress.
 
     Raises:
-        InputError: if the file cannot be written, or what draws it is not installed.
+        InputError: if the file cannot be written, the video has more than MOST_FRAMES frames, or
+            what draws it is not installed or fails.
     """
-    check_video(path)
-    import imageio_ffmpeg
-
-    with launch_browser() as browser, whole_file(path) as temporary:
+    check_video(path, fps=fps)
+    with launch_browser() as browser:
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.goto(replay.resolve().as_uri())
+        page.set_content(replay)
         wait_until_loaded(page)
         do(page, "dress", False)
         do(page, "camera", {"follow": True, "from": VIEWS[view]})
-        times = np.arange(0.0, page.evaluate("film.duration"), speed / fps).tolist()
-        kind = {"macro_block_size": 2, **KINDS[path.suffix]}
-        film = imageio_ffmpeg.write_frames(str(temporary), size, fps=fps, **kind)
-        film.send(None)
-        for number, time in enumerate(times):
-            do(page, "show", time)
-            film.send(np.asarray(picture_of(page)))
-            if number % 50 == 0:
-                say(f"frame {number + 1} of {len(times)}")
-        film.close()
+        duration = page.evaluate("film.duration")
+        if not (fps > 0.0 and speed > 0.0 and duration * fps / speed <= MOST_FRAMES):
+            problem = f"found {fps:g} at {speed:g} times the speed, expected fewer frames than"
+            raise InputError("video", "fps", f"{problem} {MOST_FRAMES} in all")
+        _encode(_frames(page, np.arange(0.0, duration, speed / fps), say), path, size=size, fps=fps)
+
+
+def _frames(page: Page, times: np.ndarray, say: Say) -> Iterator[bytes]:
+    """Pictures of a replay page at these times (s), as the bytes of their pixels."""
+    for number, time in enumerate(times.tolist()):
+        do(page, "show", time)
+        yield picture_of(page).tobytes()
+        if number % 50 == 0:
+            say(f"frame {number + 1} of {len(times)}")
+
+
+def _encode(frames: Iterable[bytes], path: Path, *, size: tuple[int, int], fps: float) -> None:
+    """Writes a video of frames by ffmpeg. Raises InputError unless ffmpeg takes all frames and ends
+    well."""
+    import imageio_ffmpeg
+
+    given = [
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{size[0]}x{size[1]}",
+        "-r",
+        f"{fps:.9g}",
+    ]
+    with whole_file(path) as temporary, tempfile.TemporaryFile() as log:
+        try:
+            ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error"]
+            process = subprocess.Popen(
+                [*ffmpeg, *given, "-i", "-", *KINDS[path.suffix], str(temporary)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=log,
+            )
+        except (OSError, RuntimeError) as error:
+            hint = "reinstall imageio-ffmpeg, or set IMAGEIO_FFMPEG_EXE to an ffmpeg"
+            raise InputError("video", "", f"ffmpeg does not start: {error}; {hint}") from error
+        took_all = False
+        with process, contextlib.suppress(BrokenPipeError):
+            assert process.stdin is not None
+            try:
+                for frame in frames:
+                    process.stdin.write(frame)
+                process.stdin.close()
+                took_all = True
+            finally:
+                if not took_all:
+                    process.kill()
+        if process.returncode or not took_all:
+            log.seek(0)
+            lines = log.read().decode(errors="replace").splitlines() or ["it was ended"]
+            reason = lines[-1].rpartition("] ")[2]
+            raise InputError(path, "", f"cannot be written: ffmpeg failed: {reason}")
