@@ -75,8 +75,8 @@ def result_text(result: SimulationResult) -> str:
     lines.append(metrics_table({"": {"fitness": result.fitness} | vars(metrics)}, scenario).text())
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
-    if sinking := result.robot.sinking_remark():
-        lines.append(f"{sinking[0].upper()}{sinking[1:]}.")
+    for remark in filter(None, [result.robot.start_up_remark(), result.robot.sinking_remark()]):
+        lines.append(f"{remark[0].upper()}{remark[1:]}.")
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]
     time, factor = _time(result.wall_time), rounded(result.duration / result.wall_time)

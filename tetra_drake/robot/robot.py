@@ -172,6 +172,13 @@ class Robot:
             problem = self.scenario.actuation.excess(signal, free_length=least)
         return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
 
+    def start_up_remark(self) -> str:
+        """Warning if a simulation ends before the cables are actuated; empty if it does not."""
+        start_up, duration = self.scenario.cpg.start_up, self.scenario.simulation.duration
+        if start_up < duration:
+            return ""
+        return f"within {duration:g} s no cable is actuated, as cpg.start_up is {start_up:g} s"
+
     def sinking_remark(self) -> str:
         """Warning if the robot at rest is in its ground by more than SINKS of its height, with a
         stiffness that would bear it; empty if it is not, or if it has no equilibrium."""
