@@ -94,7 +94,6 @@ def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, An
 _SHORT, _SETTLED = _by(CmaEs(), 3, 2000), _by(CmaEs(), 10, 2000)
 _STRUCTURE = _by(CmaEs(), 3, 1500) | {
     "simulation.duration": "15 s",
-    "simulation.steady_from": "3 s",
     "require": {"clearance": "8 mm", "tension": 0.0},  # 8 mm: the diameter of the thickest struts
 }
 

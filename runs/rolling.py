@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -112,10 +112,14 @@ class RollingPolicy:
         return np.asarray(self.rest * (1.0 - np.clip(shortened, -MOST, MOST)))
 
 
+def undisturbed(changes: Mapping[str, Any]) -> Scenario:
+    """The rover with changes. Its power counts from 2 s on."""
+    return load_scenario("rover").with_changes({"simulation.steady_from": "2 s", **changes})
+
+
 def rover(**changes: str) -> Scenario:
     """The rover with the default disturbances, and with changes of its simulation."""
-    changed = {f"simulation.{name}": text for name, text in changes.items()}
-    scenario = load_scenario("rover").with_changes(changed)
+    scenario = undisturbed({f"simulation.{name}": text for name, text in changes.items()})
     return scenario.with_changes({"disturbances": default_disturbances(scenario)})
 
 
@@ -158,13 +162,12 @@ def evolve_policy(robots: Simulation, trial: int) -> np.ndarray:
 
 def drive(coefficients: Sequence[float], engine: str, *, record: bool = False) -> SimulationResult:
     """The undisturbed rover, driven by a policy on an engine."""
-    scenario = load_scenario("rover").with_changes(ENGINES[engine])
-    rolling = RollingPolicy.of(Simulation(load_scenario("rover")), np.array(coefficients))
+    rolling = RollingPolicy.of(Simulation(undisturbed({})), np.array(coefficients))
 
     def policy(time: float, readings: Readings) -> np.ndarray:
         return rolling(readings)
 
-    return simulate(scenario, controller=policy, record=record)
+    return simulate(undisturbed(ENGINES[engine]), controller=policy, record=record)
 
 
 def rolls(metrics: Metrics | None) -> bool:
@@ -261,7 +264,7 @@ def evolve_networks() -> list[dict[str, float]]:
     CMA-ES evolves networks of oscillators, open loops, on the undisturbed rover.
     """
     changes = {"optimizer": CmaEs(), "evolution.trials": TRIALS}
-    scenario = load_scenario("rover").with_changes(changes | {"evolution.evaluations": NETWORKS})
+    scenario = undisturbed(changes | {"evolution.evaluations": NETWORKS})
     resume = (SCRATCH / MANIFEST).exists()
     run = evolve(scenario, SCRATCH, resume=resume, reevaluate=False, report=False)
     fittest = run.evaluations.loc[run.evaluations.groupby("trial")["fitness"].idxmax()]

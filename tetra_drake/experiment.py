@@ -112,7 +112,8 @@ def evolve(
         _warn_of_versions(record.manifest, progress)
         if not resume:
             robot = Robot.of(scenario)
-            for remark in filter(None, [robot.gain_remark(), robot.sinking_remark()]):
+            remarks = robot.start_up_remark(), robot.gain_remark(), robot.sinking_remark()
+            for remark in filter(None, remarks):
                 progress.warn(remark)
         trials = open_trials(record, optimizer=optimizer)
         progress.show([trial.status for trial in trials])

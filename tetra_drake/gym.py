@@ -134,7 +134,7 @@ class _Episodes:
         readings = simulation.step(self._setpoints(actions), indices=places)
         self._steps[places] += 1
         self._roll(readings)
-        early = readings.time <= self._scenario.simulation.steady_from
+        early = readings.time <= self._scenario.simulation.settling_time
         self._steady[early] = readings.p_WN[early]
         terminated = np.array([failure is not None for failure in simulation.failures])
         truncated = simulation.ended & ~terminated
@@ -158,7 +158,7 @@ class _Episodes:
         """The fitness up to now, without the metrics that are known only at the end."""
         scenario, structure = self._scenario, self.simulation.robot.structure
         nodes = np.stack([self._start[place], self._steady[place], readings.p_WN[place]])
-        steady_time = scenario.simulation.duration - scenario.simulation.steady_from
+        steady_time = scenario.simulation.duration - scenario.simulation.settling_time
         fitness = pose_fitness(poses_of(structure, nodes, steady_time), scenario.objective)
         return fitness + scenario.objective.get("rolled", 0.0) * self._rolled[place]
 

@@ -8,6 +8,7 @@ import pytest
 from record import EXPERIMENTS
 
 from tetra_drake.errors import InputError
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.refusals import TAG
 from tetra_drake.scenario.shipped import shipped_scenarios
@@ -33,7 +34,7 @@ THESIS: list[tuple[str, str, tuple[float, ...]]] = [
     ("cpg", "partner_weight gain start_up listing_step", (1.5, 2 * LBF, 2500 * 5e-4, 5e-4)),
     # Tables 5 and 6, section 2.3, appendix A
     ("gait_bounds", "weight_min weight_max tau_a_min tau_a_max", (1, 3.4, 0.2, 0.5)),
-    ("simulation", "duration steady_from", (15, 3)),
+    ("simulation", "duration settling_time", (15, 3)),
     ("evolution", "trials evaluations", (10, 50 + 2 * 2000)),
     ("optimizer", "population tournament", (50, 5)),
     ("optimizer", "crossover_probability mutation_probability", (0.2, 0.7)),
@@ -122,6 +123,16 @@ def test_a_written_scenario_loads_back_to_every_bit_without_its_base(tmp_path, n
     for scenario in (shipped, other):
         for text in (dump_scenario(scenario), scenario.to_yaml()):
             assert load_scenario(write(tmp_path, text)) == scenario
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_a_duration_is_shortened_by_one_key(name):
+    shipped = load_scenario(name)
+    for duration in (0.5, 1.0, 2.0, 15.0):
+        changed = shipped.with_changes({"simulation.duration": f"{duration} s"})
+        assert changed.simulation.settling_time == min(3.0, duration / 4.0)
+        is_idle = duration <= changed.cpg.start_up
+        assert ("cpg.start_up" in Robot.of(changed).start_up_remark()) == is_idle
 
 
 def test_differences_are_keys_and_readable_values(scenario):
@@ -232,7 +243,7 @@ def test_a_fault_names_the_file_that_has_it(tmp_path, refused):
     with refused(base, "simulation.duration", "'3 kg'"):
         load_scenario(file)
     write(tmp_path, "base: thesis\nsimulation: {duration: 4 s}\n", "low.yaml")
-    with refused(file, "simulation.steady_from", "4.0 s"):  # of file and base together
+    with refused(file, "simulation.steady_from", "4.0 s", "null"):  # of file and base together
         load_scenario(file)
 
 

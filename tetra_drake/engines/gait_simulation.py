@@ -52,7 +52,7 @@ class GaitSimulation:
         end, and where a change of the command begins or ends."""
         settings, cpg = self.robot.scenario.simulation, self.robot.scenario.cpg
         ends = cpg.listing_step * np.add.outer([0, 1], self._changes).ravel()
-        instants = np.append([0.0, settings.steady_from, cpg.start_up], ends)
+        instants = np.append([0.0, settings.settling_time, cpg.start_up], ends)
         marks = np.unique(instants.round(MARK_DECIMALS))
         before = marks[marks < settings.duration - 0.5 * 10.0**-MARK_DECIMALS]
         return np.append(before, settings.duration)

@@ -300,7 +300,7 @@ class Simulation:
         change_ends = (now + self.scenario.cpg.listing_step).round(MARK_DECIMALS)
         is_change = changed & ~starts & (change_ends < until)
         change_ends = np.where(is_change, change_ends, math.inf)
-        steady = np.full(self.count, simulation.steady_from).round(MARK_DECIMALS)
+        steady = np.full(self.count, simulation.settling_time).round(MARK_DECIMALS)
         is_within = (now < steady) & (steady < until) & (steady != change_ends)
         start, steady = np.where(starts, 0.0, math.inf), np.where(is_within, steady, math.inf)
         marks = np.sort(np.stack([start, change_ends, steady, until], axis=1), axis=1)

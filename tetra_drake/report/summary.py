@@ -76,8 +76,9 @@ def result_text(result: SimulationResult) -> str:
     lines.append(metrics_table({"": {"fitness": result.fitness} | vars(metrics)}, scenario).text())
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
-    still = result.robot.stillness_remark(metrics.distance) if result.gait else ""
-    for remark in filter(None, [still, result.robot.sinking_remark()]):
+    robot = result.robot
+    still = robot.stillness_remark(metrics.distance) if result.gait else ""
+    for remark in filter(None, [robot.start_up_remark() or still, robot.sinking_remark()]):
         lines.append(f"{remark[0].upper()}{remark[1:]}.")
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]

@@ -19,7 +19,7 @@ from tetra_drake.scenario.units import INCH, current
 
 def steady_start(scenario: Scenario) -> float:
     """Start (s) of the steady stretch. Mean values are over this stretch."""
-    return max(scenario.simulation.steady_from, scenario.cpg.start_up)
+    return max(scenario.simulation.settling_time, scenario.cpg.start_up)
 
 
 def compute_metrics(
@@ -34,7 +34,7 @@ def compute_metrics(
         signals: signals (k, m) in N at evenly spaced times from `simulation.steady_from` on.
     """
     structure, scenario = robot.structure, robot.scenario
-    steady_from = scenario.simulation.steady_from
+    steady_from = scenario.simulation.settling_time
     walk = Walk(
         **vars(poses_of(structure, nodes, float(path.times[-1] - steady_from))),
         path=path.centre[np.searchsorted(path.times, steady_from) :, :2],

@@ -145,7 +145,7 @@ class ReplayFrame:
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
     """Times (s), ascending, for which make_result() needs the motion of a simulation."""
-    times = [np.array([0.0, simulation.steady_from, simulation.duration])]
+    times = [np.array([0.0, simulation.settling_time, simulation.duration])]
     times.append(sample_times(simulation.duration, PERIOD))
     if record:
         times.append(sample_times(simulation.duration, simulation.sample_period))
@@ -170,7 +170,7 @@ def make_result(
     simulation, structure = robot.scenario.simulation, robot.structure
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
-    ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
+    ends = motion.at(np.array([0.0, simulation.settling_time, simulation.duration]))
     trajectory = None
     if record:
         samples = sample_times(simulation.duration, simulation.sample_period)
@@ -181,7 +181,7 @@ def make_result(
         nodes=np.array([node_positions(structure, state) for state in ends.states]),
         path=path,
         totals=totals,
-        signals=way.signals[instants >= simulation.steady_from],
+        signals=way.signals[instants >= simulation.settling_time],
     )
     return SimulationResult(
         scenario=robot.scenario,

@@ -187,6 +187,13 @@ class Robot:
         way = f"walks {units.shown(distance, 'm')}, less than a tenth of its length"
         return f"the robot {way}; {signals} stretch cables by {units.shown(moved, 'm')} at most"
 
+    def start_up_remark(self) -> str:
+        """Warning if a simulation ends before the cables are actuated; empty if it does not."""
+        start_up, duration = self.scenario.cpg.start_up, self.scenario.simulation.duration
+        if start_up < duration:
+            return ""
+        return f"within {duration:g} s no cable is actuated, as cpg.start_up is {start_up:g} s"
+
     def sinking_remark(self) -> str:
         """Warning if the robot at rest is in its ground by more than SINKS of its height, with a
         stiffness that would bear it; empty if it is not, or if it has no equilibrium."""

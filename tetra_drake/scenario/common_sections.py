@@ -104,13 +104,18 @@ class GaitBounds(Section):
         return self
 
 
+LONGEST_SETTLING = 3.0
+"""Time (s) at which the steady walk begins in long simulations, by default."""
+
+
 class SimulationSection(Section):
     """Duration of a simulation, and when to give up."""
 
     duration: Time = Field(gt=0, le=1e5)
     """Simulated time."""
-    steady_from: Time = Field(ge=0)
-    """Time at which the steady walk begins, for fitness and metrics (thesis section 2.3)."""
+    steady_from: Time | None = Field(default=None, ge=0)
+    """Time at which the steady walk begins, for fitness and metrics (thesis section 2.3). If not
+    given, a quarter of the duration, at most 3 s."""
     max_evaluations: int = Field(ge=1)
     """Largest number of evaluations of the derivatives in one simulation."""
     sample_period: Time = Field(gt=0)
@@ -121,11 +126,17 @@ class SimulationSection(Section):
     """Speed of a body above which a simulation has diverged. If not given, a speed that the energy
     of fall, cables and actuators cannot give; at least 10.16 m/s."""
 
+    @property
+    def settling_time(self) -> float:
+        """Time (s) at which the steady walk begins: `steady_from`, or its default."""
+        default = min(LONGEST_SETTLING, self.duration / 4.0)
+        return default if self.steady_from is None else self.steady_from
+
     @model_validator(mode="after")
     def _check(self) -> SimulationSection:
-        if self.steady_from >= self.duration:
+        if self.settling_time >= self.duration:
             problem = f"found {self.steady_from} s, expected less than the duration"
-            refuse("steady_from", f"{problem}, {self.duration} s")
+            refuse("steady_from", f"{problem}, {self.duration} s; null is a quarter of it")
         return self
 
 
