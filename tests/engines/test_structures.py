@@ -212,6 +212,35 @@ def test_a_robot_that_nothing_drives_falls_and_rests(undriven, signals):
         np.testing.assert_allclose(fallen.p_WN[-1, :, 2], heights, atol=1e-5)
 
 
+LOAD_ON_TWO_ROPES = {
+    "nodes": {"hook": [0.0, 0.0, 2.0], "load": [0.0, 0.0, 1.0]},
+    "cables": {
+        name: {"pairs": [["hook", "load"]], "stiffness": k, "damping": 0.0, "free_length": 0.98}
+        for name, k in {"rope": 600.0, "spring": 400.0}.items()
+    },
+    "masses": {"load": 1.0},
+    "anchors": {"hook": "xyz"},
+    "offsets": [[0.0, 0.0, 0.005]],
+}
+
+
+@pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])
+def test_parallel_cables_add_and_a_load_needs_no_strut(engine):
+    if engine == "!Mujoco" and not installed():
+        pytest.skip("MuJoCo is not installed")
+    changes = {"engine": engine, "friction.stiffness": "0 N/m"}
+    scenario = load_scenario("prism").with_changes(BRIEF | changes)
+    scenario = scenario.with_sections(robot=StructureFile.model_validate(LOAD_ON_TWO_ROPES))
+    g, robot = scenario.robot.gravity, Robot.of(scenario)
+    assert robot.equilibrium.lengths == pytest.approx([0.98 + g / 1000.0] * 2)
+    trajectory = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+    rise = 0.005 * np.cos(np.sqrt(1000.0) * trajectory.time.values)
+    heights = 2.0 - 0.98 - g / 1000.0 + rise
+    np.testing.assert_allclose(trajectory.p_WB[:, 0, 2], heights, atol=5e-5)
+    tension = g - 1000.0 * rise[:, np.newaxis] * [1.0, 1.0]
+    np.testing.assert_allclose(trajectory.tension / [0.6, 0.4], tension, atol=0.05)
+
+
 def test_a_robot_that_nothing_drives_has_no_gaits_to_search(undriven, refused, tmp_path):
     with refused(undriven.name, "robot.actuated", "oscillator"):
         check_scenario(undriven)

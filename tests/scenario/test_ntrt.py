@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers.structures import joined_nodes
 
@@ -108,6 +109,63 @@ def test_a_sphere_at_the_end_of_a_rod(tmp_path: Path) -> None:
     assert Structure.of(blueprint).mass == pytest.approx([rod + ball])
 
 
+DOCKED = """
+substructures: {a/b: {path: prism.yaml}}
+bond_groups:
+  string: {a/b/node_edge: [[high1, low1/low2], [high2, low2/low3], [high3, low3/low1]]}
+"""
+
+
+def test_a_bond_of_nodes_and_edges_moves_the_second_part_and_replaces_cables(tmp_path):
+    write(tmp_path, PRISM, "prism.yaml")
+    given = read(write(tmp_path, DOCKED))
+    p = {name: np.array(place) for name, place in given.nodes.items()}
+    centre = (p["a/high1"] + p["a/high2"] + p["a/high3"]) / 3.0
+    for i, j in ((1, 2), (2, 3), (3, 1)):  # the triangles have one size, their middles half of it
+        middle = (p[f"b/low{i}"] + p[f"b/low{j}"]) / 2.0
+        assert 2.0 * (middle - centre) == pytest.approx(p[f"a/high{i}"] - centre)
+    assert min(p["b/high1"] - p["a/high1"]) > -0.2 < p["b/high1"][2] - 0.3, "b stands on a"
+    pairs = [set(cable.nodes) for cable in given.all_cables]
+    assert len(pairs) == 2 * 9 - 6 + 6
+    assert {"b/low1", "a/high1"} in pairs and {"a/high1", "b/low2"} in pairs
+    assert {"b/low1", "b/low2"} not in pairs and {"a/high1", "a/high2"} not in pairs
+
+
+KINDS = """
+nodes: {u: [0, 12, 0], v: [0, 12, 4], a: [0, 9, 0], b: [0, 9, 4], w: [0, 5, 2], spare: [9, -3, 9]}
+pair_groups:
+  ceiling: [[u, v]]
+  bar: [[a, b]]
+  string: [[u, a], [v, b], [a, w], [b, w], [u, v], [a, b]]
+builders:
+  ceiling: {class: tgRodInfo, parameters: {density: 0}}
+  bar: {class: tgBoxInfo, parameters: {density: 0.7, width: 0.2, height: 0.1}}
+  w: {class: tgSphereInfo, parameters: {density: 3, radius: 1.5}}
+"""
+
+
+def test_boxes_spheres_on_cables_bodies_held_in_space_and_names_of_places(tmp_path, caplog):
+    given = read(write(tmp_path, KINDS))
+    assert given.anchors == {"u": "xyz", "v": "xyz"}, "of density 0"
+    assert given.nodes["u"][2] == pytest.approx(1.2), "where something is held, y = 0 is the ground"
+    assert (given.bodies, len(given.all_cables)) == ((("a", "b"), ("w",)), 4)
+    box, ball = 0.7 * 4.0 * 0.4 * 0.2, 3.0 * 4.0 / 3.0 * math.pi * 1.5**3  # kg
+    assert Structure.of(given.blueprint()).mass == pytest.approx([box, ball])
+    assert "spare" not in given.nodes
+    told = caplog.text
+    assert all(name in told for name in (": spare", ": ceiling", ": bar", ": u v, a b"))
+
+
+def test_of_several_builders_the_last_counts_and_bonds_have_the_names_of_their_parts(tmp_path):
+    string = "{class: tgBasicActuatorInfo, parameters: {stiffness: 3}}"
+    given = read(write(tmp_path, f"{PRISM}  string: {string}"))
+    assert given.cables["vertical/string"].stiffness == 3.0
+    write(tmp_path, VERTEBRA, "vertebra.yaml")
+    given = read(write(tmp_path, f"{SPINE}builders: {{string v1/v2: {string}}}"))
+    assert sorted(group.stiffness for group in given.cables.values()) == [3.0, 1000.0]
+
+
+ROD, EDGES = "pair_groups.prism_rod", "bond_groups.string.v1/v2/v3/node_edge"
 QUARTER = "rotation: {axis: [0, 1, 0], angle: 90}"
 
 
@@ -162,21 +220,30 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
     [
         ("nodes: {}\nnods: {}", "nods", "'nodes'"),
         (PRISM.replace("[low1, high2]", "[low1, hihg2]"), "pair_groups.prism_rod[0]", "'high2'"),
-        (PRISM.replace("tgRodInfo", "tgBoxInfo"), "builders.prism_rod.class", "'tgBoxInfo'"),
-        (SPINE.replace("1.5]", "9e14]"), "substructures", "'v3'"),
-        (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), "builders", "'prism_rod'"),
-        (PRISM + "  string: {class: tgBasicActuatorInfo}", "builders", "vertical and string"),
+        (PRISM.replace("RodInfo", "BoxInfo"), "builders.prism_rod.parameters.radius", "width"),
+        (PRISM.replace("tgRodInfo", "tgRoadInfo"), "builders.prism_rod.class", "'tgRodInfo'"),
+        (SPINE.replace("1.5]", "9e14]"), "substructures.v1/v2/v3", "'v3'"),
+        (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), f"{ROD}[0]", "'prism_rod'"),
+        (PRISM.replace("[low2, high3]", "[high2, low1]"), f"{ROD}[1]", f"{ROD}[0]"),
+        (PRISM.replace("0.25,", "1e-9,"), f"{ROD}[0]", "diameter"),
+        (PRISM.replace("1200", "1e6"), "builders.vertical.parameters.pretension", "100000.0 N"),
         (SPINE.replace("v3/node_node", "edge_node"), "bond_groups.string.v1/v2/edge_node", "'A/B"),
-        (SPINE.replace("v3/node", "v4/node"), "bond_groups.string.v1/v2/v4/node_node", "v2, v3"),
-        ("substructures: {v: {scale: 2}}", "substructures", "0 paths of 'v'"),
-        (SPINE.replace("/v2/v3: {", "/v1: {"), "substructures", "2 paths of 'v1'"),
+        (SPINE.replace("v3/node", "v4/node"), "bond_groups.string.v1/v2/v4/node_node", "'v4'"),
+        (SPINE.replace("node_node", "node_edge"), f"{EDGES}[0]", "NODE/NODE"),
+        (DOCKED.replace("low2/low3", "low1/high2"), "bond_groups.string.a/b/node_edge[1]", "rod"),
+        ("substructures: {v: {scale: 2}}", "substructures.v", "no path of the part 'v'"),
+        (SPINE.replace("/v2/v3: {", "/v1: {"), "substructures.v1/v1", "second path of 'v1'"),
         ("substructures: {v: {path: my.yaml}}", "substructures", "itself"),
+        # Without an offset the parts are at one place.
+        (SPINE.replace(", offset: [0, 0, 1.5]", ""), "pair_groups.rod[0]", "pair_groups.rod[0]"),
     ],
 )
 def test_problems_name_file_key_and_facts(text, key, fact, tmp_path, refused) -> None:
     write(tmp_path, VERTEBRA, "vertebra.yaml")
+    write(tmp_path, PRISM, "prism.yaml")
     file = write(tmp_path, text)
-    with refused(file, key, fact):
+    part = tmp_path / "vertebra.yaml" if "v1" in text and key == "pair_groups.rod[0]" else file
+    with refused(part, key, fact):
         read(file)
 
 

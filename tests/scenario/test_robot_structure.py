@@ -64,6 +64,19 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
     assert np.count_nonzero(blueprint.node_load) == 1
 
 
+def test_a_node_that_nothing_uses_is_left_out_with_a_note(tmp_path, caplog) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text(FILE.replace("nodes:", "nodes:\n  spare: [1, 1, 1]", 1))
+    assert read_structure(file).blueprint().node_names == structure().blueprint().node_names
+    assert "spare" in caplog.text
+
+
+def test_cables_of_two_groups_may_join_the_same_nodes() -> None:
+    given = structure("cables: {long: {pairs: [[e, f], [d, b]]}}\nactuated: {left: [long b d]}")
+    assert [one.name for one in given.all_cables[:3]] == ["side b d", "side c d", "long d b"]
+    assert given.cables_of_oscillator["left"] == (2,)
+
+
 TWO_FIXED = "nodes: {h: [1, 1, 1], i: [1, 1, 2]}\nanchors: {h: xyz, i: xyz}\n"
 
 
@@ -72,7 +85,7 @@ TWO_FIXED = "nodes: {h: [1, 1, 1], i: [1, 1, 2]}\nanchors: {h: xyz, i: xyz}\n"
     [
         ("cables: {side: {pairs: [[b, dd]]}}", "cables.side.pairs[0]", ["'dd'", "mean 'd'"]),
         ("struts: {bar: {pairs: [[f, g], [g, f]]}}", "struts.bar.pairs[1]", ["bar.pairs[0]"]),
-        ("cables: {long: {pairs: [[e, f], [d, b]]}}", "cables.long.pairs[1]", ["side.pairs[0]"]),
+        ("cables: {long: {pairs: [[e, f], [f, e]]}}", "cables.long.pairs[1]", ["long.pairs[0]"]),
         ("cables: {side: {pairs: [[b, d], [b, c]]}}", "cables.side.pairs[1]", ["'b a c'"]),
         ("cables: {long: {pairs: [[c, e]]}}", "cables", ["'bar'", "'b a c'"]),
         ("cables: {long: {tension: 12.3 N}}", "cables.long.tension", ["12.3 N", "12.21 N"]),
@@ -94,6 +107,9 @@ TWO_FIXED = "nodes: {h: [1, 1, 1], i: [1, 1, 2]}\nanchors: {h: xyz, i: xyz}\n"
         ("anchors: {q: xyz}", "anchors.q", ["'q'"]),
         ("anchors: {a: xw}", "anchors.a", ["'xw'", "x, y and z"]),
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xz}}", "nodes.h", ["no strut", "xyz"]),
+        ("{nodes: {h: [1, 1, 1]}, loads: {h: [0 N, 0 N, 1 N]}}", "loads.h", ["unused"]),
+        ("{nodes: {h: [1, 1, 1]}, masses: {h: 1 g}}", "nodes.h", ["no cable"]),
+        ("struts: {bar: {density: 0}}", "nodes.f", ["0 kg"]),
         ("anchors: {a: xyz, b: yz, c: z, d: xyz, e: yx, f: xyz, g: xy}", "anchors", ["every body"]),
         (f"{TWO_FIXED}cables: {{long: {{pairs: [[h, i]]}}}}", "cables.long.pairs[0]", ["fixed"]),
         ("{nodes: {h: [1, 1, 1]}, anchors: {h: xyz}, masses: {h: 1 g}}", "masses.h", ["fixed"]),

@@ -121,7 +121,7 @@ def test_a_unit_is_that_of_bare_coordinates() -> None:
         ("!Tetrahedra {file: own.yaml}", "robot.file", "unknown"),
         ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
         ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
-        ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.struts", "!Structure"),
+        ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.nodes", "none can move"),
         ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
         ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
     ],

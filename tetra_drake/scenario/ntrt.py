@@ -10,11 +10,10 @@ are not read, and cables end on the axes of rods.
 
 from __future__ import annotations
 
-import collections
 import functools
-import itertools
 import logging
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -59,7 +58,7 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     whole = Assembly(rules=[Rule(frozenset([tag]), one, at) for tag, one in defaults.items()])
     whole.add_file(file)
     made = _Translation(whole, unit)
-    made.add_parts()
+    made.add_all()
     try:
         StructureFile.from_tree(made.tree, file)
     except InputError as error:
@@ -80,16 +79,9 @@ class _Part(NamedTuple):
     place: Place
 
     @property
-    def is_massless(self) -> bool:
-        """True for a rod, box or sphere of density 0."""
-        return self.kind != "cables" and not self.rule.builder.parameters.density
-
-    @property
-    def kind(self) -> str:
-        """Key of its group in a structure file."""
-        if self.rule.builder.is_sphere:
-            return "spheres"
-        return "struts" if self.rule.builder.is_rigid else "cables"
+    def builder(self) -> Builder:
+        """Class and parameters."""
+        return self.rule.builder
 
 
 @dataclass
@@ -105,41 +97,48 @@ class _Translation:
     _names: dict[tuple[str, str, Place], str] = field(default_factory=dict)
     """Names of groups by kind, tags, and place of the builder."""
 
-    def add_parts(self) -> None:
-        """Adds everything that moves something."""
+    def add_all(self) -> None:
+        """Adds what moves, and what it hangs on."""
+        ignored = (name for rule in self.whole.rules for name in rule.builder.parameters.ignored)
+        if names := list(dict.fromkeys(ignored)):
+            self.tree["ignored"] = self.notes["not used, as the scenario has its own"] = names
         self.tree |= {"nodes": {}, "struts": {}, "cables": {}, "spheres": {}}
-        parts, rules = self._parts(), self.whole.rules
-        ignored = dict.fromkeys(name for one in rules for name in one.builder.parameters.ignored)
-        if ignored:
-            self.tree["ignored"] = list(ignored)
-            self.notes["not used, as the scenario has its own"] = list(ignored)
-        solids = [part for part in parts if part.kind != "cables"]
+        parts = self._parts()
+        solids = [part for part in parts if part.builder.kind != "cables"]
         bodies = components(Member("", "", solid.ends) for solid in solids)
         body_of = {node: number for number, nodes in enumerate(bodies) for node in nodes}
-        dense = {body_of[one.ends[0]] for one in solids if not one.is_massless}
+        dense = {body_of[solid.ends[0]] for solid in solids if solid.builder.has_mass}
         body_of = {node: body if body in dense else WORLD for node, body in body_of.items()}
-        twins = collections.Counter(frozenset(one.ends) for one in solids)
         used: dict[str, None] = {}
-        for part in parts:
-            one, other = (body_of.get(end, end) for end in part.ends)
-            if part.kind != "cables" and one == WORLD:
-                self._note("held in space, as their density is 0", part.group)
-            elif part.kind == "cables" and one == other and part.ends[0] != part.ends[1]:
-                self._note("left out, as they join a body to itself", " ".join(part.ends))
-            elif twins[frozenset(part.ends)] > 1 and part.kind == "struts" and part.is_massless:
-                twins[frozenset(part.ends)] -= 1
-                self._note("left out, as rods with mass have their place", part.group)
-            else:
-                self._add_part(part)
-                used |= dict.fromkeys(part.ends)
+        for part in self._effective(parts, body_of):
+            self._add_part(part)
+            used |= dict.fromkeys(part.ends)
         fixed = [name for name in used if body_of.get(name) == WORLD]
         self.tree["anchors"] = {_name(name): "xyz" for name in fixed}
-        lowest = min((self.whole.nodes[name][1] for name in used), default=0.0)
-        thickest = max((one.rule.builder.parameters.radius for one in solids), default=0.0)
-        self._add_nodes(list(used), ground=min(0.0, lowest - thickest) if fixed else lowest)
+        ground = min((self.whole.nodes[name][1] for name in used), default=0.0)
+        if fixed:
+            ground = min(0.0, ground - max(solid.builder.parameters.radius for solid in solids))
+        self._add_nodes(list(used), ground)
         for name, one in self._one_of.items():
             if one not in used and one not in body_of:
                 self._note("left out, as nothing uses them", name)
+
+    def _effective(self, parts: list[_Part], body_of: dict[str, int]) -> Iterator[_Part]:
+        """Parts that have an effect. `body_of` has the body of each node of one."""
+        solid = {frozenset(part.ends) for part in parts if part.builder.has_mass}
+        for part in parts:
+            first, second = (body_of.get(end, end) for end in part.ends)
+            if part.builder.kind == "cables":
+                if first == second and part.ends[0] != part.ends[1]:
+                    self._note("left out, as they join a body to itself", " ".join(part.ends))
+                    continue
+            elif first == WORLD:
+                self._note("held in space, as their density is 0", part.group)
+                continue
+            elif not part.builder.has_mass and frozenset(part.ends) in solid:
+                self._note("left out, as parts with mass have their place", part.group)
+                continue
+            yield part
 
     def error_in_file(self, error: InputError, file: Path) -> InputError:
         """An error about the tree as one about NTRT's files."""
@@ -167,25 +166,22 @@ class _Translation:
     def _parts(self) -> list[_Part]:
         """Rods, boxes, cables and spheres, with the last builders that fit."""
         whole, parts = self.whole, []
-        spheres = [rule for rule in whole.rules if rule.builder.is_sphere]
-        rigid = [rule for rule in whole.rules if rule.builder.is_rigid]
-        cables = [rule for rule in whole.rules if rule not in (*spheres, *rigid)]
         for pair in whole.pairs:
-            rule = whole.rule(pair.part, pair.tags, rigid) or whole.rule(
-                pair.part, pair.tags, cables
-            )
+            kinds = "struts", "cables"
+            found = (whole.rule(pair.part, pair.tags, kind) for kind in kinds)
+            rule = next(filter(None, found), None)
             if rule is None:
-                tags = [" ".join(sorted(rule.tags)) for rule in (*rigid, *cables)]
+                tags = [" ".join(rule.tags) for rule in whole.rules]
                 problem = f"found no builder for '{pair.group}'; {hint(pair.group, tags)}"
                 raise InputError(*pair.place, problem)
             first, second = (self._one_of[node] for node in pair.nodes)
-            if first == second and rule.builder.is_rigid and len({*pair.nodes}) == 2:
+            if first == second and rule.builder.kind == "struts" and len({*pair.nodes}) == 2:
                 self._note("left out, as their length is 0", pair.group)
                 continue
             parts.append(_Part(pair.group, (first, second), rule, pair.place))
         for name in whole.nodes:
             own, one = name.rpartition(".")[2], self._one_of[name]
-            rule = whole.rule(name.removesuffix(own), frozenset(own.split()), spheres)
+            rule = whole.rule(name.removesuffix(own), frozenset(own.split()), "spheres")
             if rule is not None:
                 group = " ".join(sorted(rule.tags))
                 parts.append(_Part(group, (one, one), rule, whole.places[name]))
@@ -193,21 +189,20 @@ class _Translation:
 
     def _add_part(self, part: _Part) -> None:
         """Adds a part to its group."""
-        kind, groups = part.kind, self.tree[part.kind]
+        kind = part.builder.kind
+        groups = self.tree[kind]
         made_by = kind, part.group, part.rule.place
         if made_by not in self._names:
-            name = first = _name(part.group.replace(" ", "/"))
-            for number in itertools.count(2):  # pairs with the same tags may have two builders
-                if name not in groups:
-                    break
-                name = f"{first}/{number}"
+            name = _name(part.group.replace(" ", "/"))
+            while name in groups:  # pairs with the same tags may have two builders
+                name += "+"
             self._names[made_by] = name
-            groups[name] = self._settings(part.rule.builder)
+            groups[name] = self._settings(part.builder)
             self._places[f"{kind}.{name}"] = part.place
             for ours in groups[name]:
                 theirs = f"{part.rule.place.key}.parameters.{_PARAMETERS.get(ours, ours)}"
                 self._places[f"{kind}.{name}.{ours}"] = part.rule.place._replace(key=theirs)
-            if part.rule.builder.made_as == "tgBoxInfo":
+            if part.builder.made_as == "tgBoxInfo":
                 self._note("round rods in place of boxes", name)
         members = "nodes" if kind == "spheres" else "pairs"
         own = groups[self._names[made_by]].setdefault(members, [])
@@ -217,7 +212,7 @@ class _Translation:
     def _settings(self, builder: Builder) -> Tree:
         """Settings of a group."""
         given, unit = builder.parameters, self.unit
-        if not builder.is_rigid and not builder.is_sphere:
+        if builder.kind == "cables":
             return {
                 "stiffness": f"{given.stiffness!r} N/m",
                 "damping": f"{given.damping!r} N*s/m",
@@ -225,9 +220,9 @@ class _Translation:
             }
         size = {"diameter": f"{2.0 * given.radius * unit!r} m"}
         size["density"] = f"{given.density / unit**3!r} kg/m^3"
-        return size if builder.is_sphere else size | {"node_diameter": "0 m"}
+        return size if builder.kind == "spheres" else size | {"node_diameter": "0 m"}
 
-    def _add_nodes(self, names: list[str], *, ground: float) -> None:
+    def _add_nodes(self, names: list[str], ground: float) -> None:
         """Adds nodes in the axes of structure files. `ground` is its height in NTRT's unit."""
         for name in names:
             p = self.unit * (self.whole.nodes[name][[2, 0, 1]] - [0.0, 0.0, ground])

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from tetra_drake.scenario.section import keys_of
 from tetra_drake.scenario.units import LARGEST
 from tetra_drake.scenario.yaml_text import read_mapping
 
-if TYPE_CHECKING:
-    from scipy.spatial.transform import Rotation as Turn
-
 MOST_BYTES = 2**20
 """Largest size of a file in bytes."""
 
@@ -30,6 +27,8 @@ MOST_PARTS = MOST_NODES // 2
 
 LEAST_PAIRS = 3
 """Least number of pairs in a bond of nodes and edges."""
+
+_NO_TURN = np.eye(3)
 
 Tags = frozenset[str]
 Ends = tuple[str, str]
@@ -94,9 +93,7 @@ class Assembly:
         self.places |= {part + name: Place(file, f"nodes.{name}") for name in given.nodes}
         _check_size(len(self.nodes), MOST_NODES, Place(file, "nodes"))
         for tags, pairs in given.pair_groups.items():
-            key = f"pair_groups.{tags}"
-            for number, pair in enumerate(pairs):
-                place = Place(file, f"{key}[{number}]")
+            for pair, place in _numbered(pairs, Place(file, f"pair_groups.{tags}")):
                 nodes = self._node(part, pair[0], place), self._node(part, pair[1], place)
                 self._add_pair(tags, part, nodes, place)
         for outer, groups in given.bond_groups.items():
@@ -104,10 +101,11 @@ class Assembly:
                 bond, tags = (outer, inner) if "/" in outer else (inner, outer)
                 self._add_bond(bond, tags, pairs, part, Place(file, f"bond_groups.{outer}.{inner}"))
 
-    def rule(self, part: str, tags: Tags, rules: Sequence[Rule]) -> Rule | None:
-        """The last one of some rules for tags in a part, whose own tags count, too."""
+    def rule(self, part: str, tags: Tags, kind: str) -> Rule | None:
+        """The last rule of a kind for tags in a part, whose own tags count, too."""
         tags |= _tags(_last(part.removesuffix(".")))
-        return next((rule for rule in reversed(rules) if rule.tags <= tags), None)
+        fitting = (one for one in reversed(self.rules) if one.tags <= tags)
+        return next((one for one in fitting if one.builder.kind == kind), None)
 
     def _content(self, file: Path) -> NtrtFile:
         if file not in self._read:
@@ -140,24 +138,21 @@ class Assembly:
         part: str,
         place: Place,
         *,
-        turn: Turn | None = None,
+        turn: np.ndarray = _NO_TURN,
         about: Sequence[float] | None = None,
         scale: float = 1.0,
         shift: np.ndarray | float = 0.0,
     ) -> None:
         """Turns and scales the nodes of a part about a point, by default their centre, and shifts
-        them."""
-        names = [name for name in self.nodes if name.startswith(part)]
-        if not names:
-            return
-        p = np.array([self.nodes[name] for name in names])
-        centre = p.mean(axis=0) if about is None else np.array(about)
-        arms = p - centre if turn is None else turn.apply(p - centre)
-        p = centre + scale * arms + shift
-        if not (farthest := np.abs(p).max()) <= LARGEST:
-            problem = f"'{part[:-1]}' reaches {farthest:g}, expected at most {LARGEST:g}"
-            raise InputError(*place, problem)
-        self.nodes |= dict(zip(names, p, strict=True))
+        them. `turn` is a matrix."""
+        if names := [name for name in self.nodes if name.startswith(part)]:
+            p = np.array([self.nodes[name] for name in names])
+            centre = p.mean(axis=0) if about is None else np.array(about)
+            p = centre + scale * (p - centre) @ turn.T + shift
+            if not (farthest := np.abs(p).max()) <= LARGEST:
+                problem = f"'{part[:-1]}' reaches {farthest:g}, expected at most {LARGEST:g}"
+                raise InputError(*place, problem)
+            self.nodes |= dict(zip(names, p, strict=True))
 
     def _part(self, part: str, tags: str, place: Place) -> str:
         """The least nested part with all tags inside a part."""
@@ -202,73 +197,65 @@ class Assembly:
                 continue
             # Builders may ask for the names of both parts.
             more = f"{first} {second} {first}/{second}"
-            for number, pair in enumerate(pairs):
-                at = place._replace(key=f"{place.key}[{number}]")
+            for pair, at in _numbered(pairs, place):
                 nodes = self._node(starts[0], pair[0], at), self._node(starts[1], pair[1], at)
                 self._add_pair(tags, part, nodes, at, more_tags=more)
 
     def _bond_edges(
         self, starts: Ends, tags: str, pairs: list[Pair], part: str, place: Place
     ) -> None:
-        """Bonds nodes of a part to the middles of edges (NODE/NODE) of another.
+        """Bonds nodes of a part to the middles of edges NODE/NODE of another.
 
         The second part is moved onto the first. Each cable at an edge becomes two cables, from its
-        ends to the node. Cables between bonded nodes of one part are removed.
+        ends to the node. Cables between the nodes are removed.
         """
-        if len(pairs) < LEAST_PAIRS:
-            raise InputError(*place, f"found {len(pairs)} pairs, expected {LEAST_PAIRS} at least")
-        nodes, edges, middles = [], [], []
-        for number, pair in enumerate(pairs):
-            at = place._replace(key=f"{place.key}[{number}]")
-            if sum("/" in end for end in pair) != 1:
-                raise InputError(*at, f"found {pair}, expected a node and an edge NODE/NODE")
+        bonds, middles = [], []
+        for pair, at in _numbered(pairs, place):
             ends = [
                 [self._node(start, name, at) for name in end.split("/", 1)]
                 for start, end in zip(starts, pair, strict=True)
             ]
-            nodes += [end[0] for end in ends if len(end) == 1]
-            edges += [(end[0], end[1]) for end in ends if len(end) == 2]
+            if sorted(map(len, ends)) != [1, 2]:
+                raise InputError(*at, f"found {pair}, expected a node and an edge NODE/NODE")
+            (node,), edge = sorted(ends, key=len)
+            bonds.append((node, edge, at))
             middles.append([np.mean([self.nodes[name] for name in end], axis=0) for end in ends])
-        there, own = np.swapaxes(np.array(middles), 0, 1)
-        self._dock(starts[1], there, own, place)
-        self._remove_cables(starts, nodes, edges, place)
-        for number, (node, edge) in enumerate(zip(nodes, edges, strict=True)):
-            at = place._replace(key=f"{place.key}[{number}]")
+        self._dock(starts[1], *np.array(middles).reshape(-1, 2, 3).swapaxes(0, 1), place=place)
+        self._remove_cables(starts, {node for node, _, _ in bonds}, place, inside=True)
+        for node, edge, at in bonds:
+            self._remove_cables(starts, {*edge}, at)
             self._add_pair(tags, part, (edge[0], node), at)
             self._add_pair(tags, part, (node, edge[1]), at)
 
-    def _dock(self, part: str, there: np.ndarray, own: np.ndarray, place: Place) -> None:
+    def _dock(self, part: str, there: np.ndarray, own: np.ndarray, *, place: Place) -> None:
         """Moves a part so that its `own` points (points, 3) come to points of another part: the
         centres meet, and the planes of the first three points; then the first points have the same
         direction from the centre."""
-        normal, own_normal = (np.cross(p[1] - p[0], p[2] - p[0]) for p in (there, own))
-        centre, own_centre = there.mean(axis=0), own.mean(axis=0)
-        first, own_first = there[0] - centre, own[0] - own_centre
-        if not all(map(np.any, (normal, own_normal, first, own_first))):
-            raise InputError(*place, "found ends in a line, expected the first three in a triangle")
-        turn = _least_turn(own_normal, normal, about=own[1] - own[0])
-        self._move(part, place, turn=turn, about=own_centre, shift=centre - own_centre)
-        turn = _least_turn(turn.apply(own_first), first, about=normal)
-        self._move(part, place, turn=turn, about=centre)
+        frames = [_frame(p) for p in (there, own)]
+        if not np.isfinite(frames).all():
+            raise InputError(*place, "the first three pairs form no triangle, expected one")
+        centre = own.mean(axis=0)
+        turn, shift = frames[0].T @ frames[1], there.mean(axis=0) - centre
+        self._move(part, place, turn=turn, about=centre.tolist(), shift=shift)
 
     def _remove_cables(
-        self, starts: Ends, nodes: Sequence[str], edges: Sequence[Ends], place: Place
+        self, starts: Ends, nodes: set[str], place: Place, *, inside: bool = False
     ) -> None:
-        """Removes the cables at edges, and those between some nodes, from two parts. Refuses an
-        edge that is a rod."""
-        rigid = [rule for rule in self.rules if rule.builder.is_rigid]
-        bonded, at_edges, kept = {*nodes}, {frozenset(edge) for edge in edges}, []
-        for pair in self.pairs:
-            ends = frozenset(pair.nodes)
-            is_edge = ends in at_edges
-            if pair.part.startswith(starts) and (is_edge or ends <= bonded):
-                if not any(rule.tags <= pair.tags for rule in rigid):
-                    continue
-                if is_edge:
-                    found = f"found the rod {'/'.join(pair.nodes)}"
-                    raise InputError(*place, f"{found}, expected an edge of cables")
-            kept.append(pair)
-        self.pairs = kept
+        """Removes the cables among some nodes from two parts. Rods are refused, or stay if they are
+        `inside`."""
+        rods = [rule for rule in self.rules if rule.builder.kind == "struts"]
+        found = [one for one in self.pairs if nodes >= {*one.nodes} and one.part.startswith(starts)]
+        stay = [one for one in found if any(rule.tags <= one.tags for rule in rods)]
+        if stay and not inside:
+            problem = f"found the rod {'/'.join(stay[0].nodes)}, expected an edge of cables"
+            raise InputError(*place, problem)
+        self.pairs = [one for one in self.pairs if one not in found or one in stay]
+
+
+def _numbered(pairs: list[Pair], place: Place) -> Iterator[tuple[Pair, Place]]:
+    """Pairs of a list with their places. `place` is the list's."""
+    for number, pair in enumerate(pairs):
+        yield pair, place._replace(key=f"{place.key}[{number}]")
 
 
 def _check_size(count: int, most: int, place: Place) -> None:
@@ -287,24 +274,24 @@ def _last(path: str) -> str:
     return path.rpartition(".")[2]
 
 
-def _turn(rotation: Rotation) -> Turn:
+def _turn(rotation: Rotation) -> np.ndarray:
+    """Matrix (3, 3) of a rotation."""
     from scipy.spatial import transform
 
     axis = np.array(rotation.axis) / np.abs(rotation.axis).max()  # its square must not be 0
     vector = rotation.angle * axis / np.linalg.norm(axis)
-    return transform.Rotation.from_rotvec(vector, degrees=True)
+    matrix: np.ndarray = transform.Rotation.from_rotvec(vector, degrees=True).as_matrix()
+    return matrix
 
 
-def _least_turn(start: np.ndarray, end: np.ndarray, *, about: np.ndarray) -> Turn:
-    """The least rotation from a direction to another; `about` an axis if they are opposite."""
-    from scipy.spatial import transform
-
-    a, b = start / np.linalg.norm(start), end / np.linalg.norm(end)
-    axis, cosine = np.cross(a, b), float(a @ b)
-    if cosine < 0.0 and np.linalg.norm(axis) < _OPPOSITE:
-        return transform.Rotation.from_rotvec(np.pi * about / np.linalg.norm(about))
-    return transform.Rotation.from_quat([*axis, 1.0 + cosine])
-
-
-_OPPOSITE = 1e-9
-"""Sine of the angle of two directions below which they count as opposite."""
+def _frame(p: np.ndarray) -> np.ndarray:
+    """Axes (3, 3) of points (points, 3), in rows: across the plane of the first three, along it
+    towards the first one from the centre, and across both. Not finite if there is no plane."""
+    if len(p) < LEAST_PAIRS:
+        return np.full((3, 3), np.nan)
+    normal = np.cross(p[1] - p[0], p[2] - p[0])
+    across = np.cross(normal, p[0] - p.mean(axis=0))
+    axes = np.array([normal, across, np.cross(across, normal)])
+    with np.errstate(invalid="ignore"):
+        unit: np.ndarray = axes / np.linalg.norm(axes, axis=1)[:, np.newaxis]
+    return unit

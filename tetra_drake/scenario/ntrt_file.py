@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import pydantic
 from pydantic import Field
 
-from tetra_drake.scenario.refusals import described, hint, refuse
+from tetra_drake.scenario.refusals import hint, refuse
 from tetra_drake.scenario.robot_structure import Pair
 from tetra_drake.scenario.section import Section
 from tetra_drake.scenario.units import LARGEST
@@ -57,13 +57,8 @@ class Parameters(Section):
     @property
     def ignored(self) -> list[str]:
         """Names of the given parameters that have no effect."""
-        fields = type(self).model_fields.items()
-        return [name for name, one in fields if one.annotation is Any and name in self.given]
-
-    @property
-    def given(self) -> set[str]:
-        """Names of the given parameters."""
-        return self.model_fields_set
+        fields, given = type(self).model_fields.items(), self.model_fields_set
+        return [name for name, one in fields if one.annotation is Any and name in given]
 
 
 class RigidParameters(Parameters):
@@ -126,16 +121,16 @@ class KinematicCableParameters(CableParameters):
     back_drivable: Any = None
 
 
-CLASSES: dict[str, type[Parameters]] = {
-    "tgRodInfo": RoundParameters,
-    "tgBoxInfo": BoxParameters,
-    "tgSphereInfo": RoundParameters,
-    "tgBasicActuatorInfo": BasicCableParameters,
-    "tgBasicContactCableInfo": BasicCableParameters,
-    "tgKinematicActuatorInfo": KinematicCableParameters,
-    "tgKinematicContactCableInfo": KinematicCableParameters,
+CLASSES: dict[str, tuple[str, type[Parameters]]] = {
+    "tgRodInfo": ("struts", RoundParameters),
+    "tgBoxInfo": ("struts", BoxParameters),
+    "tgSphereInfo": ("spheres", RoundParameters),
+    "tgBasicActuatorInfo": ("cables", BasicCableParameters),
+    "tgBasicContactCableInfo": ("cables", BasicCableParameters),
+    "tgKinematicActuatorInfo": ("cables", KinematicCableParameters),
+    "tgKinematicContactCableInfo": ("cables", KinematicCableParameters),
 }
-"""Parameters by the class of their builder."""
+"""Groups of a structure file and parameters, by the class of a builder."""
 
 
 class Builder(Section):
@@ -148,24 +143,25 @@ class Builder(Section):
     @classmethod
     def _check_class(cls, name: str) -> str:
         if name not in CLASSES:
-            refuse("", f"found {described(name)}; {hint(name, CLASSES)}")
+            refuse("", f"found '{name}'; {hint(name, CLASSES)}")
         return name
 
     @pydantic.field_validator("parameters")
     @classmethod
     def _read_parameters(cls, given: Any, info: pydantic.ValidationInfo) -> Any:
-        of_class = CLASSES.get(info.data.get("made_as", ""))
-        return of_class.model_validate({} if given is None else given) if of_class else given
+        if "made_as" not in info.data:
+            return given
+        return CLASSES[info.data["made_as"]][1].model_validate({} if given is None else given)
 
     @property
-    def is_sphere(self) -> bool:
-        """True for the builder of a sphere at a node."""
-        return self.made_as == "tgSphereInfo"
+    def kind(self) -> str:
+        """Key of the groups in a structure file: struts, spheres or cables."""
+        return CLASSES[self.made_as][0]
 
     @property
-    def is_rigid(self) -> bool:
-        """True for the builder of a rod or a box between two nodes."""
-        return self.made_as in ("tgRodInfo", "tgBoxInfo")
+    def has_mass(self) -> bool:
+        """True for rods, boxes and spheres, unless their density is 0."""
+        return self.kind != "cables" and self.parameters.density > 0.0
 
 
 class NtrtFile(Section):
