@@ -119,8 +119,7 @@ def judge(
     scenario = scenario.with_changes({"engine": "!Compiled", "disturbances": disturbances})
     fresh = fresh_draws(scenario, seed, draws)
     plan: list[_Planned] = [({"what": NOTHING}, Draw({}))]
-    for i, draw in enumerate(fresh):
-        plan.append(({"what": ALL, "draw": i, **draw.factors}, draw))
+    plan += [({"what": ALL, "draw": i, **draw.factors}, draw) for i, draw in enumerate(fresh)]
     if alone:
         plan += _alone(disturbances, fresh)
     rows = _simulated(scenario, plan, gaits, workers)
