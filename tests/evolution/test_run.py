@@ -55,7 +55,7 @@ def test_each_tetrahedrons_lifted_share_is_a_column(tmp_path):
     assert run.gait(0, 1)
 
 
-def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused):
+def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused, monkeypatch):
     run = run_small()
     plain = load_run(run)
     for path in run.rglob("*.jsonl"):
@@ -70,11 +70,16 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused)
     file.append([more])
     assert file.read() == [*entries, more]
     packed = run / "trial_00" / "iterations.jsonl.xz"
-    packed.write_bytes(b"no xz")
-    with refused(packed, "", ""):
+    monkeypatch.setattr("tetra_drake.evolution.entries.MOST", 2**20)
+    for content in (b"no xz", lzma.compress(b"{}\n")[:-9], lzma.compress(bytes(2**21), preset=0)):
+        packed.write_bytes(content)
+        with refused(packed, "", ""):
+            load_run(run)
+    packed.write_bytes(lzma.compress(b"{}", preset=0))
+    with refused(packed, "line 1", "no end"):
         load_run(run)
     for line in (b"{nonsense\n", b"[1]\n", b"\xff\n", b"[" * 10**5 + b"\n"):
-        packed.write_bytes(lzma.compress(line))
+        packed.write_bytes(lzma.compress(line, preset=0))
         with refused(packed, "line 1", "JSON"):
             load_run(run)
 

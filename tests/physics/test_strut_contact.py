@@ -1,7 +1,10 @@
 """The contact of two struts, against hand-made pairs."""
 
+import itertools
+
 import numpy as np
 import pytest
+from helpers.states import disturbed
 
 from tetra_drake.physics.capsules import (
     NearStruts,
@@ -12,7 +15,10 @@ from tetra_drake.physics.capsules import (
 )
 from tetra_drake.physics.contact import NormalForce
 from tetra_drake.physics.kinematics import FORCE, NODE_COLUMNS, P_WN, V_WN
-from tetra_drake.physics.struts import Struts
+from tetra_drake.physics.struts import Struts, strut_distance
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import moved_nodes
+from tetra_drake.scenario.load import load_scenario
 
 LAW = NormalForce(stiffness=1e4, damping=2e4)
 RADIUS = 0.01
@@ -83,22 +89,19 @@ def test_struts_touch_where_they_are_nearest_and_parallel_ones_in_the_middle(sec
     np.testing.assert_allclose(below[4], -place * below[2], atol=2e-3 * force)
 
 
-@pytest.mark.parametrize(
-    ("limit", "pairs"),
-    [(0.02, []), (0.04, [[0, 1]]), (0.12, [[0, 1], [1, 2]]), (0.14, [[0, 1], [0, 2], [1, 2]])],
-)
-def test_the_pairs_of_struts_within_a_limit_are_found(limit, pairs):
-    # Three bodies with a strut each, side by side: 3 cm and 10 cm apart.
-    y, count = np.array([0.0, 0.03, 0.13]), 3
-    nodes, state = np.zeros((2 * count, NODE_COLUMNS)), np.zeros(13 * count)
-    nodes[:, P_WN], nodes[:, P_WN + 1] = np.tile([-1.0, 1.0], count), np.repeat(y, 2)
-    state[: 7 * count].reshape(count, 7)[:, 5] = y
-    ends, ones = np.arange(2 * count).reshape(count, 2), np.ones(count)
-    struts = Struts(*ends.T.copy(), np.arange(count + 1), 2.0 * ones, RADIUS * ones)
-    search = Search(near=limit, drift=0.0, passage=0.0, lightest=1.0)
-    law, near = StrutContactLaw(True, np.array(LAW), np.array(search)), NearStruts.of(struts)
-    find_near_struts(struts, law, ones, state, nodes, near)
-    assert near.pairs[: near.count[0]].tolist() == pairs
+def test_all_pairs_of_struts_within_a_limit_are_found():
+    structure = Robot.of(load_scenario("six_bar")).structure
+    state = disturbed(structure, 3, pose=0.02, speed=0.0)
+    struts, nodes = structure.strut_table, moved_nodes(structure, state)
+    all_pairs, near = itertools.combinations(range(struts.length.size), 2), NearStruts.of(struts)
+    distances = {pair: strut_distance(struts, nodes, *pair) for pair in all_pairs}
+    for nearest in [0.0, *distances.values()]:
+        limit = nearest + 1e-9
+        search = Search(near=limit, drift=0.0, passage=0.0, lightest=1.0)
+        law = StrutContactLaw(True, np.array(LAW), np.array(search))
+        find_near_struts(struts, law, structure.radius, state, nodes, near)
+        expected = [list(pair) for pair, distance in distances.items() if distance <= limit]
+        assert near.pairs[: near.count[0]].tolist() == expected
 
 
 def test_the_force_is_continuous_as_struts_turn_through_parallel():

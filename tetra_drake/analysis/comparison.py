@@ -294,12 +294,10 @@ def _labelled(runs: Sequence[Run], given: Sequence[str] | None) -> dict[str, Run
     labels = list(given or [run.directory.resolve().name for run in runs])
     if given is None and len({*labels}) < len(labels):
         labels = [str(run.directory) for run in runs]
-    labelled: dict[str, Run] = {}
-    for label, run in zip(labels, runs, strict=True):
-        if label in labelled:
+    for label in labels:
+        if labels.count(label) > 1:
             raise InputError(label, "", "is given twice, expected different runs")
-        labelled[label] = run
-    return labelled
+    return dict(zip(labels, runs, strict=True))
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:

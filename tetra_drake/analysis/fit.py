@@ -20,10 +20,10 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say, Table, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
-from tetra_drake.scenario.common_sections import repeated, separate
+from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import python_value, value_at
+from tetra_drake.scenario.section import value_at
 from tetra_drake.scenario.units import given_quantity
 
 STEP = 1e-3
@@ -178,7 +178,7 @@ def fit_values(
     from scipy.optimize import least_squares
 
     began = time.perf_counter()
-    given = _given(measurements, parameters, source)
+    given = FitFile.from_tree({"parameters": parameters, "measurements": measurements}, source)
     fitted = [_parameter(scenario, key, each, source) for key, each in given.parameters.items()]
     measured = [
         each.read(scenario, f"measurement {number}")
@@ -206,20 +206,6 @@ def fit_values(
         gtol=np.finfo(float).eps,  # without it, no influence and no residual give NaN
     )
     return _result(problem, start, solution.x, time.perf_counter() - began)
-
-
-def _given(
-    measurements: Sequence[Measurement], parameters: Mapping[str, Bounds], source: object
-) -> FitFile:
-    """Arguments as the content of a file. Raises InputError, naming `source`, if they are none, or
-    if a key is given twice."""
-    if isinstance(parameters, Mapping):
-        parameters = {key: python_value(bounds) for key, bounds in parameters.items()}
-    given = {"parameters": parameters, "measurements": measurements}
-    content = FitFile.from_tree(given, source)
-    if key := repeated(content.parameters):
-        raise InputError(source, "parameters", f"'{key}' is given twice")
-    return content
 
 
 def _parameter(scenario: Scenario, key: str, bounds: Bounds, source: object) -> Parameter:
@@ -400,14 +386,13 @@ class _Problem:
     def _restore(self, name: str) -> bool:
         """Takes an evaluation from the folder. Returns False if it is not there, or damaged."""
         counts = [len(each.numbers) + 1 for each in self.measured]
-        size = np.dtype(float).itemsize * sum(counts)
         try:
             file = self._file(name)
-            content = read_bytes(file, "evaluation", most=SEAL + size) if file else b""
+            content = read_bytes(file, "evaluation") if file else b""
         except InputError:  # it is simulated again
             return False
         numbers = content[SEAL:]
-        if len(numbers) != size or content[:SEAL] != _seal(name, numbers):
+        if content[:SEAL] != _seal(name, numbers):
             return False
         arrays = np.split(np.frombuffer(numbers), np.cumsum(counts)[:-1])
         self._known[name] = [Prediction(each[:-1], float(each[-1])) for each in arrays]

@@ -128,8 +128,7 @@ def robustness(
     scenario = scenario.on_engine("compiled").with_changes({"disturbances": disturbances})
     fresh = fresh_draws(scenario, seed, draws)
     plan: list[_Planned] = [({"what": NOTHING}, Draw({}))]
-    for i, draw in enumerate(fresh):
-        plan.append(({"what": ALL, "draw": i, **draw.factors}, draw))
+    plan += [({"what": ALL, "draw": i, **draw.factors}, draw) for i, draw in enumerate(fresh)]
     if alone:
         plan += _alone(disturbances, fresh)
     rows = _simulated(scenario, plan, walkers, workers)

@@ -74,7 +74,7 @@ def sweep(
     count = len(walkers) * math.prod(len(values) for values in changes.values())
     if count > MOST:
         raise InputError("sweep", "changes", f"found {count} simulations, expected at most {MOST}")
-    combinations = list(itertools.product(*changes.values()))
+    combinations = itertools.product(*changes.values())
     grid = [dict(zip(changes, each, strict=True)) for each in combinations]
     scenarios = [with_joined_changes(base, each) for each in grid]
     outcomes = simulate_many(
@@ -83,8 +83,8 @@ def sweep(
         workers=workers,
     )
     labels = {}
-    for position, (key, values) in enumerate(changes.items()):
-        along = [each[position] for each in combinations]
+    for key, values in changes.items():
+        along = [each[key] for each in grid]
         firsts = [scenarios[along.index(value)] for value in values]
         labels[_dimension(key, changes)] = _labels(key, values, firsts)
     labels["gait"] = [gait.name for gait in walkers], {}

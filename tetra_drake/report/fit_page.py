@@ -37,6 +37,13 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
     return [PAGE, SCENARIO, *written]
 
 
+UNKNOWN = """`± ?`: the interval is unknown, because the data do not determine the value, or because
+predictions are not smooth: their derivatives by steps of 0.1 % and of 1 % of the start differ by
+more than 20 %. One contact that comes or goes within such a step is enough, in any part of a log:
+with other noise, or without that part, an interval may be found. The value is still the best one
+that was found; its error may be estimated by fits to parts of the data."""
+
+
 def _page(fit: Fit) -> str:
     notes = "\n".join(f"- {note}" for note in fit.notes)
     keys = [str(key) for key in fit.correlations]
@@ -56,6 +63,7 @@ def _page(fit: Fit) -> str:
             "by its root.",
             fit.table.markdown(),
             *([notes] if notes else []),
+            *([UNKNOWN.replace("\n", " ")] if fit.parameters["low"].isna().any() else []),
             "![residuals](residuals.figure.svg)",
             correlations.markdown(),
             f"[{SCENARIO}]({SCENARIO}) has the fitted values.\n",

@@ -237,6 +237,8 @@ def python_value(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, (list, tuple)):
         return [python_value(item) for item in value]
+    if isinstance(value, Mapping):
+        return {name: python_value(item) for name, item in value.items()}
     return value
 
 
