@@ -62,9 +62,18 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         except (OSError, ValueError) as error:
             problem = f"no Dask scheduler answers at '{cluster}': {error}"
             raise InputError("executor", "", problem) from error
-        for name in ("tetra_drake", "drake"):
-            _check_version(client, name)
-        yield DaskExecutors(client)
+        yield executors_of(client)
+
+
+def executors_of(client: Client) -> DaskExecutors:
+    """Factory of executors on a Dask client. Raises InputError if the client is closed or
+    asynchronous, or a worker has another version of this package or of Drake."""
+    if client.asynchronous or client.status != "running":
+        found = "asynchronous" if client.asynchronous else client.status
+        raise InputError("executor", "", f"found a Dask client that is {found}, expected running")
+    for name in ("tetra_drake", "drake"):
+        _check_version(client, name)
+    return DaskExecutors(client)
 
 
 def _check_version(client: Client, name: str) -> None:
