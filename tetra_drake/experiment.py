@@ -15,14 +15,9 @@ from tetra_drake.analysis.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import reevaluation
+from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
-from tetra_drake.evolution.evaluators import (
-    GivenExecutor,
-    MakeExecutor,
-    check_guard,
-    evaluator_of,
-    maker_of,
-)
+from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
 from tetra_drake.evolution.manifest import Manifest, Method, read_manifest
 from tetra_drake.evolution.progress import Display, Progress
 from tetra_drake.evolution.run import Run, load_run
@@ -258,10 +253,9 @@ def _completing(progress: Progress, failing: str) -> Iterator[None]:
         progress.warn(f"{failing}: {cause}")
 
 
-def _introduction(directory: Path, manifest: Manifest, workers: int | None, *, report: bool) -> str:
+def _introduction(directory: Path, manifest: Manifest, workers: object, *, report: bool) -> str:
     """Introduction to a run: method, scenario, and the files to come."""
-    count = "its executor's" if workers is None else workers
-    text = f"{directory}: {manifest.method}, seed {manifest.seed}, {count} workers\n"
+    text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
     text += str(manifest.scenario)
     if report:
         text += (

@@ -23,7 +23,7 @@ from concurrent import futures
 from concurrent.futures import BrokenExecutor, Executor, Future
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any, Protocol, Self, Union
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say
@@ -31,17 +31,12 @@ from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Task
 
 if TYPE_CHECKING:
-    from distributed import Client
-
     from tetra_drake.engines.compiled.lane_pool import LanePool
     from tetra_drake.evolution.evaluation import GaitEvaluation
 
 MakeExecutor = Callable[[int], Executor]
 """Function that makes an executor with the given number of workers. If it cannot choose the number,
-it has an attribute `workers`: the current number, or None if it is unknown."""
-
-GivenExecutor = Union[Executor, MakeExecutor, "Client"]
-"""An executor, a function that makes one, or a Dask client."""
+it has an attribute `workers`: the current number, or a text about it."""
 
 TASKS_PER_WORKER = 150
 """Number of tasks after which a worker process is replaced. Drake before 1.56 leaks about 2 MB per
@@ -217,7 +212,7 @@ class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
 class Lent(Executor):
     """An executor of the user, as a MakeExecutor: it is neither shut down nor replaced."""
 
-    workers = None
+    workers = "its executor's"
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
@@ -232,22 +227,6 @@ class Lent(Executor):
         except RuntimeError as error:
             problem = f"takes no more tasks; the run can be resumed: {error}"
             raise InputError("executor", "", problem) from error
-
-
-def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
-    """The function that makes executors, for an argument of evolve(). Raises InputError if the
-    argument is neither an executor nor a Dask client nor a function."""
-    if isinstance(executor, Executor):
-        return Lent(executor)
-    dask = sys.modules.get("distributed")
-    if dask and isinstance(executor, dask.Client):
-        from tetra_drake.evolution.cluster import executors_of
-
-        return executors_of(executor)
-    if executor is None or callable(executor):
-        return executor
-    expected = "an Executor, a Dask client, or a function that makes an Executor"
-    raise InputError("evolve", "executor", f"found {executor!r:.60}, expected {expected}")
 
 
 class Evaluations:
