@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers.brief import BRIEF
 
@@ -92,6 +93,7 @@ def test_a_failure_among_many_says_of_which_gait_and_scenario() -> None:
     assert walked.scenario == scenario
     assert (failed.name, failed.gait, failed.scenario) == ("random gait 2", gaits[1], failing)
     assert "random gait 2 on scenario failing" in repr(failed)
+    assert failed.fitness == -np.inf
 
 
 def test_a_run_stands_for_its_scenario_and_its_best_gait():
@@ -111,6 +113,11 @@ def test_a_run_stands_for_its_scenario_and_its_best_gait():
         (lambda: td.load_result(None), ("load_result", "folder")),
         (lambda: td.load_gait(5, td.load_scenario("quick")), ("load_gait", "path")),
         (lambda: td.evolve("quick", 5), ("evolve", "out")),
+        (lambda: td.ParameterSpace.of("quick").repair([1.0]), ("ParameterSpace", "vector")),
+        (
+            lambda: td.ParameterSpace.of("quick").gait([-1.0] * 26, name="g"),
+            ("ParameterSpace", "weight 2->1 extensor"),
+        ),
     ],
 )
 def test_an_argument_that_stands_for_nothing_is_named(call, named):

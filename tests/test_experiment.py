@@ -181,6 +181,27 @@ def test_a_run_is_resumed_only_by_its_own_method(
         reevaluate(run, None)
 
 
+def test_an_executor_that_is_given_stays_open(tiny, tmp_path, refused):
+    own = tetra_drake.evolve(tiny, tmp_path / "own", **QUICK).evaluations["fitness"]
+    with ThreadPoolExecutor(2) as executor:
+        for out in ("first", "second"):
+            run = tetra_drake.evolve(tiny, tmp_path / out, executor=executor, **QUICK)
+            assert run.evaluations["fitness"].equals(own)
+    with refused("executor", "", "shutdown"):
+        tetra_drake.evolve(tiny, tmp_path / "third", executor=executor, **QUICK)
+
+
+def test_a_resumed_run_is_checked_only_if_it_was_begun_so(tiny, tmp_path, monkeypatch):
+    again = MagicMock()
+    monkeypatch.setattr("tetra_drake.evolution.reevaluation.reevaluate", again)
+    out, resumed = tmp_path / "run", {"resume": True, "report": False}
+    tetra_drake.evolve(tiny, out, **QUICK)
+    tetra_drake.evolve(None, out, **resumed)
+    again.assert_not_called()
+    tetra_drake.evolve(None, out, reevaluate=True, **resumed)
+    again.assert_called_once()
+
+
 def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeypatch):
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda path: {}["x1"])
     with pytest.warns(RuntimeWarning, match="x1"):

@@ -100,6 +100,23 @@ def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.Monkey
     assert len(td.load_run("runs/python").evaluations) == 60
 
 
+@pytest.mark.parametrize(
+    ("library", "number"), [("optuna", 1), ("nevergrad", 2), ("scipy", 3), ("ribs", 4)]
+)
+def test_other_libraries_find_gaits(
+    library: str, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip(library)
+    short = td.load_scenario("coulomb").with_changes({"simulation.duration": "4 s"})
+    monkeypatch.setattr(td, "load_scenario", lambda name: short, raising=False)
+    page = (CHECKOUT / "tetra_drake/evolution/README.md").read_text(encoding="utf-8")
+    texts, names = snippets("python", page), dict[str, Any]()
+    exec(compile(texts[0] + texts[number], "evolution/README.md", "exec"), names)
+    gait, first = names["best"], td.seeded_gait(names["scenario"], 1)
+    best, other = td.simulate_many(names["scenario"], [gait, first])
+    assert best.fitness > other.fitness
+
+
 def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: None) -> None:
     (_, snippet) = snippets("python", SCENARIOS)
     names: dict[str, Any] = {}

@@ -269,7 +269,8 @@ def _evolve(
             machine
         resume: continue an interrupted run; needs only --out
         reevaluate: skip the simulations after the search, which check the best gaits in Drake if
-            the engine is another one, and the gaits of a map on disturbed robots
+            the engine is another one, and the gaits of a map on disturbed robots; --resume keeps to
+            it
 
     Example: tetra-drake evolve --scenario quick --out runs/demo
     """
@@ -307,7 +308,7 @@ def _evolve(
                 resume=resume,
                 executor=make_executor,
                 progress=Display(sys.stdout),
-                reevaluate=reevaluate,
+                reevaluate=None if reevaluate else False,
             )
     except KeyboardInterrupt:
         if not (out / MANIFEST).exists():

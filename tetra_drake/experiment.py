@@ -14,6 +14,7 @@ from tetra_drake.analysis.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure, check_whole
 from tetra_drake.evolution import reevaluation
+from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
 from tetra_drake.evolution.manifest import Manifest, Method, read_manifest
@@ -41,9 +42,9 @@ def evolve(
     overwrite: bool = False,
     optimizer: MakeOptimizer | None = None,
     objective: Objective | None = None,
-    executor: MakeExecutor | None = None,
+    executor: GivenExecutor | None = None,
     progress: Progress | bool | None = None,
-    reevaluate: bool = True,
+    reevaluate: bool | None = None,
     report: bool = True,
 ) -> Run:
     """Evolves gaits on a scenario and records the run in the new directory `out`.
@@ -65,15 +66,17 @@ def evolve(
             (see optimizers.base). By default the scenario gives the optimiser.
         objective: objective(result) -> float is maximised; by default the scenario's fitness. An
             objective that reads result.trajectory has the attribute `needs_trajectory = True`.
-        executor: executor(workers) makes a concurrent.futures.Executor, such as mpi4py's
-            MPIPoolExecutor; see also evolution.cluster.dask_cluster(). By default the compiled
-            engine simulates the candidates of all trials together, like simulate_many(). The other
-            engines simulate in worker processes. If worker processes cannot import the objective,
-            for example in a notebook, gaits are simulated one by one.
+        executor: A concurrent.futures.Executor or a Dask client, which stay open; or a function
+            that makes an Executor for a number of workers, such as mpi4py's MPIPoolExecutor; see
+            also evolution.cluster.dask_cluster(). By default the compiled engine simulates the
+            candidates of all trials together, like simulate_many(). The other engines simulate in
+            worker processes. If worker processes cannot import the objective, for example in a
+            notebook, gaits are simulated one by one.
         progress: True shows bars on a terminal, and lines in notebooks and files. A Progress (see
             evolution.progress) is a display of your own.
         reevaluate: After the evolution, evaluates the best gaits on the Drake diagram if the engine
-            is another, and simulates the gaits of a map on disturbed robots.
+            is another, and simulates the gaits of a map on disturbed robots. By default a new run
+            does so, and a resumed run does what it was begun with.
         report: After the evolution, writes report.html, replay.html, figures/ and, for a map,
             elites/.
 
@@ -83,7 +86,8 @@ def evolve(
     """
     check_guard()
     _check_counts(seed=(seed, 0), workers=(workers, 1))
-    _check_functions("evolve", optimizer=optimizer, objective=objective, executor=executor)
+    _check_functions("evolve", optimizer=optimizer, objective=objective)
+    make_executor = maker_of(executor)
     if progress is True:
         progress = Display(sys.stdout)
     if not isinstance(progress, Progress | None) and progress is not False:
@@ -104,11 +108,16 @@ def evolve(
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
         record = RunRecord.create(
-            out, scenario=scenario, seed=int(seed or 0), method=method, overwrite=overwrite
+            out,
+            scenario=scenario,
+            seed=int(seed or 0),
+            method=method,
+            overwrite=overwrite,
+            reevaluate=reevaluate is not False,
         )
     with record, progress:
-        cores = getattr(executor, "workers", None) or workers or available_cores()
-        progress.say(_introduction(out, record.manifest, cores, report=report))
+        count = getattr(make_executor, "workers", workers or available_cores())
+        progress.say(_introduction(out, record.manifest, count, report=report))
         _warn_of_versions(record.manifest, progress)
         if not resume:
             robot = Robot.of(scenario)
@@ -121,13 +130,13 @@ def evolve(
         if unfinished or (resume and objective is not None):
             evaluate = GaitEvaluation(scenario, objective)
             with evaluator_of(
-                evaluate, workers=workers, executor=executor, warn=progress.warn
+                evaluate, workers=workers, executor=make_executor, warn=progress.warn
             ) as evaluator:
                 if resume:
                     check_fitness(trials, out, evaluator)
                 run_trials(trials, evaluator, show=progress.show)
-        if reevaluate:
-            _simulate_again(record, objective, workers, executor, progress)
+        if record.manifest.reevaluate if reevaluate is None else reevaluate:
+            _simulate_again(record, objective, workers, make_executor, progress)
         if report:
             _report(out, progress)
     return load_run(out)
@@ -244,7 +253,7 @@ def _completing(progress: Progress, failing: str) -> Iterator[None]:
         progress.warn(f"{failing}: {cause}")
 
 
-def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
+def _introduction(directory: Path, manifest: Manifest, workers: object, *, report: bool) -> str:
     """Introduction to a run: method, scenario, and the files to come."""
     text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
     text += str(manifest.scenario)

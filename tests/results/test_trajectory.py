@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import xarray
 from helpers import prism
+from helpers.brief import BRIEF
 from helpers.made_up_walk import make_walk
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.trajectory import sample_times, save_dataset, with_indexes
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait import load_gait, seeded_gait
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 
@@ -116,8 +117,18 @@ def test_several_names_of_several_cables_each_are_selected() -> None:
     assert bodies.size == tension.cable.size / 2 and all("T2-T3" in name for name in bodies.values)
 
 
-def test_what_is_saved_is_what_is_read(tmp_path: Path) -> None:
-    walk = make_walk(bodies=2, duration=0.1)
-    save_dataset(walk, tmp_path / "t.nc")
-    with xarray.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as loaded:
-        xarray.testing.assert_identical(with_indexes(loaded.load()), walk)
+def test_what_is_saved_is_what_is_read_and_a_file_alone_says_what_was_simulated(
+    tmp_path: Path,
+) -> None:
+    scenario = load_scenario("quick").with_changes(BRIEF | {"engine": "!Compiled"})
+    result = simulate(scenario, seeded_gait(scenario), record=True)
+    save_dataset(result.trajectory, tmp_path / "t.nc")
+    loaded = with_indexes(xarray.load_dataset(tmp_path / "t.nc", engine="h5netcdf"))
+    xarray.testing.assert_identical(loaded, result.trajectory)
+    (tmp_path / "s.yaml").write_text(loaded.attrs["scenario"])
+    (tmp_path / "gait.json").write_text(loaded.attrs["gait"])
+    assert load_scenario(tmp_path / "s.yaml") == scenario
+    assert load_gait(tmp_path / "gait.json", scenario) == result.gait
+    assert loaded.attrs["title"] == result.title
+    assert {*np.unique(loaded.in_contact)} <= {*loaded.in_contact.attrs["flag_values"]}
+    assert all(values.variable.values.base is None for values in result.trajectory.values())

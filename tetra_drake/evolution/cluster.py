@@ -1,20 +1,24 @@
-"""Executors that run tasks on the workers of a Dask cluster."""
+"""Executors for evolve(): on the workers of a Dask cluster, or the user's own."""
 
 from __future__ import annotations
 
 import contextlib
 import logging
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluators import check_guard, deaf_to_ctrl_c
+from tetra_drake.evolution.evaluators import Lent, MakeExecutor, check_guard, deaf_to_ctrl_c
 from tetra_drake.machine import available_cores, check_package
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
+
+GivenExecutor = Union[Executor, MakeExecutor, "Client"]
+"""An executor, a function that makes one, or a Dask client."""
 
 
 class DaskExecutors:
@@ -62,9 +66,32 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         except (OSError, ValueError) as error:
             problem = f"no Dask scheduler answers at '{cluster}': {error}"
             raise InputError("executor", "", problem) from error
-        for name in ("tetra_drake", "drake"):
-            _check_version(client, name)
-        yield DaskExecutors(client)
+        yield executors_of(client)
+
+
+def executors_of(client: Client) -> DaskExecutors:
+    """Factory of executors on a Dask client. Raises InputError if the client is closed or
+    asynchronous, or a worker has another version of this package or of Drake."""
+    if client.asynchronous or client.status != "running":
+        found = "asynchronous" if client.asynchronous else client.status
+        raise InputError("executor", "", f"found a Dask client that is {found}, expected running")
+    for name in ("tetra_drake", "drake"):
+        _check_version(client, name)
+    return DaskExecutors(client)
+
+
+def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
+    """The function that makes executors, for an argument of evolve(). Raises InputError if the
+    argument is neither an executor nor a Dask client nor a function."""
+    if isinstance(executor, Executor):
+        return Lent(executor)
+    dask = sys.modules.get("distributed")
+    if dask and isinstance(executor, dask.Client):
+        return executors_of(executor)
+    if executor is None or callable(executor):
+        return executor
+    expected = "an Executor, a Dask client, or a function that makes an Executor"
+    raise InputError("evolve", "executor", f"found {executor!r:.60}, expected {expected}")
 
 
 def _check_version(client: Client, name: str) -> None:

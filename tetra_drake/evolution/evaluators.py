@@ -23,7 +23,7 @@ from concurrent import futures
 from concurrent.futures import BrokenExecutor, Executor, Future
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 MakeExecutor = Callable[[int], Executor]
 """Function that makes an executor with the given number of workers. If it cannot choose the number,
-it has an attribute `workers`: the current number."""
+it has an attribute `workers`: the current number, or a text about it."""
 
 TASKS_PER_WORKER = 150
 """Number of tasks after which a worker process is replaced. Drake before 1.56 leaks about 2 MB per
@@ -207,6 +207,26 @@ class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
         self._submitted.add(future)
         future.add_done_callback(self._submitted.discard)
         return future
+
+
+class Lent(Executor):
+    """An executor of the user, as a MakeExecutor: it is neither shut down nor replaced."""
+
+    workers = "its executor's"
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+
+    def __call__(self, workers: int) -> Executor:
+        return self
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **more: Any) -> Future[Any]:
+        """Submits a task. Raises InputError if the executor is broken or shut down."""
+        try:
+            return self._executor.submit(function, *args, **more)
+        except RuntimeError as error:
+            problem = f"takes no more tasks; the run can be resumed: {error}"
+            raise InputError("executor", "", problem) from error
 
 
 class Evaluations:

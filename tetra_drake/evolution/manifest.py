@@ -100,13 +100,18 @@ class Manifest:
     """Name of the run in the lines of its record."""
     thinned: bool = False
     """True if most genomes were removed to save space, as in the folder runs/."""
+    reevaluate: bool = True
+    """False if the run was begun without simulations after the evolution; see evolve()."""
 
     @classmethod
-    def of(cls, scenario: Scenario, seed: int, method: Method) -> Manifest:
+    def of(
+        cls, scenario: Scenario, seed: int, method: Method, *, reevaluate: bool = True
+    ) -> Manifest:
         """The manifest of a new run, with the versions that are installed."""
         now = versions(scenario.engine.packages)
         parts = (dump_scenario(scenario), seed, now, vars(method))
-        return cls(scenario, seed, now, method, _sha256(json.dumps(parts))[:_NAME])
+        name = _sha256(json.dumps(parts))[:_NAME]
+        return cls(scenario, seed, now, method, name, reevaluate=reevaluate)
 
     @property
     def other_versions(self) -> list[str]:
@@ -139,7 +144,9 @@ def read_manifest(directory: Path) -> Manifest:
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
     method = Method(file.objective, file.optimizer)
-    manifest = Manifest(scenario, file.seed, file.versions, method, file.run, file.thinned)
+    manifest = Manifest(
+        scenario, file.seed, file.versions, method, file.run, file.thinned, file.reevaluate
+    )
     if file.sha256 != _digest(manifest):
         raise InputError(path, "sha256", "does not fit the other keys: they were changed")
     return manifest
@@ -158,6 +165,8 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
         "optimizer": manifest.method.optimizer,
         "sha256": _digest(manifest),
     }
+    if not manifest.reevaluate:
+        content["reevaluate"] = False
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
@@ -174,6 +183,7 @@ class _File(Section):
     sha256: str
     """SHA-256 of run, seed, versions, objective and optimiser."""
     thinned: bool = False
+    reevaluate: bool = True
 
 
 def _digest(manifest: Manifest) -> str:

@@ -73,10 +73,12 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         seed: int,
         method: Method | None = None,
         overwrite: bool = False,
+        reevaluate: bool = True,
     ) -> RunRecord:
         """A new run in a new or empty directory. With `overwrite` the directory may hold another
         run, unless a process is working on it. begin() writes the first file."""
-        manifest = Manifest.of(scenario, seed, method or Method.of(scenario))
+        method = method or Method.of(scenario)
+        manifest = Manifest.of(scenario, seed, method, reevaluate=reevaluate)
         check_folder(directory)
         if not overwrite or _is_empty(directory):
             _check_empty(directory)
