@@ -13,11 +13,11 @@ LoadText = Callable[[str], Scenario]
 
 @pytest.fixture
 def load_text(tmp_path: Path) -> LoadText:
-    """Loads a text as a file that is based on the thesis scenario, unless it names another."""
+    """Loads a text as a file that is based on the thesis scenario."""
 
     def load(text: str) -> Scenario:
-        file, base = tmp_path / "mine.yaml", "" if text.startswith("base:") else "base: thesis\n"
-        file.write_text(f"{base}{text}\n", encoding="utf-8")
+        file = tmp_path / "mine.yaml"
+        file.write_text(f"base: thesis\n{text}\n", encoding="utf-8")
         return load_scenario(file)
 
     return load

@@ -43,13 +43,10 @@ DAMPING, RANGE, OTHER = "robot.cables.damping", "friction.stiction_range", "robo
 ROUGH = {"terrain": "!Rough {amplitude: 0.1 in, wavelength: 2 in}"}
 
 
-@pytest.mark.parametrize(
-    "spreads",
-    [
-        {OTHER: 0.1, DAMPING: 0.2, RANGE: 0.1},
-        {f"{OTHER}, {RANGE}": 0.1, DAMPING: 0.2},
-    ],
-)
+OTHERS = {OTHER: 0.1, DAMPING: 0.2, RANGE: 0.1}, {f"{OTHER}, {RANGE}": 0.1, DAMPING: 0.2}
+
+
+@pytest.mark.parametrize("spreads", OTHERS)
 def test_what_else_is_disturbed_changes_no_number_of_a_draw(scenario, spreads):
     both = {"draws": 2, "start": 0.1}
     first = scenario.with_changes(ROUGH | {"disturbances": both | {"spreads": {DAMPING: 0.2}}})

@@ -36,9 +36,8 @@ THESIS: list[tuple[str, str, tuple[float, ...]]] = [
     ("gait_bounds", "weight_min weight_max tau_a_min tau_a_max", (1, 3.4, 0.2, 0.5)),
     ("simulation", "duration settling_time", (15, 3)),
     ("evolution", "trials evaluations", (10, 50 + 2 * 2000)),
-    ("optimizer", "population tournament", (50, 5)),
-    ("optimizer", "crossover_probability mutation_probability", (0.2, 0.7)),
-    ("optimizer", "weight_mutation tau_mutation_range", (0.2, 0.05)),
+    ("optimizer", "population tournament crossover_probability", (50, 5, 0.2)),
+    ("optimizer", "mutation_probability weight_mutation tau_mutation_range", (0.7, 0.2, 0.05)),
     ("optimizer", "stop_rise stop_window stop_after", (0.03, 100, 200)),
 ]
 
@@ -73,6 +72,10 @@ BAD_CHANGES: list[tuple[object, str, str]] = [
     ({"robot.payload": ["35 g"]}, "robot.payload", "1 items"),
     ({"engine": "compiled"}, "engine", "!Compiled"),
     ({f"engine.{TAG}": {"a": 1}}, "engine", "!Compiled"),
+    # Keys without their sections
+    ({"duration": "5 s"}, "duration", "'simulation.duration'"),
+    ({"outer_stiffness": "5 N/m"}, "outer_stiffness", "'robot.cables.outer_stiffness'"),
+    ({"robot": {"slack": True}}, "robot.slack", "'cables.slack'"),
     # Networks that cannot be
     ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
     ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
@@ -214,16 +217,15 @@ def test_a_bad_file_is_refused(tmp_path, text, key, found, refused):
         load_scenario(file)
 
 
-@pytest.mark.parametrize(
-    ("key", "spread", "found"),
-    [
-        ("robot.cables.dampin", 0.1, "'robot.cables.damping'"),
-        ("robot.tetrahedra", 0.1, "no number"),
-        ("robot.cables.damping", 0.7, "0.7"),
-        ("optimizer.mutation_probability", 0.5, "at most 1"),
-        ("friction.kinetic", 0.1, "at most static"),
-    ],
-)
+ASTRAY = [("robot.cables.dampin", 0.1, "'robot.cables.damping'")]
+ASTRAY += [("robot.tetrahedra", 0.1, "no number"), ("robot.cables.damping", 0.7, "0.7")]
+ASTRAY += [
+    ("optimizer.mutation_probability", 0.5, "1"),
+    ("friction.kinetic", 0.1, "at most static"),
+]
+
+
+@pytest.mark.parametrize(("key", "spread", "found"), ASTRAY)
 def test_a_spread_that_leads_astray_is_refused(load_text, tmp_path, key, spread, found, refused):
     friction = "friction: !Coulomb\n" if "kinetic" in key else ""
     with refused(tmp_path / "mine.yaml", f"disturbances.spreads.{key}", found):

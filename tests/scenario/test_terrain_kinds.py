@@ -44,11 +44,8 @@ def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def test_the_ground_of_a_robot_ten_times_as_long_is_ten_times_as_large(terrain):
     lengths = ("height", "depth", "amplitude", "wavelength", "radius", "spacing")
     larger = {key: 10.0 * length for key, length in terrain if key in lengths}
-    grid, ours = (
-        terrain.grid(ahead=AHEAD, scale=1.0, source="file"),
-        terrain.model_copy(update=larger),
-    )
-    large = ours.grid(ahead=10.0 * AHEAD, scale=10.0, source="file")
+    grid = grid_of(terrain)
+    large = terrain.model_copy(update=larger).grid(ahead=10.0 * AHEAD, scale=10.0, source="file")
     np.testing.assert_allclose(large.heights, 10.0 * grid.heights, atol=1e-12)
     np.testing.assert_allclose(large.corner + large.cell, 10.0 * np.array(grid.corner + grid.cell))
 

@@ -27,31 +27,20 @@ def test_displayed_units_have_their_exact_definitions():
     assert pytest.approx((IN, LBF), rel=1e-15) == (INCH, POUND_FORCE)
 
 
-@pytest.mark.parametrize(
-    ("text", "unit", "expected"),
-    [
-        ("25 lbf/in", "N/m", 25 * LBF / IN),
-        ("0.72 s/in", "s/m", 0.72 / IN),
-        ("2.7 g/cm^3", "kg/m^3", 2.7e-3 / 1e-6),
-        (" -1.5e-3   m ", "m", -1.5e-3),
-    ],
-)
+EXACT = [("25 lbf/in", "N/m", 25 * LBF / IN), ("0.72 s/in", "s/m", 0.72 / IN)]
+EXACT += [("2.7 g/cm^3", "kg/m^3", 2.7e-3 / 1e-6), (" -1.5e-3   m ", "m", -1.5e-3)]
+
+
+@pytest.mark.parametrize(("text", "unit", "expected"), EXACT)
 def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
     assert quantity_to_si(text, unit) == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("system", "unit", "read"),
-    [
-        ("in", "m", "in"),
-        ("in", "N", "lbf"),
-        ("in", "N*s/m^2", "lbf*s/in^2"),
-        ("in", "1/rad", "/deg"),
-        ("cm", "m/s", "cm/s"),
-        ("mm", "1/m", "/mm"),
-        ("SI", "rad", "deg"),
-    ],
-)
+READ = [("in", "m", "in"), ("in", "N", "lbf"), ("in", "N*s/m^2", "lbf*s/in^2")]
+READ += [("in", "1/rad", "/deg"), ("cm", "m/s", "cm/s"), ("mm", "1/m", "/mm"), ("SI", "rad", "deg")]
+
+
+@pytest.mark.parametrize(("system", "unit", "read"), READ)
 def test_people_read_numbers_of_the_same_size(system, unit, read):
     units = SYSTEMS[system]
     size, name = units.of(unit)
@@ -100,18 +89,11 @@ def test_a_structure_is_shown_in_the_unit_in_which_it_is_given(nodes, expected, 
     assert units_of(scenario, tmp_path) == SYSTEMS[expected]
 
 
-@pytest.mark.parametrize(
-    ("text", "unit"),
-    [
-        ("6 in", "m"),
-        ("240 mm/s", "m/s"),
-        ("27 lbf*s/in^2", "N*s/m^2"),
-        ("9.80665 m/s^2", "m/s^2"),
-        ("1 /rad", "1/rad"),
-        ("0.125", ""),
-        ("0", "m"),
-    ],
-)
+ROUND = {"6 in": "m", "240 mm/s": "m/s", "27 lbf*s/in^2": "N*s/m^2", "9.80665 m/s^2": "m/s^2"}
+ROUND |= {"1 /rad": "1/rad", "0.125": "", "0": "m"}
+
+
+@pytest.mark.parametrize(("text", "unit"), ROUND.items())
 def test_a_setting_is_shown_in_the_unit_in_which_it_is_a_round_number(text, unit):
     number = quantity_to_si(text, unit) if " " in text else float(text)
     assert plainest(number, unit) == text

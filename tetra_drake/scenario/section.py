@@ -77,9 +77,8 @@ class Section(BaseModel):
             first = max(of_field, key=lambda one: _place(one, tree)[1])
         key, problem = _in_words(first, cls, tree)
         if first["type"] == "missing" and info.context and info.context["has_base"]:
-            is_kind = isinstance(tree, dict) and TAG in tree
             whole = f", as !{cls.tag} replaces a base's kind"
-            problem += whole if is_kind else ", or name a `base` that has it"
+            problem += whole if TAG in (tree or {}) else ", or name a `base` that has it"
         refuse(key, problem)
 
     @pydantic.model_validator(mode="before")
