@@ -65,7 +65,7 @@ Info = dict[str, Any]
 
 WALK, ROLL = "tetra_drake/Walk-v0", "tetra_drake/Roll-v0"
 """Names of the environments of a robot that walks, by default on the scenario `walk`, and of one
-that rolls, by default on `rover`."""
+that rolls, by default on `roll`."""
 
 _SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
 
@@ -88,11 +88,8 @@ class _Episodes:
         if most_steps is not None:
             check_whole(_SOURCE, "max_episode_steps", most_steps, least=1)
         self.simulation, self._most_steps = simulation, most_steps
-        self.metadata = {
-            "render_modes": [_RENDERED],
-            "render_fps": max(1, round(1.0 / simulation.control_period)),
-        }
-        self._camera: Any = None
+        frames_per_second = max(1, round(1.0 / simulation.control_period))
+        self.metadata = {"render_modes": [_RENDERED], "render_fps": frames_per_second}
         self._scenario: Scenario = simulation.scenario
         robot, count, start = simulation.robot, simulation.count, simulation.state
         by_network = Robot.of(self._scenario)
@@ -183,11 +180,10 @@ class _Episodes:
 
     def pictures(self) -> tuple[np.ndarray, ...]:
         """Pictures of all robots now; see visualization.picture."""
-        if self._camera is None:
-            from tetra_drake.visualization.picture import Camera
+        from tetra_drake.visualization.picture import picture
 
-            self._camera = Camera(self.simulation.robot)
-        return tuple(self._camera.picture(p_WN) for p_WN in self.simulation.state.p_WN)
+        simulation = self.simulation
+        return tuple(picture(simulation.robot, p_WN) for p_WN in simulation.state.p_WN)
 
     def _observe(self, readings: Readings) -> np.ndarray:
         """Observations (N, size)."""
@@ -330,6 +326,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         for place in np.flatnonzero(self._ended).tolist():
             last[place] = seen[place]
         info: Info = {"final_obs": last, "_final_obs": self._ended, "final_info": {}}
+        info["_final_info"] = self._ended
         seen = self._episodes.reset(np.flatnonzero(self._ended), self._generators)
         return seen, rewards, terminated, truncated, info
 
@@ -348,33 +345,28 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         """A seed for each robot; None if its generator goes on."""
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
-            if len(seed) != self.num_envs:
-                problem = f"found {len(seed)} seeds, expected {self.num_envs}"
-                raise InputError(_SOURCE, "seed", problem)
-            return [_checked_seed(each) for each in seed]
-        first = _checked_seed(seed)
-        return [None if first is None else first + i for i in range(self.num_envs)]
+        if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+            first = _checked_seed(seed)
+            return [None if first is None else first + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            problem = f"found {len(seed)} seeds, expected {self.num_envs}"
+            raise InputError(_SOURCE, "seed", problem)
+        return [_checked_seed(each) for each in seed]
 
 
 def _checked_seed(seed: int | None) -> int | None:
-    if seed is None:
-        return None
-    check_whole(_SOURCE, "seed", seed, least=0)
-    return int(seed)
+    return None if seed is None else check_whole(_SOURCE, "seed", seed, least=0)
 
 
 def _check_options(options: Info | None, *known: str) -> None:
     """Raises InputError for an option of reset() that is none of the known ones."""
-    if options is not None and not isinstance(options, Mapping):
-        raise InputError(_SOURCE, "options", f"found {options!r:.60}, expected a mapping")
-    for name in options or {}:
-        if name not in known:
-            expected = ", ".join(map(repr, known)) or "none"
-            raise InputError(_SOURCE, "options", f"found {name!r:.60}, expected {expected}")
+    is_known = isinstance(options, Mapping) and set(options) <= set(known)
+    if options is not None and not is_known:
+        expected = " or ".join(["None", *known])
+        raise InputError(_SOURCE, "options", f"found {options!r:.60}, expected {expected}")
 
 
-for _name, _scenario in {WALK: "walk", ROLL: "rover"}.items():
+for _name, _scenario in {WALK: "walk", ROLL: "roll"}.items():
     gymnasium.register(
         _name,
         entry_point="tetra_drake.gym:TensegrityEnv",

@@ -1,17 +1,23 @@
 """Robots in control periods: Simulation(count=N), on the compiled engine and on the diagram."""
 
+import copy
 import math
+import multiprocessing
+import pickle
+import signal
+import threading
 
 import numpy as np
 import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
 
 from tetra_drake.engines import interface
-from tetra_drake.engines.compiled.lane_engine import processor_lanes
-from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.compiled.lane_engine import LaneEngine, processor_lanes
+from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
 from tetra_drake.robot.command import Command
+from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
 
@@ -20,6 +26,7 @@ SPANS = {"!Force": 2.0, "!Winch": 0.01, "!TensionMotor": 1.0}
 """Actions differ from those at rest by up to this, in N, m and N."""
 
 
+OTHERS = ("!Drake", "!Mujoco")
 READINGS = {"length": "lengths", "normal_force": "normal_forces", "tension": "tensions"}
 READINGS |= {name: name for name in ("p_WN", "v_WN", "q_WB")}
 """Of variables of a trajectory."""
@@ -141,6 +148,68 @@ def test_the_last_period_ends_with_the_simulation(short):
     assert times[-2:] == [0.24, 0.25] and simulation.ended.all()
 
 
+def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
+    scenario = short.with_changes(WINCH)
+    one, alone = (Simulation(scenario, count=9, workers=workers) for workers in (1, 9))
+    actions = drawn_actions(one)
+    for ours, theirs in zip(go(one, actions), go(alone, actions), strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("engine", "inner"),
+    [("!Compiled", (LaneEngine, "_simulate")), *((e, (Readings, "put")) for e in OTHERS)],
+)
+def test_after_an_interrupt_a_reset_makes_the_robots_whole(
+    short, engine, inner, monkeypatch, refused
+):
+    two = Simulation(short.with_changes({"engine": engine}), count=2, workers=2)
+    actions, call = drawn_actions(two)[:3], getattr(*inner)
+    expected = go(two, actions)[-1]
+    two.reset()
+    two.step(actions[0])
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(*inner, lambda *a: (call(*a), signal.raise_signal(signal.SIGINT)))
+        two.step(actions[1])
+    for method, use in {"step": lambda: two.step(actions[1]), "state": lambda: two.state}.items():
+        with refused("Simulation", method, "reset() all robots"):
+            use()
+    with refused("Simulation", "reset", "reset() all robots"):
+        two.reset(indices=[1])
+    two.reset()
+    for found, wanted in zip(go(two, actions)[-1], expected, strict=True):
+        assert np.array_equal(found, wanted)
+
+
+def test_another_thread_is_refused_during_a_step(short, monkeypatch):
+    simulation, told, simulate_lanes = Simulation(short), [], LaneEngine._simulate
+
+    def intrude() -> None:
+        with pytest.raises(InputError) as caught:
+            simulation.step(simulation.rest)
+        told.append(caught.value.key)
+
+    def interfered(*args: object) -> None:
+        thread = threading.Thread(target=intrude)
+        thread.start()
+        thread.join()
+        simulate_lanes(*args)
+
+    monkeypatch.setattr(LaneEngine, "_simulate", interfered)
+    assert simulation.step(simulation.rest).time == [PERIOD]
+    assert told == ["step"]
+
+
+def test_robots_in_two_threads_go_on_in_a_fork(short):
+    simulation = Simulation(short, count=2, workers=2)
+    simulation.step(simulation.rest)
+    fork = multiprocessing.get_context("fork")
+    child = fork.Process(target=simulation.step, args=(simulation.rest,))
+    child.start()
+    child.join(60.0)
+    assert child.exitcode == 0
+
+
 NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
 
 
@@ -148,7 +217,15 @@ NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
     ("call", "key", "facts"),
     [
         (lambda two: two.step(np.zeros((2, 7))), "actions", ("(2, 7)", "(2, 8)")),
-        (lambda two: two.step("fast"), "actions", ("'fast'",)),
+        *(
+            (lambda two, a=actions: two.step(a), "actions", ("real numbers of shape (2, 8)",))
+            for actions in (
+                "fast",
+                np.zeros((2, 8), complex),
+                np.zeros((2, 8), object),
+                np.ma.array(np.zeros((2, 8)), mask=True),
+            )
+        ),
         (lambda two: two.step(NAN), "actions[1], T3-T4 outer bottom_left", ("nan",)),
         (lambda two: two.result(1), "result", ("robot 1 is at 0 s",)),
         (lambda two: two.reset(indices=[2]), "indices", ("0 to 1",)),
@@ -156,15 +233,26 @@ NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
         (lambda two: two.reset(indices=1), "indices", ("0 to 1",)),
         (lambda two: Simulation(two.scenario, control_period=0.00075), "control_period", ()),
         (lambda two: Simulation(two.scenario, control_period="fast"), "control_period", ()),
-        (lambda two: Simulation(two.scenario, count=0), "count", ("0",)),
-        (lambda two: Simulation(two.scenario, count=1.5), "count", ("1.5",)),
+        (lambda two: Simulation(two.scenario, control_period=1e29), "control_period", ("1e+29",)),
+        (lambda two: Simulation(two.scenario, record="nan"), "record", ("'nan'",)),
+        (lambda two: Simulation(two.scenario, name=None), "name", ("None",)),
+        *(
+            (lambda two, n=count: Simulation(two.scenario, count=n), "count", (str(count),))
+            for count in (0, 1.5, True, 10**9)
+        ),
+        (lambda two: Simulation(two.scenario, workers="x"), "workers", ("'x'",)),
         (lambda two: two.reset(seed=-1), "seed", ("-1",)),
+        (lambda two: two.reset(seed=[1, 2, 3]), "seed", ("3 seeds",)),
+        (copy.deepcopy, "", ("the same arguments",)),
+        (pickle.dumps, "", ("the same arguments",)),
     ],
 )
 def test_wrong_input_is_told_in_a_line(short, call, key, facts, refused):
     two = Simulation(short.with_sections(disturbances=Disturbances(draws=1)), count=2, workers=1)
     with refused("Simulation", key, *facts):
         call(two)
+    with refused("simulate_many", "workers", "2.5"):
+        simulate_many(short, [], workers=2.5)
 
 
 def test_a_robot_that_has_ended_is_not_moved_on(short, refused):

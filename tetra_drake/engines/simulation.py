@@ -241,15 +241,14 @@ class Simulation:
         if seed is None:
             return [None] * len(places)
         if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
-            seeds: list[Any] = [(each, 0) for each in seed]
+            seeds = [(check_whole("Simulation", "seed", each, least=0), 0) for each in seed]
         else:
-            seeds = [(seed, place) for place in places]
+            one = check_whole("Simulation", "seed", seed, least=0)
+            seeds = [(one, place) for place in places]
         if len(seeds) != len(places):
             problem = f"found {len(seeds)} seeds, expected one, or one for each of {len(places)}"
             raise InputError("Simulation", "seed", problem)
-        for each, _ in seeds:
-            check_whole("Simulation", "seed", each, least=0)
-        return [None] * len(places) if self.scenario.disturbances is None else seeds
+        return [None] * len(places) if self.scenario.disturbances is None else [*seeds]
 
     def _drawn(self, seed: tuple[int, int]) -> Robot:
         """The robot with a draw of the scenario's disturbances."""
