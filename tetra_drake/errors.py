@@ -61,6 +61,12 @@ def check_whole(
     return int(number)
 
 
+def check_truth(source: object, key: str, value: object) -> None:
+    """Raises InputError unless a value is True or False."""
+    if not isinstance(value, bool):
+        raise InputError(source, key, f"found {value!r:.60}, expected True or False")
+
+
 class SimulationFailure(RuntimeError):
     """A simulation that failed at `time` (s) for a `reason`."""
 

@@ -41,8 +41,8 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.simulation import Simulation, checked_actions
-from tetra_drake.errors import InputError, SimulationFailure, check_whole
+from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
+from tetra_drake.errors import InputError, SimulationFailure, check_truth, check_whole
 from tetra_drake.results.metrics import pose_fitness, poses_of
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.readings import Readings, pitch_rates
@@ -82,7 +82,8 @@ class _Episodes:
         most_steps: int | None = None,
     ) -> None:
         """Robots that have no episodes yet. An episode has at most `most_steps`."""
-        if render_mode not in (None, _RENDERED):
+        check_truth(_SOURCE, "grouped", grouped)
+        if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
             raise InputError(_SOURCE, "render_mode", problem)
         if most_steps is not None:
@@ -345,7 +346,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         """A seed for each robot; None if its generator goes on."""
-        if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+        if not is_list(seed):
             first = _checked_seed(seed)
             return [None if first is None else first + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
@@ -354,7 +355,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         return [_checked_seed(each) for each in seed]
 
 
-def _checked_seed(seed: int | None) -> int | None:
+def _checked_seed(seed: Any) -> int | None:
     return None if seed is None else check_whole(_SOURCE, "seed", seed, least=0)
 
 

@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
-import tetra_drake.gym
+from tetra_drake.gym import ROLL, WALK
 
-steps, robots = 300_000, 32
-name = f"tetra_drake/{sys.argv[1]}" if sys.argv[1:] == ["Roll-v0"] else tetra_drake.gym.WALK
+name, grouped, steps, robots = WALK, True, 130_000, 32
+if sys.argv[1:] == ["Roll-v0"]:
+    name, grouped, steps = ROLL, False, 300_000
 
 
 class Robots(VecEnv):
@@ -65,7 +66,7 @@ class Robots(VecEnv):
 
 
 # %% PPO, with the same digits for the same seed on the same processor.
-together = Robots(gymnasium.make_vec(name, num_envs=robots, grouped=True))
+together = Robots(gymnasium.make_vec(name, num_envs=robots, grouped=grouped))
 scaled = VecNormalize(VecMonitor(together), gamma=0.99)
 learner = PPO(
     "MlpPolicy",
@@ -85,7 +86,7 @@ while learner.num_timesteps < steps:
 
 
 # %% An episode of the trained policy, and of others to compare. A replay shows the trained one.
-alone: Any = gymnasium.make(name, grouped=True, record=True)
+alone: Any = gymnasium.make(name, grouped=grouped, record=True)
 
 
 def score(act: Any) -> float:

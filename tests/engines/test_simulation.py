@@ -1,11 +1,12 @@
 """Robots in control periods: Simulation(count=N), on the compiled engine and on the diagram."""
 
 import copy
+import functools
 import math
 import multiprocessing
 import pickle
 import signal
-import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -86,60 +87,31 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(
 
 
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
-    alone = Simulation(short, count=LANES, workers=1)
+    alone, simulation = (Simulation(short, count=LANES, workers=1) for _ in range(2))
     actions = drawn_actions(alone)
-    expected = go(alone, actions)[-1]
-    simulation = Simulation(short, count=LANES, workers=1)
     bad = actions.copy()
-    bad[3, 2] = 1e9
-    bad[4:, 2] = math.nan
-    found = go(simulation, bad)[-1]
+    bad[3, 2], bad[4:, 2] = 1e9, math.nan
+    expected, found = go(alone, actions)[-1], go(simulation, bad)[-1]
     assert isinstance(simulation.failures[2], Diverged)
     assert 0.06 <= simulation.failures[2].time < 0.08
     with pytest.raises(Diverged):
         simulation.result(2)
-    others = [robot for robot in range(LANES) if robot != 2]
-    assert [simulation.failures[robot] for robot in others] == [None] * (LANES - 1)
+    others = np.arange(LANES) != 2
+    assert [failure is None for failure in simulation.failures] == others.tolist()
     for ours, theirs in zip(found, expected, strict=True):
         assert np.array_equal(ours[others], theirs[others])
     simulation.reset(indices=[2])
     assert simulation.failures[2] is None and not simulation.ended[2]
 
 
-def test_a_robot_that_starts_again_walks_as_before(short):
-    simulation = Simulation(short, count=LANES, workers=1)
-    actions = drawn_actions(simulation)
-    for some in actions[:5]:
-        simulation.step(some)
-    again = simulation.reset(indices=[1])
-    assert again.time.tolist() == [0.0 if robot == 1 else 0.1 for robot in range(LANES)]
-    for k in range(10):
-        mixed = actions[5 + k].copy()
-        mixed[1] = actions[k][1]
-        again = simulation.step(mixed)
-    whole = Simulation(short, count=LANES, workers=1)
-    states = go(whole, actions)
-    for robot, expected in ((0, states[-1]), (1, states[10])):
-        for found, wanted in zip(again, expected, strict=True):
-            assert np.array_equal(found[robot], wanted[robot])
-
-
-def test_seeds_repeat_disturbed_robots_bit_for_bit(short):
-    spreads = {"robot.spacing": 0.02, "robot.cables.outer_stiffness": 0.1}
-    settings = Disturbances(draws=1, spreads=spreads, start=0.01)
-    disturbed = short.with_sections(disturbances=settings)
-    simulation = Simulation(disturbed, count=LANES, workers=1)
-    actions = drawn_actions(simulation)
-    plain = simulation.state.p_WN[0]
-    seen = []
-    for seed in (1, 1, 2):
-        start = simulation.reset(seed=seed)
-        ends = go(simulation, actions)[-1].p_WN
-        assert len({end.tobytes() for end in ends}) == LANES
-        assert not np.array_equal(start.p_WN[0], plain)
-        seen.append(ends.tobytes())
-    assert seen[0] == seen[1] != seen[2]
-    assert np.array_equal(simulation.reset().p_WN[0], plain)
+def test_each_seed_disturbs_robots_in_its_own_way_and_none_does_not(short):
+    settings = Disturbances(draws=1, spreads={"robot.spacing": 0.02}, start=0.01)
+    robots = Simulation(short.with_sections(disturbances=settings), count=LANES, workers=1)
+    plain = robots.state.p_WN
+    starts = [robots.reset(seed=seed).p_WN for seed in (1, 1, 2, [3] * LANES)]
+    assert np.array_equal(starts[0], starts[1])
+    assert len({start.tobytes() for start in np.concatenate([*starts[1:], plain])}) == 2 * LANES + 2
+    assert np.array_equal(robots.reset().p_WN, plain)
 
 
 def test_the_last_period_ends_with_the_simulation(short):
@@ -171,9 +143,8 @@ def test_after_an_interrupt_a_reset_makes_the_robots_whole(
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr(*inner, lambda *a: (call(*a), signal.raise_signal(signal.SIGINT)))
         two.step(actions[1])
-    for method, use in {"step": lambda: two.step(actions[1]), "state": lambda: two.state}.items():
-        with refused("Simulation", method, "reset() all robots"):
-            use()
+    with refused("Simulation", "step", "reset() all robots"):
+        two.step(actions[1])
     with refused("Simulation", "reset", "reset() all robots"):
         two.reset(indices=[1])
     two.reset()
@@ -182,22 +153,14 @@ def test_after_an_interrupt_a_reset_makes_the_robots_whole(
 
 
 def test_another_thread_is_refused_during_a_step(short, monkeypatch):
-    simulation, told, simulate_lanes = Simulation(short), [], LaneEngine._simulate
-
-    def intrude() -> None:
-        with pytest.raises(InputError) as caught:
-            simulation.step(simulation.rest)
-        told.append(caught.value.key)
-
-    def interfered(*args: object) -> None:
-        thread = threading.Thread(target=intrude)
-        thread.start()
-        thread.join()
-        simulate_lanes(*args)
-
-    monkeypatch.setattr(LaneEngine, "_simulate", interfered)
-    assert simulation.step(simulation.rest).time == [PERIOD]
-    assert told == ["step"]
+    simulation, told, call = Simulation(short), [], LaneEngine._simulate
+    with ThreadPoolExecutor(1) as pool, monkeypatch.context() as patch:
+        step = functools.partial(pool.submit, simulation.step, simulation.rest)
+        patch.setattr(
+            LaneEngine, "_simulate", lambda *a: (told.append(step().exception()), call(*a))
+        )
+        assert simulation.step(simulation.rest).time == [PERIOD]
+    assert [(type(error), error.key) for error in told] == [(InputError, "step")]
 
 
 def test_robots_in_two_threads_go_on_in_a_fork(short):

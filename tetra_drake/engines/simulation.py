@@ -8,7 +8,7 @@ import math
 import numbers
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, V
 from tetra_drake.engines.interface import check_can_be_watched, engine_of
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import InputError, SimulationFailure, check_whole
+from tetra_drake.errors import InputError, SimulationFailure, check_truth, check_whole
 from tetra_drake.machine import threads_for
 from tetra_drake.physics.cable import CableLaw
 from tetra_drake.results.result import SimulationResult
@@ -90,9 +90,7 @@ class Simulation:
         self._first_readings = first_readings(self.robot)
         check_whole("Simulation", "count", count, least=1, most=MOST_ROBOTS)
         self._threads = threads_for(workers, source="Simulation")
-        if not isinstance(record, bool):
-            problem = f"found {record!r:.60}, expected True or False"
-            raise InputError("Simulation", "record", problem)
+        check_truth("Simulation", "record", record)
         if not isinstance(name, str):
             raise InputError("Simulation", "name", f"found {name!r:.60}, expected a text")
         if viewer is not None:
@@ -240,7 +238,7 @@ class Simulation:
         """Seeds of the draws of some robots; None for robots without disturbances."""
         if seed is None:
             return [None] * len(places)
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+        if is_list(seed):
             seeds = [(check_whole("Simulation", "seed", each, least=0), 0) for each in seed]
         else:
             one = check_whole("Simulation", "seed", seed, least=0)
@@ -316,6 +314,11 @@ class Simulation:
             raise InputError("Simulation", "indices", problem)
         found: list[int] = places.astype(int).tolist()
         return found
+
+
+def is_list(values: object) -> TypeGuard[Sequence[Any]]:
+    """True for a list, a tuple, or an array of one dimension."""
+    return isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim == 1)
 
 
 def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
