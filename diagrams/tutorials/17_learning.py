@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from tetra_drake.gym import ROLL, WALK
 
-name, grouped, steps, robots = WALK, True, 130_000, 32
+name, grouped, steps, robots = WALK, True, 200_000, 32
 if sys.argv[1:] == ["Roll-v0"]:
     name, grouped, steps = ROLL, False, 300_000
 
@@ -79,7 +79,7 @@ learner = PPO(
 )
 curve: list[tuple[int, float]] = []
 while learner.num_timesteps < steps:
-    learner.learn(steps // 20, reset_num_timesteps=False)
+    learner.learn(steps // 8, reset_num_timesteps=False)
     episodes = [episode["r"] for episode in learner.ep_info_buffer or []]
     curve.append((learner.num_timesteps, float(np.mean(episodes)) if episodes else 0.0))
     print(f"{curve[-1][0]:7d} steps: {curve[-1][1]:.1f}", flush=True)
@@ -111,5 +111,6 @@ for level, label in ((trained, "trained"), (still, "standing still"), (drawn, "r
     axes.axhline(level, color="0.6", linewidth=0.8)
     axes.annotate(label, (0.01, level), xycoords=("axes fraction", "data"), va="bottom")
 axes.set(xlabel="steps of robots", ylabel="sum of an episode's rewards")
+axes.margins(y=0.12)
 axes.legend()
 figure.savefig(f"{Path(__file__).stem}.png", dpi=120)

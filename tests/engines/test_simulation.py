@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
 
-from tetra_drake.engines import interface
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, processor_lanes
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
@@ -224,10 +223,3 @@ def test_a_robot_that_has_ended_is_not_moved_on(short, refused):
     two.reset(indices=[0])
     with refused("Simulation", "step", "robot 1", "0.3 s"):
         two.step(np.zeros((2, 8)))
-
-
-def test_an_engine_that_cannot_pause_is_named(short, monkeypatch):
-    monkeypatch.setattr("tetra_drake.engines.simulation.engine_of", lambda _: interface.Engine())
-    with pytest.raises(InputError) as caught:
-        Simulation(short)
-    assert caught.value.key == "engine"

@@ -30,7 +30,7 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 MOST_ROBOTS = 100_000
-"""Largest number of robots side by side. They take about 2 GB of memory."""
+"""Largest number of robots side by side."""
 
 Controller = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of one robot to its actions (actions,)."""
