@@ -303,8 +303,8 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
-        """Begins episodes of all robots, or of those with True in the option `reset_mask` (N,). A
-        seed is for the first robot, the next one is for the second; or there is a list of them."""
+        """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. A seed is
+        for the first robot, the next one is for the second; or there is a list of seeds."""
         mask = self._reset_mask(options)
         seeds = self._seeds(seed)
         for place in np.flatnonzero(mask):

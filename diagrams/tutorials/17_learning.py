@@ -22,7 +22,7 @@ if sys.argv[1:] == ["Roll-v0"]:
 
 
 class Robots(VecEnv):
-    """Robots of a TensegrityVectorEnv that begin again in the step in which they end."""
+    """Robots of a TensegrityVectorEnv that begin again in the same step as they end."""
 
     def __init__(self, robots: Any) -> None:
         self.robots = robots

@@ -214,7 +214,7 @@ class Simulation:
 
     @contextlib.contextmanager
     def _used(self, method: str, *, is_whole: bool | None = None) -> Iterator[None]:
-        """A block in which this thread alone uses the robots. Raises InputError, naming `method`,
+        """A block for which this thread alone uses the robots. Raises InputError, naming `method`,
         if another one does, or if the robots are not whole."""
         if not self._owner.acquire(blocking=False):
             problem = "another thread uses these robots; give each thread its own Simulation"
