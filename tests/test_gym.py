@@ -1,23 +1,32 @@
 """Environments of Gymnasium."""
 
+import copy
 import importlib
+import pickle
 import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 from helpers.actuations import FORCE, MOTOR, WINCH
 from helpers.converged import shortly
 
 from tetra_drake.engines.compiled.lane_engine import processor_lanes
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
+from tetra_drake.evolution.run import load_run
 from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.robot.robot import AMPLITUDE
 from tetra_drake.scenario.common_sections import Disturbances
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.visualization.scene import COLOURS
 
-LANES = processor_lanes()
+LANES, CHECKOUT = processor_lanes(), Path(__file__).parents[1]
 
 
 @pytest.fixture
@@ -64,22 +73,17 @@ def test_an_action_is_the_signal_as_a_share_of_the_networks(short, actuation):
     np.testing.assert_allclose(setpoints - rest, amplitude * shifts * per_newton, rtol=1e-9)
 
 
-def test_seeds_repeat_episodes_bit_for_bit(short):
-    env = TensegrityEnv(short)
-    first, again, other = (episode(env, seed=seed) for seed in (1, 1, 2))
-    assert np.array_equal(first[0], again[0]) and first[1] == again[1]
-    assert not np.array_equal(first[0][0], other[0][0]), "another draw"
-    assert first[2:] == (False, True), "it ends with the time"
+def test_an_episode_ends_with_the_time(short):
+    assert episode(TensegrityEnv(short), seed=1)[2:] == (False, True)
 
 
 @pytest.mark.parametrize("objective", ["", "speed", "cost_of_transport", "rolled"])
 def test_the_rewards_of_an_episode_are_the_fitness(short, objective):
     chosen = short.with_sections(objective={objective: 2.0}) if objective else short
-    env = TensegrityEnv(chosen)
-    rewards = episode(env, seed=3)[1]
-    fitness = env._episodes.simulation.result().fitness
-    assert sum(rewards) == pytest.approx(fitness, rel=1e-9)
-    assert fitness != 0.0
+    env = TensegrityEnv(chosen, record=True)
+    rewards, result = episode(env, seed=3)[1], env.result()
+    assert sum(rewards) == pytest.approx(result.fitness, rel=1e-9)
+    assert result.fitness != 0.0 and result.trajectory.time[-1] == 0.2
     dense = np.flatnonzero(rewards[:-1])
     assert (dense.size > 5) == (objective != "cost_of_transport")
 
@@ -91,34 +95,101 @@ def test_a_robot_that_fails_ends_its_episode_with_nothing(short):
     assert sum(rewards) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_robots_side_by_side_begin_again_when_they_end(short):
-    many = TensegrityVectorEnv(LANES, short, workers=1)
-    start, _ = many.reset(seed=5)
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_robots_side_by_side_do_what_environments_of_one_robot_do(short, mode):
+    """Also with some robots reset by a mask, and with other modes of beginning again."""
+    many = TensegrityVectorEnv(LANES, short, autoreset_mode=mode.value, workers=1)
+    single = SyncVectorEnv([lambda: TensegrityEnv(short)] * LANES, autoreset_mode=mode)
+    generator, some = np.random.default_rng(0), np.arange(LANES) % 3 == 0
+    start = many.reset(seed=7)[0]
+    assert np.array_equal(many.reset(seed=[*range(7, 7 + LANES)])[0], start)
+    assert not np.array_equal(many.reset()[0], start), "other draws"
+    assert np.array_equal(many.reset(seed=7)[0], start)
+    assert np.array_equal(single.reset(seed=7)[0], start)
     assert len({row.tobytes() for row in start}) == LANES, "each has a draw"
-    still = np.zeros(many.action_space.shape)
-    for _ in range(9):
-        _, _, terminated, truncated, info = many.step(still)
-        assert not (terminated | truncated).any() and not info
-    begun, _, _, truncated, info = many.step(still)
-    assert truncated.all() and info["_final_obs"].all()
-    angular_velocities = slice(-15, None)
-    assert not begun[:, angular_velocities].any()
-    assert np.stack(info["final_obs"])[:, angular_velocities].all()
-    assert not np.array_equal(begun, start), "another draw"
-    assert many.step(still)[3].sum() == 0
-    assert np.array_equal(many.reset(seed=5)[0], start)
+    ended = np.zeros(LANES, dtype=bool)
+    for step in range(30):
+        if step == 4 or (ended.any() and mode == AutoresetMode.DISABLED):
+            masks = [{"reset_mask": ended if ended.any() else some} for _ in range(2)]
+            ours, theirs = many.reset(options=masks[0]), single.reset(options=masks[1])
+            assert np.array_equal(ours[0], theirs[0])
+        actions = generator.uniform(-1.0, 1.0, many.action_space.shape)
+        ours, theirs = many.step(actions), single.step(actions)
+        for found, expected in zip(ours[:4], theirs[:4], strict=True):
+            assert np.array_equal(found, expected), step
+        ended = ours[2] | ours[3]
+        assert ours[4].keys() == theirs[4].keys()
 
 
-def test_an_action_of_wrong_shape_is_refused(short, refused):
-    env, many = TensegrityEnv(short, grouped=True), TensegrityVectorEnv(LANES, short)
-    for each, action, expected in (
-        (env, np.zeros((2, 4)), "(4,)"),
-        (env, "left", "(4,)"),
-        (many, np.zeros(8), f"found the shape (8,), expected ({LANES}, 8)"),
-    ):
-        each.reset(seed=0)
-        with refused("tetra_drake.gym", "actions", expected):
-            each.step(action)
+def test_wrappers_of_gymnasium_take_robots_side_by_side(short):
+    options = {"scenario": short, "max_episode_steps": 3, "autoreset_mode": "NextStep"}
+    many = RecordEpisodeStatistics(gymnasium.make_vec(WALK, num_envs=2, **options))
+    many = NormalizeObservation(many)
+    many.reset(seed=0)
+    steps = [many.step(many.action_space.sample()) for _ in range(3)]
+    assert [step[3].tolist() for step in steps] == [[False] * 2, [False] * 2, [True] * 2]
+
+
+def test_a_picture_shows_the_robot_on_its_floor(short):
+    env = gymnasium.make(WALK, scenario=short, render_mode="rgb_array")
+    env.reset(seed=0)
+    seen = [env.render() for _ in range(2) if env.step(env.action_space.sample())]
+    for name in ("rear", "actuated", "passive", "square"):
+        colour = np.frombuffer(bytes.fromhex(COLOURS[name][1:]), dtype=np.uint8)
+        shown = [(each == colour).all(axis=-1).sum() for each in seen]
+        assert min(shown) > 50, name
+    assert seen[0].shape == (400, 680, 3) and not np.array_equal(*seen)
+    assert env.metadata["render_fps"] == 50
+    many = TensegrityVectorEnv(2, short, render_mode="rgb_array")
+    many.reset(seed=0)
+    assert np.array_equal(many.render()[0], seen[0])
+
+
+def test_a_copy_begins_anew(short, refused):
+    for each in (TensegrityEnv(short), TensegrityVectorEnv(2, short)):
+        each.reset()
+        for copied in (copy.deepcopy(each), pickle.loads(pickle.dumps(each))):
+            with refused("tetra_drake.gym", "step", "reset()"):
+                copied.step(np.zeros(copied.action_space.shape))
+            assert np.array_equal(copied.reset(seed=3)[0], each.reset(seed=3)[0])
+
+
+def test_the_best_recorded_gait_scores_more_than_standing_still():
+    scenario = load_scenario("walk")
+    gait = load_run(CHECKOUT / "runs/coulomb").best_gait()
+    signal = simulate(scenario, gait, record=True).trajectory.signal
+    env, times = TensegrityEnv(scenario, grouped=True), 0.05 * np.arange(300)
+    amplitude = scenario.cpg.gain * AMPLITUDE * scenario.cpg.external_input
+    played = signal.interp(time=times + 0.025).to_numpy() / amplitude
+    scores = []
+    for actions in (played, np.zeros_like(played)):
+        env.reset(seed=0)
+        scores.append(sum(env.step(action)[1] for action in actions))
+    assert scores[0] > 20.0 and scores[1] == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("use", "key", "fact"),
+    [
+        (lambda one, many: one.step(np.zeros((2, 4))), "actions", "(4,)"),
+        (lambda one, many: one.step("left"), "actions", "(4,)"),
+        (lambda one, many: many.step(np.zeros(8)), "actions", f"(8,), expected ({LANES}, 8)"),
+        (lambda one, many: one.reset(seed=-1), "seed", "-1"),
+        (lambda one, many: many.reset(seed=[1]), "seed", f"expected {LANES}"),
+        (lambda one, many: one.reset(options={"scenario": "incline"}), "options", "scenario"),
+        (lambda one, many: many.reset(options={"mask": True}), "options", "reset_mask"),
+        (lambda one, many: many.reset(options={"reset_mask": 1}), "options['reset_mask']", "1"),
+        (lambda one, many: TensegrityEnv("walk", render_mode="x"), "render_mode", "'rgb_array'"),
+        (lambda *_: TensegrityVectorEnv(2, "walk", autoreset_mode="x"), "autoreset_mode", "'x'"),
+        (lambda *_: TensegrityVectorEnv(2, "walk", max_episode_steps=0), "max_episode_steps", "0"),
+    ],
+)
+def test_what_cannot_be_used_is_told_in_a_line(short, refused, use, key, fact):
+    one, many = TensegrityEnv(short, grouped=True), TensegrityVectorEnv(LANES, short)
+    one.reset(seed=0)
+    many.reset(seed=0)
+    with refused("tetra_drake.gym", key, fact):
+        use(one, many)
 
 
 def test_without_gymnasium_the_import_tells_what_to_install(monkeypatch, refused):

@@ -53,12 +53,19 @@ def _cut(text: str, length: int) -> str:
 
 def check_whole(
     source: object, key: str, number: Any, *, least: int, most: int | None = None
-) -> None:
-    """Raises InputError unless a number is whole, and from `least` to `most`."""
+) -> int:
+    """A whole number. Raises InputError unless it is one, and from `least` to `most`."""
     is_whole = isinstance(number, numbers.Integral) and not isinstance(number, bool)
     if not is_whole or number < least or (most is not None and number > most):
         limits = f"{least} or more" if most is None else f"{least} to {most}"
         raise InputError(source, key, f"found {number!r:.60}, expected an integer, {limits}")
+    return int(number)
+
+
+def check_truth(source: object, key: str, value: object) -> None:
+    """Raises InputError unless a value is True or False."""
+    if not isinstance(value, bool):
+        raise InputError(source, key, f"found {value!r:.60}, expected True or False")
 
 
 class SimulationFailure(RuntimeError):

@@ -41,8 +41,8 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.simulation import Simulation, checked_actions
-from tetra_drake.errors import InputError, SimulationFailure, check_whole
+from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
+from tetra_drake.errors import InputError, SimulationFailure, check_truth, check_whole
 from tetra_drake.results.metrics import pose_fitness, poses_of
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.readings import Readings, pitch_rates
@@ -65,7 +65,7 @@ Info = dict[str, Any]
 
 WALK, ROLL = "tetra_drake/Walk-v0", "tetra_drake/Roll-v0"
 """Names of the environments of a robot that walks, by default on the scenario `walk`, and of one
-that rolls, by default on `rover`."""
+that rolls, by default on `roll`."""
 
 _SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
 
@@ -82,17 +82,15 @@ class _Episodes:
         most_steps: int | None = None,
     ) -> None:
         """Robots that have no episodes yet. An episode has at most `most_steps`."""
-        if render_mode not in (None, _RENDERED):
+        check_truth(_SOURCE, "grouped", grouped)
+        if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
             raise InputError(_SOURCE, "render_mode", problem)
         if most_steps is not None:
             check_whole(_SOURCE, "max_episode_steps", most_steps, least=1)
         self.simulation, self._most_steps = simulation, most_steps
-        self.metadata = {
-            "render_modes": [_RENDERED],
-            "render_fps": max(1, round(1.0 / simulation.control_period)),
-        }
-        self._camera: Any = None
+        frames_per_second = max(1, round(1.0 / simulation.control_period))
+        self.metadata = {"render_modes": [_RENDERED], "render_fps": frames_per_second}
         self._scenario: Scenario = simulation.scenario
         robot, count, start = simulation.robot, simulation.count, simulation.state
         by_network = Robot.of(self._scenario)
@@ -183,11 +181,10 @@ class _Episodes:
 
     def pictures(self) -> tuple[np.ndarray, ...]:
         """Pictures of all robots now; see visualization.picture."""
-        if self._camera is None:
-            from tetra_drake.visualization.picture import Camera
+        from tetra_drake.visualization.picture import picture
 
-            self._camera = Camera(self.simulation.robot)
-        return tuple(self._camera.picture(p_WN) for p_WN in self.simulation.state.p_WN)
+        simulation = self.simulation
+        return tuple(picture(simulation.robot, p_WN) for p_WN in simulation.state.p_WN)
 
     def _observe(self, readings: Readings) -> np.ndarray:
         """Observations (N, size)."""
@@ -306,8 +303,8 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
-        """Begins episodes of all robots, or of those with True in the option `reset_mask` (N,). A
-        seed is for the first robot, the next one is for the second; or there is a list of them."""
+        """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. A seed is
+        for the first robot, the next one is for the second; or there is a list of seeds."""
         mask = self._reset_mask(options)
         seeds = self._seeds(seed)
         for place in np.flatnonzero(mask):
@@ -330,6 +327,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         for place in np.flatnonzero(self._ended).tolist():
             last[place] = seen[place]
         info: Info = {"final_obs": last, "_final_obs": self._ended, "final_info": {}}
+        info["_final_info"] = self._ended
         seen = self._episodes.reset(np.flatnonzero(self._ended), self._generators)
         return seen, rewards, terminated, truncated, info
 
@@ -348,33 +346,28 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         """A seed for each robot; None if its generator goes on."""
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
-            if len(seed) != self.num_envs:
-                problem = f"found {len(seed)} seeds, expected {self.num_envs}"
-                raise InputError(_SOURCE, "seed", problem)
-            return [_checked_seed(each) for each in seed]
-        first = _checked_seed(seed)
-        return [None if first is None else first + i for i in range(self.num_envs)]
+        if not is_list(seed):
+            first = _checked_seed(seed)
+            return [None if first is None else first + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            problem = f"found {len(seed)} seeds, expected {self.num_envs}"
+            raise InputError(_SOURCE, "seed", problem)
+        return [_checked_seed(each) for each in seed]
 
 
-def _checked_seed(seed: int | None) -> int | None:
-    if seed is None:
-        return None
-    check_whole(_SOURCE, "seed", seed, least=0)
-    return int(seed)
+def _checked_seed(seed: Any) -> int | None:
+    return None if seed is None else check_whole(_SOURCE, "seed", seed, least=0)
 
 
 def _check_options(options: Info | None, *known: str) -> None:
     """Raises InputError for an option of reset() that is none of the known ones."""
-    if options is not None and not isinstance(options, Mapping):
-        raise InputError(_SOURCE, "options", f"found {options!r:.60}, expected a mapping")
-    for name in options or {}:
-        if name not in known:
-            expected = ", ".join(map(repr, known)) or "none"
-            raise InputError(_SOURCE, "options", f"found {name!r:.60}, expected {expected}")
+    is_known = isinstance(options, Mapping) and set(options) <= set(known)
+    if options is not None and not is_known:
+        expected = " or ".join(["None", *known])
+        raise InputError(_SOURCE, "options", f"found {options!r:.60}, expected {expected}")
 
 
-for _name, _scenario in {WALK: "walk", ROLL: "rover"}.items():
+for _name, _scenario in {WALK: "walk", ROLL: "roll"}.items():
     gymnasium.register(
         _name,
         entry_point="tetra_drake.gym:TensegrityEnv",

@@ -21,8 +21,7 @@ def threads_for(workers: int | None, *, source: str) -> int:
     Raises InputError unless it is a whole number, 1 or more."""
     if workers is None:
         return available_cores()
-    check_whole(source, "workers", workers, least=1)
-    return int(workers)
+    return check_whole(source, "workers", workers, least=1)
 
 
 def check_package(name: str, *, extra: str, source: str) -> None:

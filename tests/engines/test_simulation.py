@@ -1,17 +1,23 @@
 """Robots in control periods: Simulation(count=N), on the compiled engine and on the diagram."""
 
+import copy
+import functools
 import math
+import multiprocessing
+import pickle
+import signal
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
 
-from tetra_drake.engines import interface
-from tetra_drake.engines.compiled.lane_engine import processor_lanes
-from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.compiled.lane_engine import LaneEngine, processor_lanes
+from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
 from tetra_drake.robot.command import Command
+from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.scenario import Scenario
 
@@ -20,6 +26,7 @@ SPANS = {"!Force": 2.0, "!Winch": 0.01, "!TensionMotor": 1.0}
 """Actions differ from those at rest by up to this, in N, m and N."""
 
 
+OTHERS = ("!Drake", "!Mujoco")
 READINGS = {"length": "lengths", "normal_force": "normal_forces", "tension": "tensions"}
 READINGS |= {name: name for name in ("p_WN", "v_WN", "q_WB")}
 """Of variables of a trajectory."""
@@ -79,66 +86,90 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(
 
 
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
-    alone = Simulation(short, count=LANES, workers=1)
+    alone, simulation = (Simulation(short, count=LANES, workers=1) for _ in range(2))
     actions = drawn_actions(alone)
-    expected = go(alone, actions)[-1]
-    simulation = Simulation(short, count=LANES, workers=1)
     bad = actions.copy()
-    bad[3, 2] = 1e9
-    bad[4:, 2] = math.nan
-    found = go(simulation, bad)[-1]
+    bad[3, 2], bad[4:, 2] = 1e9, math.nan
+    expected, found = go(alone, actions)[-1], go(simulation, bad)[-1]
     assert isinstance(simulation.failures[2], Diverged)
     assert 0.06 <= simulation.failures[2].time < 0.08
     with pytest.raises(Diverged):
         simulation.result(2)
-    others = [robot for robot in range(LANES) if robot != 2]
-    assert [simulation.failures[robot] for robot in others] == [None] * (LANES - 1)
+    others = np.arange(LANES) != 2
+    assert [failure is None for failure in simulation.failures] == others.tolist()
     for ours, theirs in zip(found, expected, strict=True):
         assert np.array_equal(ours[others], theirs[others])
     simulation.reset(indices=[2])
     assert simulation.failures[2] is None and not simulation.ended[2]
 
 
-def test_a_robot_that_starts_again_walks_as_before(short):
-    simulation = Simulation(short, count=LANES, workers=1)
-    actions = drawn_actions(simulation)
-    for some in actions[:5]:
-        simulation.step(some)
-    again = simulation.reset(indices=[1])
-    assert again.time.tolist() == [0.0 if robot == 1 else 0.1 for robot in range(LANES)]
-    for k in range(10):
-        mixed = actions[5 + k].copy()
-        mixed[1] = actions[k][1]
-        again = simulation.step(mixed)
-    whole = Simulation(short, count=LANES, workers=1)
-    states = go(whole, actions)
-    for robot, expected in ((0, states[-1]), (1, states[10])):
-        for found, wanted in zip(again, expected, strict=True):
-            assert np.array_equal(found[robot], wanted[robot])
-
-
-def test_seeds_repeat_disturbed_robots_bit_for_bit(short):
-    spreads = {"robot.spacing": 0.02, "robot.cables.outer_stiffness": 0.1}
-    settings = Disturbances(draws=1, spreads=spreads, start=0.01)
-    disturbed = short.with_sections(disturbances=settings)
-    simulation = Simulation(disturbed, count=LANES, workers=1)
-    actions = drawn_actions(simulation)
-    plain = simulation.state.p_WN[0]
-    seen = []
-    for seed in (1, 1, 2):
-        start = simulation.reset(seed=seed)
-        ends = go(simulation, actions)[-1].p_WN
-        assert len({end.tobytes() for end in ends}) == LANES
-        assert not np.array_equal(start.p_WN[0], plain)
-        seen.append(ends.tobytes())
-    assert seen[0] == seen[1] != seen[2]
-    assert np.array_equal(simulation.reset().p_WN[0], plain)
+def test_each_seed_disturbs_robots_in_its_own_way_and_none_does_not(short):
+    settings = Disturbances(draws=1, spreads={"robot.spacing": 0.02}, start=0.01)
+    robots = Simulation(short.with_sections(disturbances=settings), count=LANES, workers=1)
+    plain = robots.state.p_WN
+    starts = [robots.reset(seed=seed).p_WN for seed in (1, 1, 2, [3] * LANES)]
+    assert np.array_equal(starts[0], starts[1])
+    assert len({start.tobytes() for start in np.concatenate([*starts[1:], plain])}) == 2 * LANES + 2
+    assert np.array_equal(robots.reset().p_WN, plain)
 
 
 def test_the_last_period_ends_with_the_simulation(short):
     simulation = Simulation(short.with_changes({"simulation.duration": "0.25 s"}))
     times = [float(readings.time[0]) for readings in go(simulation, np.zeros((13, 1, 8)))]
     assert times[-2:] == [0.24, 0.25] and simulation.ended.all()
+
+
+def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
+    scenario = short.with_changes(WINCH)
+    one, alone = (Simulation(scenario, count=9, workers=workers) for workers in (1, 9))
+    actions = drawn_actions(one)
+    for ours, theirs in zip(go(one, actions), go(alone, actions), strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("engine", "inner"),
+    [("!Compiled", (LaneEngine, "_simulate")), *((e, (Readings, "put")) for e in OTHERS)],
+)
+def test_after_an_interrupt_a_reset_makes_the_robots_whole(
+    short, engine, inner, monkeypatch, refused
+):
+    two = Simulation(short.with_changes({"engine": engine}), count=2, workers=2)
+    actions, call = drawn_actions(two)[:3], getattr(*inner)
+    expected = go(two, actions)[-1]
+    two.reset()
+    two.step(actions[0])
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(*inner, lambda *a: (call(*a), signal.raise_signal(signal.SIGINT)))
+        two.step(actions[1])
+    with refused("Simulation", "step", "reset() all robots"):
+        two.step(actions[1])
+    with refused("Simulation", "reset", "reset() all robots"):
+        two.reset(indices=[1])
+    two.reset()
+    for found, wanted in zip(go(two, actions)[-1], expected, strict=True):
+        assert np.array_equal(found, wanted)
+
+
+def test_another_thread_is_refused_during_a_step(short, monkeypatch):
+    simulation, told, call = Simulation(short), [], LaneEngine._simulate
+    with ThreadPoolExecutor(1) as pool, monkeypatch.context() as patch:
+        step = functools.partial(pool.submit, simulation.step, simulation.rest)
+        patch.setattr(
+            LaneEngine, "_simulate", lambda *a: (told.append(step().exception()), call(*a))
+        )
+        assert simulation.step(simulation.rest).time == [PERIOD]
+    assert [(type(error), error.key) for error in told] == [(InputError, "step")]
+
+
+def test_robots_in_two_threads_go_on_in_a_fork(short):
+    simulation = Simulation(short, count=2, workers=2)
+    simulation.step(simulation.rest)
+    fork = multiprocessing.get_context("fork")
+    child = fork.Process(target=simulation.step, args=(simulation.rest,))
+    child.start()
+    child.join(60.0)
+    assert child.exitcode == 0
 
 
 NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
@@ -148,7 +179,15 @@ NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
     ("call", "key", "facts"),
     [
         (lambda two: two.step(np.zeros((2, 7))), "actions", ("(2, 7)", "(2, 8)")),
-        (lambda two: two.step("fast"), "actions", ("'fast'",)),
+        *(
+            (lambda two, a=actions: two.step(a), "actions", ("real numbers of shape (2, 8)",))
+            for actions in (
+                "fast",
+                np.zeros((2, 8), complex),
+                np.zeros((2, 8), object),
+                np.ma.array(np.zeros((2, 8)), mask=True),
+            )
+        ),
         (lambda two: two.step(NAN), "actions[1], T3-T4 outer bottom_left", ("nan",)),
         (lambda two: two.result(1), "result", ("robot 1 is at 0 s",)),
         (lambda two: two.reset(indices=[2]), "indices", ("0 to 1",)),
@@ -156,15 +195,26 @@ NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
         (lambda two: two.reset(indices=1), "indices", ("0 to 1",)),
         (lambda two: Simulation(two.scenario, control_period=0.00075), "control_period", ()),
         (lambda two: Simulation(two.scenario, control_period="fast"), "control_period", ()),
-        (lambda two: Simulation(two.scenario, count=0), "count", ("0",)),
-        (lambda two: Simulation(two.scenario, count=1.5), "count", ("1.5",)),
+        (lambda two: Simulation(two.scenario, control_period=1e29), "control_period", ("1e+29",)),
+        (lambda two: Simulation(two.scenario, record="nan"), "record", ("'nan'",)),
+        (lambda two: Simulation(two.scenario, name=None), "name", ("None",)),
+        *(
+            (lambda two, n=count: Simulation(two.scenario, count=n), "count", (str(count),))
+            for count in (0, 1.5, True, 10**9)
+        ),
+        (lambda two: Simulation(two.scenario, workers="x"), "workers", ("'x'",)),
         (lambda two: two.reset(seed=-1), "seed", ("-1",)),
+        (lambda two: two.reset(seed=[1, 2, 3]), "seed", ("3 seeds",)),
+        (copy.deepcopy, "", ("the same arguments",)),
+        (pickle.dumps, "", ("the same arguments",)),
     ],
 )
 def test_wrong_input_is_told_in_a_line(short, call, key, facts, refused):
     two = Simulation(short.with_sections(disturbances=Disturbances(draws=1)), count=2, workers=1)
     with refused("Simulation", key, *facts):
         call(two)
+    with refused("simulate_many", "workers", "2.5"):
+        simulate_many(short, [], workers=2.5)
 
 
 def test_a_robot_that_has_ended_is_not_moved_on(short, refused):
@@ -173,10 +223,3 @@ def test_a_robot_that_has_ended_is_not_moved_on(short, refused):
     two.reset(indices=[0])
     with refused("Simulation", "step", "robot 1", "0.3 s"):
         two.step(np.zeros((2, 8)))
-
-
-def test_an_engine_that_cannot_pause_is_named(short, monkeypatch):
-    monkeypatch.setattr("tetra_drake.engines.simulation.engine_of", lambda _: interface.Engine())
-    with pytest.raises(InputError) as caught:
-        Simulation(short)
-    assert caught.value.key == "engine"

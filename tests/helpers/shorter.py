@@ -8,6 +8,7 @@ NUMBERS = {
     r'(?<="popsize": )16': "8",
     r'(?<="simulation.duration": ")[58](?= s")': "3.5",
     r"(?<=\(0\.0, )4\.0": "0.5",
+    r"(?<=True, )200_000": "5_000",
 }
 """Numbers of gaits and durations (s) of tutorials, and what stands in their place."""
 

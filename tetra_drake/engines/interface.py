@@ -27,7 +27,8 @@ Outcome = SimulationResult | SimulationFailure
 
 
 class Engine:
-    """Base class of engines. A subclass must implement simulate(); the other methods have defaults.
+    """Base class of engines. A subclass must implement simulate() and stepper(); the other methods
+    have defaults.
 
     simulate() must call time_limit.check_time() often, which raises TimeBudgetExceeded.
     """
@@ -55,11 +56,8 @@ class Engine:
         raise NotImplementedError
 
     def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> Stepper:
-        """A stepper for `count` robots like the first one. Raises InputError if the engine cannot
-        pause."""
-        scenario = first.robot.scenario
-        problem = f"found '{scenario.engine_name}', which does not simulate in control periods"
-        raise InputError(f"scenario {scenario.name}", "engine", problem)
+        """A stepper for `count` robots like the first one."""
+        raise NotImplementedError
 
     def simulate_many(
         self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int

@@ -8,7 +8,7 @@ import math
 import numbers
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, V
 from tetra_drake.engines.interface import check_can_be_watched, engine_of
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import InputError, SimulationFailure, check_whole
+from tetra_drake.errors import InputError, SimulationFailure, check_truth, check_whole
 from tetra_drake.machine import threads_for
 from tetra_drake.physics.cable import CableLaw
 from tetra_drake.results.result import SimulationResult
@@ -30,7 +30,7 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 MOST_ROBOTS = 100_000
-"""Largest number of robots side by side. They take about 2 GB of memory."""
+"""Largest number of robots side by side."""
 
 Controller = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of one robot to its actions (actions,)."""
@@ -90,9 +90,7 @@ class Simulation:
         self._first_readings = first_readings(self.robot)
         check_whole("Simulation", "count", count, least=1, most=MOST_ROBOTS)
         self._threads = threads_for(workers, source="Simulation")
-        if not isinstance(record, bool):
-            problem = f"found {record!r:.60}, expected True or False"
-            raise InputError("Simulation", "record", problem)
+        check_truth("Simulation", "record", record)
         if not isinstance(name, str):
             raise InputError("Simulation", "name", f"found {name!r:.60}, expected a text")
         if viewer is not None:
@@ -216,7 +214,7 @@ class Simulation:
 
     @contextlib.contextmanager
     def _used(self, method: str, *, is_whole: bool | None = None) -> Iterator[None]:
-        """A block in which this thread alone uses the robots. Raises InputError, naming `method`,
+        """A block for which this thread alone uses the robots. Raises InputError, naming `method`,
         if another one does, or if the robots are not whole."""
         if not self._owner.acquire(blocking=False):
             problem = "another thread uses these robots; give each thread its own Simulation"
@@ -240,16 +238,15 @@ class Simulation:
         """Seeds of the draws of some robots; None for robots without disturbances."""
         if seed is None:
             return [None] * len(places)
-        if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
-            seeds: list[Any] = [(each, 0) for each in seed]
+        if is_list(seed):
+            seeds = [(check_whole("Simulation", "seed", each, least=0), 0) for each in seed]
         else:
-            seeds = [(seed, place) for place in places]
+            one = check_whole("Simulation", "seed", seed, least=0)
+            seeds = [(one, place) for place in places]
         if len(seeds) != len(places):
             problem = f"found {len(seeds)} seeds, expected one, or one for each of {len(places)}"
             raise InputError("Simulation", "seed", problem)
-        for each, _ in seeds:
-            check_whole("Simulation", "seed", each, least=0)
-        return [None] * len(places) if self.scenario.disturbances is None else seeds
+        return [None] * len(places) if self.scenario.disturbances is None else [*seeds]
 
     def _drawn(self, seed: tuple[int, int]) -> Robot:
         """The robot with a draw of the scenario's disturbances."""
@@ -317,6 +314,11 @@ class Simulation:
             raise InputError("Simulation", "indices", problem)
         found: list[int] = places.astype(int).tolist()
         return found
+
+
+def is_list(values: object) -> TypeGuard[Sequence[Any]]:
+    """True for a list, a tuple, or an array of one dimension."""
+    return isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim == 1)
 
 
 def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
