@@ -304,12 +304,10 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
     ("parameters", "named"),
     [
         ({"robot.cables.line.stiff": (1, 2)}, "robot.cables.line.stiff"),
-        ({"name": ("a", "b")}, "name"),
         ({STIFFNESS: (210.0, 400.0)}, STIFFNESS),
         ({STIFFNESS: ("1 m", "400 N/m")}, STIFFNESS),
         ({STIFFNESS: (-1.0, 400.0)}, STIFFNESS),
         ({MASSES: (0.1, 0.5)}, MASSES),  # 0.2 and 0.3
-        ({STIFFNESS: 100.0}, STIFFNESS),
         ({STIFFNESS: (100.0, math.nan)}, STIFFNESS),
         ({}, "parameters"),
         ([STIFFNESS], "parameters"),

@@ -93,14 +93,6 @@ def test_every_change_is_also_made_alone(judgement, gaits):
     assert other == simulate(still.with_changes({"terrain": terrain}), gaits["b"]).metrics.distance
 
 
-def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits, judgement):
-    again = robustness.robustness(scenario, {"b": gaits["b"]}, draws=DRAWS, seed=5, workers=1)
-    for name in ("undisturbed", "draws", "alone"):
-        table = getattr(judgement, name)
-        of_b = table[table["gait"] == "b"].reset_index(drop=True)
-        pandas.testing.assert_frame_equal(getattr(again, name), of_b, check_exact=True)
-
-
 def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
     damping = Disturbances(draws=4, spreads={"robot.cables.damping": 0.2})
     disturbing = scenario.with_changes({"disturbances": damping, "require": {"distance": "1 m"}})

@@ -36,13 +36,11 @@ PAIR = Struts(
     ],
 )
 def test_segments_are_as_far_apart_as_their_nearest_points(first, second, distance):
-    for turned in (first, first[::-1]):
-        for other in (second, second[::-1]):
-            nodes = np.zeros((4, NODE_COLUMNS))
-            nodes[:, P_WN : P_WN + 3] = [*turned, *other]
-            for i, j in ((0, 1), (1, 0)):
-                apart = strut_distance(PAIR, nodes, i, j)
-                assert apart == pytest.approx(distance, abs=1e-12)
+    for ends in ([*first, *second], [*first[::-1], *second], [*first, *second[::-1]]):
+        nodes = np.zeros((4, NODE_COLUMNS))
+        nodes[:, P_WN : P_WN + 3] = ends
+        for pair in ((0, 1), (1, 0)):
+            assert strut_distance(PAIR, nodes, *pair) == pytest.approx(distance, abs=1e-12)
 
 
 def drake_distance(structure: Structure, poses: list[RigidTransform], radius: float) -> float:

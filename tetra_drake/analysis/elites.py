@@ -76,15 +76,15 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
         return
     file.repair()
     run = load_run(directory)
-    gaits_of_map = elites(run)
+    scenario, gaits_of_map = run.scenario, elites(run)
     missing = gaits_of_map[gaits_of_map["kept"].isna()]
     if missing.empty:
         return
     keys = missing[_KEY].to_numpy().tolist()
     gaits = {i: run.gait(trial, index) for i, (trial, index) in enumerate(keys)}
-    seed = manifest.seed
+    seed = run.manifest.seed
     judgement = robustness(
-        manifest.scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers
+        scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers
     )
     table = by_gait(judgement)
     lines = [

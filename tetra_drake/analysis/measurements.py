@@ -10,11 +10,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 import pandas
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.gait_simulation import Driver
@@ -29,9 +29,9 @@ from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.common_sections import repeated
+from tetra_drake.scenario.common_sections import different_keys
 from tetra_drake.scenario.quantities import Force, Length, Time, Unit
-from tetra_drake.scenario.refusals import hint, refuse
+from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Kinds, Section, keys_of
 from tetra_drake.scenario.units import given_quantity
@@ -205,15 +205,9 @@ Measurement = Annotated[MotionCapture | Rest, Kinds()]
 class FitFile(Section):
     """What a fit needs beside the scenario."""
 
-    parameters: Annotated[dict[str, _Pair], Field(min_length=1)]
+    parameters: Annotated[dict[str, _Pair], Field(min_length=1), AfterValidator(different_keys)]
     """Bounds, least and most, by scenario key. Keys joined by commas get the same value."""
     measurements: list[Measurement] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if key := repeated(self.parameters):
-            refuse("parameters", f"'{key}' is given twice")
-        return self
 
 
 def load_fit_file(path: str | Path) -> FitFile:

@@ -110,6 +110,8 @@ def simulate_many(
     Raises:
         InputError: if the numbers of scenarios and gaits differ, or a gait does not fit.
     """
+    if not isinstance(gaits, Sequence):
+        raise InputError("simulate_many", "gaits", f"found {gaits!r:.60}, expected a list of gaits")
     if isinstance(scenario, Sequence) and not isinstance(scenario, str):
         scenarios = [given_scenario(each) for each in scenario]
     else:

@@ -264,12 +264,11 @@ def _read(path: Path) -> bytes:
 
 def _unpacked(path: Path) -> bytes:
     """Content of a compressed file, empty if there is none. Raises InputError if it is damaged."""
-    packed = _read(path)
-    if not packed:
+    if not os.path.lexists(path):
         return b""
     unpacking = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=MOST)
     try:
-        content = unpacking.decompress(packed, MOST)
+        content = unpacking.decompress(read_bytes(path, "record", most=MOST), MOST)
     except lzma.LZMAError as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     if not unpacking.eof or unpacking.unused_data:

@@ -15,9 +15,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import given_path, read_text
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import SCENARIO
+from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
 from tetra_drake.scenario.refusals import hint
-from tetra_drake.scenario.scenario import Scenario
 
 TIME = "time_s"
 
@@ -51,7 +50,7 @@ def scenario_beside(path: Path) -> Path | None:
     return scenario if os.path.isfile(scenario) else None
 
 
-def load_command(path: str | Path, scenario: Scenario) -> Command:
+def load_command(path: str | Path, scenario: GivenScenario) -> Command:
     """Reads a command file for a scenario's robot.
 
         >>> scenario = td.load_scenario("quick")
@@ -60,12 +59,12 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
 
     Args:
         path: the CSV file. Its columns may be in any order.
-        scenario: the scenario of the robot.
+        scenario: the scenario of the robot, its name or file, or a run.
 
     Raises:
         InputError: names file and line, if the file is wrong or does not fit the robot.
     """
-    path = given_path(path, "load_command", "path")
+    path, scenario = given_path(path, "load_command", "path"), given_scenario(scenario)
     robot, text = Robot.of(scenario), read_text(path, "command file")
     wanted = [TIME, *command_columns(robot)]
     cells = table_cells(text, path, wanted=wanted)

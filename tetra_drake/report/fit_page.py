@@ -37,11 +37,10 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
     return [PAGE, SCENARIO, *written]
 
 
-UNKNOWN = """`± ?`: the interval is unknown, because the data do not determine the value, or because
-predictions are not smooth: their derivatives by steps of 0.1 % and of 1 % of the start differ by
-more than 20 %. One contact that comes or goes within such a step is enough, in any part of a log:
-with other noise, or without that part, an interval may be found. The value is still the best one
-that was found; its error may be estimated by fits to parts of the data."""
+UNKNOWN = """`± ?` is an unknown interval: the data do not determine the value, or predictions are
+not smooth. Then their derivatives by steps of 0.1 % and 1 % of the start differ by more than 20 %.
+One contact that comes or goes, in any part of a log, is enough: without this part, or with other
+noise, there may be an interval."""
 
 
 def _page(fit: Fit) -> str:

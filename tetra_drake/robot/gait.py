@@ -275,20 +275,21 @@ class GaitFile(Section):
     gains: Gains = Gains()
 
 
-def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
+def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Gait:
     """Reads a gait for the scenario's robot.
 
         >>> gait = td.load_gait("gait.json", td.load_scenario("quick"))
 
     Args:
         path: a gait file.
-        scenario: the scenario that the gait must fit.
+        scenario: the scenario that the gait must fit, its name or file, or a run.
         key: key of the gait, if `path` is another JSON file that contains one.
 
     Raises:
         InputError: names file and key, if the file is wrong or does not fit the scenario.
     """
     file = _read_file(given_path(path, "load_gait", "path"), key)
+    scenario = given_scenario(scenario)
     own, weights = Weights.of(scenario), file.weights
     names = own.names
     if isinstance(weights, dict):

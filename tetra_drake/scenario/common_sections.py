@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Literal, TypeVar, get_args
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from tetra_drake.scenario.quantities import DampingPerLength, Force, Speed, Stiffness, Time
 from tetra_drake.scenario.refusals import refuse
@@ -152,6 +152,24 @@ class EvolutionSection(Section):
     """Wall time of a simulation; a longer one counts as failed."""
 
 
+def separate(joined: str) -> list[str]:
+    """Splits a key of `spreads` at its commas into scenario keys."""
+    return [key.strip() for key in joined.split(",")]
+
+
+def repeated(all_joined: Iterable[str]) -> str:
+    """The first scenario key that is given twice in joined keys; "" if there is none."""
+    counts = Counter(key for joined in all_joined for key in separate(joined))
+    return next((key for key, count in counts.items() if count > 1), "")
+
+
+def different_keys(by_joined: dict[str, Value]) -> dict[str, Value]:
+    """Validates values by joined keys: a scenario key may be given once."""
+    if key := repeated(by_joined):
+        refuse("", f"'{key}' is given twice")
+    return by_joined
+
+
 Spread = Annotated[float, Field(gt=0, le=0.5)]
 
 
@@ -164,7 +182,7 @@ class Disturbances(Section):
 
     draws: int = Field(ge=1, le=10_000)
     """Number of draws. Each gait is simulated once in each draw."""
-    spreads: dict[str, Spread] = Field(default={})
+    spreads: Annotated[dict[str, Spread], AfterValidator(different_keys)] = Field(default={})
     """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
     1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
@@ -174,24 +192,7 @@ class Disturbances(Section):
     """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
     at risk). 1 is the mean over all draws. At least one draw counts."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Disturbances:
-        if key := repeated(self.spreads):
-            refuse("spreads", f"'{key}' is given twice")
-        return self
-
-
-def separate(joined: str) -> list[str]:
-    """Splits a key of `spreads` at its commas into scenario keys."""
-    return [key.strip() for key in joined.split(",")]
-
 
 def by_separate_key(by_joined: Mapping[str, Value]) -> dict[str, Value]:
     """Values by scenario key, from values for joined keys."""
     return {key: value for joined, value in by_joined.items() for key in separate(joined)}
-
-
-def repeated(all_joined: Iterable[str]) -> str:
-    """The first scenario key that is given twice in joined keys; "" if there is none."""
-    counts = Counter(key for joined in all_joined for key in separate(joined))
-    return next((key for key, count in counts.items() if count > 1), "")
