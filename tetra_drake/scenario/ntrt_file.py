@@ -51,7 +51,7 @@ class Substructure(Section):
 
 
 class Parameters(Section):
-    """Parameters of a builder, with NTRT's defaults. Fields of type Any have no effect: the scenario
+    """Parameters of a builder, with NTRT's defaults. Fields of type Any have no effect: a scenario
     has its own friction, ground and actuators."""
 
     @property
