@@ -51,8 +51,8 @@ class Substructure(Section):
 
 
 class Parameters(Section):
-    """Parameters of a builder, with NTRT's defaults. Fields of type Any have no effect: a scenario
-    has its own friction, ground and actuators."""
+    """Parameters of a builder, with NTRT's defaults. Fields of type Any have no effect, as the
+    scenario has its own friction, ground and actuators."""
 
     @property
     def ignored(self) -> list[str]:
