@@ -13,7 +13,14 @@ import pytest
 import xarray
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import check_file, check_folder, read_text, whole_file, write_whole
+from tetra_drake.files import (
+    check_file,
+    check_folder,
+    file_names,
+    read_text,
+    whole_file,
+    write_whole,
+)
 from tetra_drake.results.trajectory import save_dataset
 
 
@@ -29,6 +36,14 @@ def test_a_file_appears_whole_or_not_at_all_from_a_temporary_one_of_the_same_kin
         raise KeyboardInterrupt
     assert file.read_text() == "whole"
     assert os.listdir(file.parent) == ["a.svg"]
+
+
+def test_names_from_a_file_are_no_paths_and_differ_without_case():
+    names = ["../a", "/a", "A", "..", "", "a_2", 300 * "ü", "\0"]
+    files = file_names(names)
+    assert list(files) == names and not {"/", "\0"} & set("".join(files.values()))
+    assert len({file.casefold() for file in files.values()} - {"", ".", ".."}) == len(names)
+    assert max(len(file.encode()) for file in files.values()) < 255
 
 
 def test_the_mode_follows_the_umask(tmp_path):

@@ -271,6 +271,7 @@ PRIVATE = [
     "root:$6$secret:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n",  # YAML: a mapping
     *("a: [1, 2\nsecret: {x: 1\n  secret\n", "*secret\n", "&secret 1\n&secret 2\n", "- secret\n"),
     *("!secret {a: 1}\n", "!$6$secret text\n", "!secret!name text\n", "name: !!int secret\n"),
+    "root:$6$secret" + 120 * "x",  # longer than what NumPy quotes
     *("name: !!bool secret\n", "name: !!timestamp secret\n", "secret one: 1\nsecret one: 2\n"),
 ]
 

@@ -146,7 +146,7 @@ def test_a_video_has_its_size_rate_and_speed(browser, replay, tmp_path, name, vi
     reader = pytest.importorskip("imageio_ffmpeg").read_frames
     settings = {"size": (320, 180), "fps": 10.0, "view": view, "speed": 10.0}
     with ThreadPoolExecutor(1) as pool:  # this thread may have the browser of other tests
-        pool.submit(make_video, replay, tmp_path / name, **settings).result()
+        pool.submit(make_video, replay.read_text(), tmp_path / name, **settings).result()
     about, *frames = reader(str(tmp_path / name))
     assert about["size"] == (320, 180) and about["fps"] == pytest.approx(10.0)
     assert len(frames) == 5 and frames[0] != frames[-1]

@@ -32,7 +32,7 @@ from tetra_drake.visualization.replay import (
     save_replay,
 )
 from tetra_drake.visualization.scene import COLOURS, THICKEST, THINNEST, cable_paths, drawn_radii
-from tetra_drake.visualization.video import make_video
+from tetra_drake.visualization.video import encode, make_video
 
 from .conftest import opened
 
@@ -132,9 +132,22 @@ def test_bodies_with_slashes_in_their_names_are_where_they_rest(browser, tmp_pat
             assert found == pytest.approx(place.tolist(), abs=1e-4)
 
 
-def test_what_cannot_be_a_video_is_refused(file, tmp_path, refused):
+def test_what_cannot_be_a_video_is_refused(tmp_path, refused):
     with refused(tmp_path / "talk.avi", "", ".mp4 or .gif"):
-        make_video(file, tmp_path / "talk.avi")
+        make_video("", tmp_path / "talk.avi")
+
+
+@pytest.mark.parametrize("program", ["cat > /dev/null; exit 228", "exit 0"])
+def test_a_video_that_ffmpeg_does_not_finish_is_refused(program, tmp_path, monkeypatch, refused):
+    pytest.importorskip("imageio_ffmpeg")
+    ffmpeg, film = tmp_path / "ffmpeg", tmp_path / "talk.mp4"
+    ffmpeg.write_text(f"#!/bin/sh\n{program}\n")
+    ffmpeg.chmod(0o755)
+    film.write_text("old")
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(ffmpeg))
+    with refused(film, "", "ffmpeg"):
+        encode([bytes(64 * 64 * 3)] * 50, film, size=(64, 64), fps=10.0)
+    assert film.read_text() == "old"
 
 
 def test_nodes_sit_on_their_bodies(structure, film):

@@ -45,6 +45,9 @@ _POINT = 1e-8
 it, and the floor is lower."""
 LEAST_MOMENT = 1e-14
 """Least principal moment of inertia (kg m²) of a body that MuJoCo takes: mjEPS of its compiler."""
+_LEAST_FRICTION = 1e-5
+"""Least coefficient of friction in MuJoCo. MJX has no contacts without friction (condim 1) beside
+elliptic cones."""
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
 
 
@@ -208,7 +211,7 @@ def _contact(robot: Robot, mass: float) -> dict:
 
 
 def _add_strut_contacts(model: Element, robot: Robot) -> None:
-    """Adds the contact of all struts of different bodies, without friction. Its constant damping
+    """Adds the contact of all struts of different bodies, with least friction. Its constant damping
     takes as much energy from a weakly damped impact at _IMPACT_SPEED, between the middles of
     struts, as the damping that grows with depth."""
     normal = NormalForce(*robot.model.strut_contact.normal)
@@ -222,7 +225,8 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
         depth = 4.0 / (3.0 * math.pi) * _IMPACT_SPEED / math.sqrt(normal.stiffness * per_mass)
         scale = -(1.0 - _IMPEDANCE) * per_mass
         contact = {
-            "condim": "1",
+            "condim": "3",
+            "friction": [_LEAST_FRICTION, _LEAST_FRICTION, 0, 0, 0],
             "solref": [normal.stiffness * scale, normal.damping * depth * scale],
             "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
         }

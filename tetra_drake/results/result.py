@@ -119,8 +119,8 @@ class SimulationResult:
         """The HTML page that save_replay() writes."""
         from tetra_drake.visualization.replay import replay_page
 
-        given = {"robot": self.robot, "trajectory": self.trajectory, "title": self.title}
-        return replay_page(**given)[0]
+        robot, title = self.robot, self.title
+        return replay_page(robot=robot, trajectory=self.trajectory, title=title)[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
         """Writes a page that plays the motion; see visualization.replay.save_replay()."""

@@ -100,7 +100,7 @@ class LimitedActuator(ActuatorKind):
     """An actuator of limited force and speed on each driven cable. The cable never pushes."""
 
     max_force: quantities.Force = Field(gt=0)
-    """Tension at which the actuator stalls."""
+    """Tension at which the actuator stalls. A greater tension pulls a winch backward."""
     max_speed: Speed = Field(gt=0)
     """Speed without tension."""
     time_constant: Time = Field(gt=0)

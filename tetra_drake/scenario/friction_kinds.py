@@ -153,11 +153,15 @@ class Coulomb(FrictionKind):
     def cone(self, source: object) -> Cone:
         possible = {"static": self.kinetic, "stiffness": 0.0}
         possible |= {"forward": 1.0, "backward": 1.0, "lateral": 1.0}
-        for name, expected in possible.items():
-            value = getattr(self, name)
-            if value != expected:
-                problem = f"found {value:g}, but mujoco can simulate only {expected:g}"
-                raise InputError(source, f"friction.{name}", problem)
+        wrong = {key: most for key, most in possible.items() if getattr(self, key) != most}
+        if wrong:
+            first, units = next(iter(wrong)), {"stiffness": " N/m"}
+            change = ", ".join(
+                f"{key}: {most:g}{units.get(key, '')}" for key, most in wrong.items()
+            )
+            found = f"found {getattr(self, first):g}, but mujoco can simulate only {wrong[first]:g}"
+            remedy = f"make a scenario with this one as `base` and friction: {{{change}}}"
+            raise InputError(source, f"friction.{first}", f"{found}; {remedy}")
         return Cone(self.kinetic, self.damping)
 
 

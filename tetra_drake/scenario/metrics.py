@@ -236,9 +236,14 @@ class Metrics:
     """Travelling index of the signals in the steady stretch: 0 for a standing wave along the robot,
     1 for a travelling wave."""
     peak_actuator_force: float = _metric(
-        "N", "at any time", lambda walk: walk.tally.effort.peak_force[0], most=True, is_cost=True
+        "N",
+        "at any time; a cable can pull a winch backward",
+        lambda walk: walk.tally.effort.peak_force[0],
+        most=True,
+        is_cost=True,
     )
-    """Greatest tension of a driven cable at any time."""
+    """Greatest tension of a driven cable at any time. It exceeds the `max_force` of a winch while
+    the robot stretches the cable faster than the stalled winch pays out."""
     mean_actuator_force: float = _metric(
         "N",
         "of all driven cables",

@@ -97,7 +97,7 @@ def make_video(
         if not (fps > 0.0 and speed > 0.0 and duration * fps / speed <= MOST_FRAMES):
             problem = f"found {fps:g} at {speed:g} times the speed, expected fewer frames than"
             raise InputError("video", "fps", f"{problem} {MOST_FRAMES} in all")
-        _encode(_frames(page, np.arange(0.0, duration, speed / fps), say), path, size=size, fps=fps)
+        encode(_frames(page, np.arange(0.0, duration, speed / fps), say), path, size=size, fps=fps)
 
 
 def _frames(page: Page, times: np.ndarray, say: Say) -> Iterator[bytes]:
@@ -109,9 +109,11 @@ def _frames(page: Page, times: np.ndarray, say: Say) -> Iterator[bytes]:
             say(f"frame {number + 1} of {len(times)}")
 
 
-def _encode(frames: Iterable[bytes], path: Path, *, size: tuple[int, int], fps: float) -> None:
-    """Writes a video of frames by ffmpeg. Raises InputError unless ffmpeg takes all frames and ends
-    well."""
+def encode(frames: Iterable[bytes], path: Path, *, size: tuple[int, int], fps: float) -> None:
+    """Writes a video of frames (bytes of RGB pixels) by ffmpeg.
+
+    Raises InputError unless ffmpeg takes all frames and ends well.
+    """
     import imageio_ffmpeg
 
     given = [
