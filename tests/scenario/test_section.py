@@ -100,7 +100,7 @@ def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
         load(text)
 
 
-NUMBERS = {"010": 10, "0o10": 8, "-.43": -0.43, "+.5": 0.5, "1e-3": 0.001, "0x1F": 31}
+NUMBERS = {"010": 10, "0o10": 8, "-.43": -0.43, "+.5": 0.5, "1e-3": 0.001, "0x1F": 31, "\t2\t": 2}
 TEXTS = ["1:30", "yes", "on", "off", "1_1", "1_000.5", "2001-01-01", "0b11", "="]
 
 

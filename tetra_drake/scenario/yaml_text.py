@@ -60,6 +60,17 @@ class _Loader(yamlcore.CoreLoader):
         super().__init__(stream)
         self.deep_construct = True  # refuses an alias of what holds it
 
+    def scan_to_next_token(self) -> None:
+        """Skips what separates tokens. PyYAML alone refuses tabs there; YAML refuses them only in
+        an indentation."""
+        super().scan_to_next_token()
+        while self.peek() == "\t":
+            before = self.buffer[self.pointer - self.column : self.pointer]
+            if not (before.strip() or self.flow_level):
+                break
+            self.forward()
+            super().scan_to_next_token()
+
     def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[Any, Any]:
         seen = set()
         for key, _ in node.value if isinstance(node, yaml.MappingNode) else ():
