@@ -134,7 +134,7 @@ def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
 def test_after_an_interrupt_a_reset_makes_the_robots_whole(
     short, engine, inner, monkeypatch, refused
 ):
-    two = Simulation(short.with_changes({"engine": engine}), count=2, workers=2)
+    two = Simulation(short.with_changes({"engine": engine}), count=2, workers=1)
     actions, call = drawn_actions(two)[:3], getattr(*inner)
     expected = go(two, actions)[-1]
     two.reset()
