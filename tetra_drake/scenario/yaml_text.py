@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Collection
 from pathlib import Path
@@ -53,12 +54,23 @@ def dump_yaml(tree: Tree) -> str:
     return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
 
 
+MOST_VALUES = 10**6
+"""Largest number of values in a file. The content of a file is walked through many times."""
+
+
 class _Loader(yamlcore.CoreLoader):
     """Loader of YAML 1.2 with tagged kinds. It refuses repeated keys."""
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)
         self.deep_construct = True  # refuses an alias of what holds it
+
+    def get_single_node(self) -> yaml.Node:
+        node = super().get_single_node()
+        if node is not None and _expanded(node, {}) > MOST_VALUES:
+            problem = f"found aliases that stand for more than {MOST_VALUES} values in all"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+        return node
 
     def scan_to_next_token(self) -> None:
         """Skips what separates tokens. PyYAML alone refuses tabs there; YAML refuses them only in
@@ -90,6 +102,17 @@ class _Loader(yamlcore.CoreLoader):
             problem = f"found {_shown(f'!{name}', 'a tag')} without a mapping of keys"
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
         return {TAG: name} | (self.construct_mapping(node, deep=True) if node.value else {})
+
+
+def _expanded(node: yaml.Node, sizes: dict[int, int]) -> int:
+    """Number of values in a node. An alias counts like what it stands for. `sizes` has the numbers
+    of the nodes that are counted already."""
+    if id(node) not in sizes:
+        sizes[id(node)] = 1  # for an alias of what holds it
+        inner = node.value if isinstance(node, yaml.CollectionNode) else []
+        parts = itertools.chain(*inner) if isinstance(node, yaml.MappingNode) else inner
+        sizes[id(node)] += sum(_expanded(part, sizes) for part in parts)
+    return sizes[id(node)]
 
 
 def _shown(name: str, what: str) -> str:
