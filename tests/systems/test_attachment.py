@@ -11,12 +11,7 @@ from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import (
-    Frame,
-    LinearSpringDamper,
-    RevoluteJoint,
-    SpatialInertia,
-)
+from pydrake.multibody.tree import Frame, LinearSpringDamper, RevoluteJoint, SpatialInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
