@@ -188,8 +188,7 @@ class _Episodes:
             readings.q_WB,
             readings.w_WB,
         )
-        count = self.simulation.count
-        return np.hstack([part.reshape(count, -1) for part in parts])
+        return np.hstack([part.reshape(self.simulation.count, -1) for part in parts])
 
 
 class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
