@@ -172,11 +172,7 @@ def test_the_best_recorded_gait_scores_more_than_standing_still():
     [
         (lambda one, many: one.step(np.zeros((2, 4))), "actions", "(4,)"),
         (lambda one, many: one.step("left"), "actions", "(4,)"),
-        (
-            lambda one, many: many.step(np.zeros(8)),
-            "actions",
-            f"(8,), expected real numbers of shape ({LANES}, 8)",
-        ),
+        (lambda one, many: many.step(np.zeros(8)), "actions", f"numbers of shape ({LANES}, 8)"),
         (lambda one, many: one.reset(seed=-1), "seed", "-1"),
         (lambda one, many: many.reset(seed=[1]), "seed", f"expected {LANES}"),
         (lambda one, many: one.reset(options={"scenario": "incline"}), "options", "scenario"),
