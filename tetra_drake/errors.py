@@ -6,11 +6,13 @@ import functools
 import math
 import numbers
 import re
+from collections.abc import Sequence
 from typing import Any, Self
 
 _LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 270, 60, 200, 4096
 """Largest number of characters of key and problem; if they have more, of a key or a quotation, and
 of a problem; of a source."""
+_IN_WORDS = {bool: "True or False", str: "a text", list: "a list", Sequence: "a list"}
 
 
 class InputError(ValueError):
@@ -62,10 +64,11 @@ def check_whole(
     return int(number)
 
 
-def check_truth(source: object, key: str, value: object) -> None:
-    """Raises InputError unless a value is True or False."""
-    if not isinstance(value, bool):
-        raise InputError(source, key, f"found {value!r:.60}, expected True or False")
+def check_type(source: object, key: str, value: object, *kinds: type) -> None:
+    """Raises InputError unless a value is of one of the kinds."""
+    if not isinstance(value, kinds):
+        expected = " or ".join(_IN_WORDS.get(kind, kind.__name__) for kind in kinds)
+        raise InputError(source, key, f"found {value!r:.60}, expected {expected}")
 
 
 class SimulationFailure(RuntimeError):

@@ -42,7 +42,7 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
-from tetra_drake.errors import InputError, SimulationFailure, check_truth, check_whole
+from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.results.metrics import pose_fitness, poses_of
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.readings import Readings, pitch_rates
@@ -74,15 +74,10 @@ class _Episodes:
     """Episodes of robots side by side: observations, actions and rewards of all environments."""
 
     def __init__(
-        self,
-        simulation: Simulation,
-        *,
-        grouped: bool,
-        render_mode: str | None,
-        most_steps: int | None = None,
+        self, simulation: Simulation, most_steps: int | None, grouped: bool, render_mode: str | None
     ) -> None:
         """Robots that have no episodes yet. An episode has at most `most_steps`."""
-        check_truth(_SOURCE, "grouped", grouped)
+        check_type(_SOURCE, "grouped", grouped, bool)
         if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
             raise InputError(_SOURCE, "render_mode", problem)
@@ -137,8 +132,7 @@ class _Episodes:
         terminated = np.array([failure is not None for failure in simulation.failures])
         truncated = simulation.ended & ~terminated
         robots = range(simulation.count)
-        fitness = np.array([self._fitness(readings, robot) for robot in robots], dtype=float)
-        fitness -= self._offsets
+        fitness = np.array([self._fitness(readings, robot) for robot in robots]) - self._offsets
         for place in np.flatnonzero(truncated).tolist():
             try:
                 fitness[place] = simulation.result(place).fitness
@@ -174,10 +168,7 @@ class _Episodes:
         cpg = self._scenario.cpg
         amplitude = abs(cpg.gain) * AMPLITUDE * abs(cpg.external_input)
         signals = amplitude * actions[:, self._groups]
-        setpoints: np.ndarray = self._scenario.actuation.commands(
-            self._cables._replace(signal=signals)
-        )
-        return setpoints
+        return np.asarray(self._scenario.actuation.commands(self._cables._replace(signal=signals)))
 
     def pictures(self) -> tuple[np.ndarray, ...]:
         """Pictures of all robots now; see visualization.picture."""
@@ -197,8 +188,7 @@ class _Episodes:
             readings.q_WB,
             readings.w_WB,
         )
-        count = self.simulation.count
-        return np.hstack([part.reshape(count, -1) for part in parts])
+        return np.hstack([part.reshape(self.simulation.count, -1) for part in parts])
 
 
 class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
@@ -228,7 +218,7 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
         options: Info = {"grouped": grouped, "render_mode": render_mode}
         EzPickle.__init__(self, scenario, control_period=control_period, record=record, **options)
         simulation = Simulation(scenario, control_period=control_period, record=record, workers=1)
-        self._episodes = _Episodes(simulation, **options)
+        self._episodes = _Episodes(simulation, None, **options)
         self.metadata, self.render_mode = self._episodes.metadata, render_mode
         self.observation_space = self._episodes.observation_space
         self.action_space = self._episodes.action_space
@@ -286,11 +276,11 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         try:
             self._autoreset = AutoresetMode(autoreset_mode)
         except ValueError:
-            modes = ", ".join(repr(mode.value) for mode in AutoresetMode)
+            modes = [mode.value for mode in AutoresetMode]
             problem = f"found {autoreset_mode!r:.60}, expected one of {modes}"
             raise InputError(_SOURCE, "autoreset_mode", problem) from None
         simulation = Simulation(scenario, count=num_envs, **made)
-        self._episodes = _Episodes(simulation, **options, most_steps=max_episode_steps)
+        self._episodes = _Episodes(simulation, max_episode_steps, **options)
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
         self._ended = np.zeros(num_envs, dtype=bool)
         self.num_envs, self.render_mode = num_envs, render_mode

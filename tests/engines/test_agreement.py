@@ -143,10 +143,8 @@ def rows() -> Iterable[Any]:
         yield row(f"{terrain}, {law}", *cells)
     # The reset integrator's modes change 1e5 times while a robot with feedback lands.
     changes = {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS), "friction": COULOMB}
-    drive, within = (
-        gait(gains=Gains(**dict.fromkeys(PATHWAYS, 1.0))),
-        {"p_WN": 1e-6, "signal": 2e-5},
-    )
+    drive = gait(gains=Gains(**dict.fromkeys(PATHWAYS, 1.0)))
+    within = {"p_WN": 1e-6, "signal": 2e-5}
     yield row("feedback", "thesis", 0.3, changes, CONVERGE, within, drive)
     for signals in ("listing", "live"):
         changes = {"cpg.signals": signals, "cpg.listing_step": "1e-4 s", "gait_bounds.turn": 0.0}

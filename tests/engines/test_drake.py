@@ -59,9 +59,8 @@ def test_the_work_counts_all_steps_from_the_start(scenario, gait):
 
 @pytest.mark.parametrize("changes", [{}, {"terrain": Rough(amplitude=2e-3, wavelength=0.1)}])
 def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scenario, changes):
-    robot = Robot.of(
-        scenario.with_changes({"robot.tetrahedra": 3, "cpg.start_up": "0 s"} | changes)
-    )
+    changes = {"robot.tetrahedra": 3, "cpg.start_up": "0 s"} | changes
+    robot = Robot.of(scenario.with_changes(changes))
     diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
     engine, there = robot.scenario.engine, []
     simulator = MakeSimulator(diagram, robot, engine)

@@ -84,6 +84,9 @@ def between_two_cables(robot: Robot, times: np.ndarray) -> np.ndarray:
 
 
 ANGLE = 0.5
+CROSSING = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
+CROSSING += [((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))]
+"""Ends of two bars, and of one across them."""
 
 
 def leaning() -> Robot:
@@ -297,10 +300,8 @@ def test_bars_that_tumble_move_as_drakes_capsules():
 
 
 def test_a_bar_rests_across_two_others_where_the_contact_bears_its_weight(engine):
-    beams = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
-    across = ((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))
     given = {"dissipation": 1.0, "gravity": G, "anchors": CROSSED, "duration": 0.3}
-    robot = loose_bars([*beams, across], **given)
+    robot = loose_bars(CROSSING, **given)
     heights = moved_nodes(robot.structure, robot.structure.initial_state)[:, 5]
     depth = 2.0 * RADIUS - (heights[-1] - heights[0])
     assert 2.0 * STIFFNESS * depth == pytest.approx(robot.weight / 3.0, rel=1e-6)
@@ -314,12 +315,10 @@ def test_a_bar_rests_across_two_others_where_the_contact_bears_its_weight(engine
 def test_a_bar_that_is_dropped_on_two_others_rebounds(engine, drop, dissipation, expected):
     # Hunt and Crossley's restitution on rigid supports. At 4 m/s, the bar would be beyond the
     # others within a step.
-    beams = [((-0.1, y, 0.0), (0.1, y, 0.0)) for y in (-0.05, 0.05)]
-    across = ((0.0, -0.1, 2.0 * RADIUS), (0.0, 0.1, 2.0 * RADIUS))
     fall = float(np.sqrt(2.0 * drop / G))
     held = CROSSED | {"a0": "xyz", "b0": "yz", "a1": "xyz", "b1": "yz"}
     given = {"dissipation": dissipation, "gravity": G, "anchors": held}
-    resting = loose_bars([*beams, across], **given, duration=round(fall + 0.05, 3))
+    resting = loose_bars(CROSSING, **given, duration=round(fall + 0.05, 3))
     offsets = [["0 m", "0 m", f"{z} m"] for z in (0.0, 0.0, drop)]
     robot = Robot.of(resting.scenario.with_changes({"robot.offsets": offsets}))
     found = trajectory_of(robot, engine)

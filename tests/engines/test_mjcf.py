@@ -11,11 +11,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.analysis.equilibrium import EquilibriumStudy, study_equilibrium
 from tetra_drake.engines.mjcf import make_mjcf
-from tetra_drake.physics.cable import CableLaw
 from tetra_drake.report.structure_page import robot_of_file
 from tetra_drake.robot.sdf import make_sdf
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.systems import AddCables, Cable
+from tetra_drake.systems import AddCables
+from tetra_drake.systems.diagram import cables_of
 
 ROBOTS = ["thesis", "motors", "rough", "prism", "six_bar", "mast", "pair"]
 
@@ -72,12 +72,7 @@ def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(stu
     context = plant.CreateDefaultContext()
     p_WN = [node.CalcPoseInWorld(context).translation() for node in nodes]
     np.testing.assert_allclose(p_WN, node_positions(structure, state), atol=1e-9)
-    cables = [
-        Cable(name, nodes[a], nodes[b], CableLaw(**law))
-        for name, (a, b), law in zip(
-            structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True
-        )
-    ]
+    cables = cables_of(structure, nodes)
     network = AddCables(builder, plant, cables=cables, slack=structure.slack)
     diagram = builder.Build()
     here = network.GetMyContextFromRoot(diagram.CreateDefaultContext())

@@ -11,12 +11,7 @@ from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import (
-    Frame,
-    LinearSpringDamper,
-    RevoluteJoint,
-    SpatialInertia,
-)
+from pydrake.multibody.tree import Frame, LinearSpringDamper, RevoluteJoint, SpatialInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
@@ -174,24 +169,17 @@ def test_arguments_that_do_not_fit_are_refused(given, key, fact, refused):
 def test_cables_between_wrong_places_are_refused_by_name(refused):
     builder, plant, tip, (left, _) = rod_with_tendons()
     _, other, far, _ = rod_with_tendons()
-    for key, fact, cables in (
+    elsewhere = Cable("a", tip, other.world_frame(), LAW)
+    cases = [
         ("cables.left", "twice", [left, left]),
         ("cables.a", "length of 0 m", [Cable("a", tip, tip, LAW)]),
         ("cables.a.frame_a", "'tip' of another plant", [Cable("a", far, tip, LAW)]),
-        (
-            "cables.a.frame_b",
-            "'world' of another plant",
-            [Cable("a", tip, other.world_frame(), LAW)],
-        ),
-        *(
-            (
-                f"cables.a.{name}",
-                f"{value}",
-                [Cable("a", left.frame_a, tip, LAW._replace(**{name: value}))],
-            )
-            for name, value in (("stiffness", -1.0), ("free_length", math.nan), ("damping", "8 N"))
-        ),
-    ):
+        ("cables.a.frame_b", "'world' of another plant", [elsewhere]),
+    ]
+    for constant in ({"stiffness": -1.0}, {"free_length": math.nan}, {"damping": "8 N"}):
+        wrong = Cable("a", left.frame_a, tip, LAW._replace(**constant))
+        cases += [(f"cables.a.{name}", f"{value}", [wrong]) for name, value in constant.items()]
+    for key, fact, cables in cases:
         with refused("AddCables", key, fact):
             AddCables(builder, plant, cables=cables)
 
@@ -221,14 +209,12 @@ def test_ground_that_cannot_be_is_refused(refused):
     builder, plant, tip, cables = rod_with_tendons()
     ground = make_surface(GroundSection(stiffness=1e3, damping=0.0), Coulomb(), Flat())
     wrong = ground._replace(normal=np.array(NormalForce(1e3, math.nan)))
-    for key, given in (
-        ("frames[0]", {"frames": [cables[0].frame_a]}),
-        ("frames[0]", {"frames": [rod_with_tendons()[2]]}),
-        ("frames[1]", {"frames": [tip, tip]}),
-        ("ground", {"ground": 3}),
-        ("ground.damping", {"ground": wrong}),
-        *(("radius", {"radius": radius}) for radius in (-0.1, [0.1, 0.1], math.inf, "1 m")),
-    ):
+    frames = {"frames[0]": [cables[0].frame_a], "frames[1]": [tip, tip]}
+    cases = [(key, {"frames": given}) for key, given in frames.items()]
+    cases += [("frames[0]", {"frames": [rod_with_tendons()[2]]})]
+    cases += [("ground", {"ground": 3}), ("ground.damping", {"ground": wrong})]
+    cases += [("radius", {"radius": radius}) for radius in (-0.1, [0.1, 0.1], math.inf, "1 m")]
+    for key, given in cases:
         with refused("AddGroundContact", key, ""):
             AddGroundContact(builder, plant, **{"frames": [tip], "ground": ground} | given)
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation, Viewer
 from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
 from tetra_drake.engines.simulation import Controller, simulate_controlled
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
@@ -110,8 +110,7 @@ def simulate_many(
     Raises:
         InputError: if the numbers of scenarios and gaits differ, or a gait does not fit.
     """
-    if not isinstance(gaits, Sequence):
-        raise InputError("simulate_many", "gaits", f"found {gaits!r:.60}, expected a list of gaits")
+    check_type("simulate_many", "gaits", gaits, Sequence)
     if isinstance(scenario, Sequence) and not isinstance(scenario, str):
         scenarios = [given_scenario(each) for each in scenario]
     else:

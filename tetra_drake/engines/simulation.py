@@ -17,7 +17,7 @@ from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, V
 from tetra_drake.engines.interface import check_can_be_watched, engine_of
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import InputError, SimulationFailure, check_truth, check_whole
+from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.machine import threads_for
 from tetra_drake.physics.cable import CableLaw
 from tetra_drake.results.result import SimulationResult
@@ -90,9 +90,8 @@ class Simulation:
         self._first_readings = first_readings(self.robot)
         check_whole("Simulation", "count", count, least=1, most=MOST_ROBOTS)
         self._threads = threads_for(workers, source="Simulation")
-        check_truth("Simulation", "record", record)
-        if not isinstance(name, str):
-            raise InputError("Simulation", "name", f"found {name!r:.60}, expected a text")
+        check_type("Simulation", "record", record, bool)
+        check_type("Simulation", "name", name, str)
         if viewer is not None:
             check_can_be_watched(scenario)
         self._listing_steps = _listing_steps(control_period, scenario)
@@ -149,10 +148,9 @@ class Simulation:
             InputError: if the seed or an index is wrong.
         """
         places = self._places(indices)
-        seeds = self._seeds(seed, places)
         is_whole = self._is_whole or len(set(places)) == self.count
         with self._used("reset", is_whole=is_whole):
-            robots = [self.robot if seed is None else self._drawn(seed) for seed in seeds]
+            robots = self._drawn(seed, places)
             if not self._is_whole:
                 self._stepper = self._new_stepper()
             self._is_whole = False
@@ -184,9 +182,8 @@ class Simulation:
             signals = np.where(goes[:, np.newaxis], self._to_signals(actions, goes), 0.0)
             marks = self._marks(goes, changed=(signals != self._signals).any(axis=1))
             for place in np.flatnonzero(goes & (self._steps == 0)).tolist():
-                begun = dataclasses.replace(
-                    self._robots[place], commanded=signals[place : place + 1].copy()
-                )
+                first = signals[place : place + 1].copy()
+                begun = dataclasses.replace(self._robots[place], commanded=first)
                 self._stepper.begin(place, self._gait_simulation(begun))
             self._is_whole = False
             self._stepper.advance(signals, marks)
@@ -232,26 +229,20 @@ class Simulation:
         first = self._gait_simulation(self.robot)
         return engine_of(self.scenario).stepper(first, count=self.count, threads=self._threads)
 
-    def _seeds(
-        self, seed: int | Sequence[int] | None, places: list[int]
-    ) -> list[tuple[int, int] | None]:
-        """Seeds of the draws of some robots; None for robots without disturbances."""
-        if seed is None:
-            return [None] * len(places)
-        if is_list(seed):
-            seeds = [(check_whole("Simulation", "seed", each, least=0), 0) for each in seed]
-        else:
-            one = check_whole("Simulation", "seed", seed, least=0)
-            seeds = [(one, place) for place in places]
-        if len(seeds) != len(places):
-            problem = f"found {len(seeds)} seeds, expected one, or one for each of {len(places)}"
+    def _drawn(self, seed: int | Sequence[int] | None, places: list[int]) -> list[Robot]:
+        """Some robots, with draws of the scenario's disturbances if there is a seed."""
+        given = seed if is_list(seed) else [seed] * len(places)
+        if len(given) != len(places):
+            problem = f"found {len(given)} seeds, expected one, or one for each of {len(places)}"
             raise InputError("Simulation", "seed", problem)
-        return [None] * len(places) if self.scenario.disturbances is None else [*seeds]
-
-    def _drawn(self, seed: tuple[int, int]) -> Robot:
-        """The robot with a draw of the scenario's disturbances."""
-        draw = draw_disturbances(self.scenario, seed)
-        return controlled_robot(disturbed(self.scenario, draw))
+        if seed is not None:
+            given = [check_whole("Simulation", "seed", each, least=0) for each in given]
+        if seed is None or self.scenario.disturbances is None:
+            return [self.robot] * len(places)
+        numbers_of_robots = [0] * len(places) if is_list(seed) else places
+        seeds = zip(given, numbers_of_robots, strict=True)
+        draws = [draw_disturbances(self.scenario, each) for each in seeds]
+        return [controlled_robot(disturbed(self.scenario, draw)) for draw in draws]
 
     def _put(self, place: int, robot: Robot) -> None:
         """Puts a robot at its start."""
@@ -260,9 +251,8 @@ class Simulation:
             values[place] = given
         self.rest[place] = robot.scenario.actuation.commands(cables)
         self._robots[place], self.failures[place], self._steps[place] = robot, None, 0
-        self._stepper.readings.put(
-            place, self._first_readings if robot is self.robot else first_readings(robot)
-        )
+        first = self._first_readings if robot is self.robot else first_readings(robot)
+        self._stepper.readings.put(place, first)
 
     def _gait_simulation(self, robot: Robot) -> GaitSimulation:
         return GaitSimulation(robot, self._gait, record=self._record, viewer=self._viewer)
@@ -270,15 +260,12 @@ class Simulation:
     def _to_signals(self, actions: npt.ArrayLike, goes: np.ndarray) -> np.ndarray:
         """Signals (N, m) in N of actions. Actions of robots that do not go may be anything."""
         given = checked_actions(actions, self.rest.shape, source="Simulation")
-        bad = goes & ~np.isfinite(given).all(axis=1)
+        bad = goes[:, np.newaxis] & ~np.isfinite(given)
         if bad.any():
-            robot = int(bad.argmax())
-            action = int((~np.isfinite(given[robot])).argmax())
-            problem = f"found {given[robot, action]}, expected a number"
+            robot, action = np.argwhere(bad)[0].tolist()
             key = f"actions[{robot}], {self.robot.structure.oscillators[action]}"
-            raise InputError("Simulation", key, problem)
-        signals: np.ndarray = self.scenario.actuation.signals(given, self._law)
-        return signals
+            raise InputError("Simulation", key, f"found {given[robot, action]}, expected a number")
+        return np.asarray(self.scenario.actuation.signals(given, self._law))
 
     def _time_after(self, steps: np.ndarray) -> np.ndarray:
         """Time (N,) in s after a number of control periods (N,), at most the duration."""
@@ -312,8 +299,7 @@ class Simulation:
         if places.size and not (valid and ((places >= 0) & (places < self.count)).all()):
             problem = f"found {indices}, expected a list of integers from 0 to {self.count - 1}"
             raise InputError("Simulation", "indices", problem)
-        found: list[int] = places.astype(int).tolist()
-        return found
+        return [int(place) for place in places]
 
 
 def is_list(values: object) -> TypeGuard[Sequence[Any]]:
@@ -325,35 +311,24 @@ def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: s
     """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, naming
     `source`, if they have another shape, or are not real numbers."""
     least = shape[1:] if shape[0] == 1 else shape
-    try:
+    found = f"{actions!r:.60}"
+    with contextlib.suppress(TypeError, ValueError):
         given: np.ma.MaskedArray = np.ma.asarray(actions)
-        is_real = given.dtype.kind in "iuf" and not np.ma.is_masked(given)
-    except (TypeError, ValueError):
-        is_real = False
-    if not is_real:
-        problem = f"found {actions!r:.60}, expected real numbers of shape {least}"
-        raise InputError(source, "actions", problem)
-    if given.shape not in (shape, least):
-        raise InputError(source, "actions", f"found the shape {given.shape}, expected {least}")
-    return given.data.astype(float).reshape(shape)
+        if given.dtype.kind in "iuf" and not np.ma.is_masked(given):
+            if given.shape in (shape, least):
+                return given.data.astype(float).reshape(shape)
+            found = f"the shape {given.shape}"
+    problem = f"found {found}, expected real numbers of shape {least}"
+    raise InputError(source, "actions", problem)
 
 
 def simulate_controlled(
-    scenario: Scenario,
-    controller: Controller,
-    *,
-    control_period: float | None,
-    record: bool,
-    viewer: Viewer | None,
+    scenario: Scenario, controller: Controller, **options: Any
 ) -> SimulationResult:
-    """Simulates a robot that follows a controller. Raises the same errors as simulate()."""
-    simulation = Simulation(
-        scenario,
-        control_period=control_period,
-        record=record,
-        viewer=viewer,
-        name=getattr(controller, "__name__", "controller"),
-    )
+    """Simulates a robot that follows a controller, with options of Simulation. Raises the same
+    errors as simulate()."""
+    name = getattr(controller, "__name__", "controller")
+    simulation = Simulation(scenario, name=name, **options)
     while not simulation.ended[0]:
         check_time()
         readings = simulation.state.rows(0)

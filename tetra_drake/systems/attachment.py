@@ -34,7 +34,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import Adder
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.scenario.blueprint import WORLD
 
 
@@ -119,12 +119,11 @@ class BodyForces(LeafSystem):
     def __init__(self, plant: MultibodyPlant) -> None:
         super().__init__()
         self._force = self.DeclareVectorInputPort("generalized_force", 6 * (plant.num_bodies() - 1))
-        self.DeclareAbstractOutputPort(
-            "spatial_forces",
-            lambda: AbstractValue.Make([ExternallyAppliedSpatialForce()]),
-            self._calc_forces,
+        none, sources = (
+            AbstractValue.Make([ExternallyAppliedSpatialForce()]),
             {self._force.ticket()},
         )
+        self.DeclareAbstractOutputPort("spatial_forces", none.Clone, self._calc_forces, sources)
 
     def _calc_forces(self, context: Context, output: AbstractValue) -> None:
         forces = self._force.Eval(context).reshape(-1, 6)
@@ -135,25 +134,12 @@ class BodyForces(LeafSystem):
 def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
     """A torque and a force (6,) on a body at its origin."""
     applied = ExternallyAppliedSpatialForce()
-    applied.body_index = BodyIndex(body - WORLD)
-    applied.F_Bq_W = SpatialForce(force)
+    applied.body_index, applied.F_Bq_W = BodyIndex(body - WORLD), SpatialForce(force)
     return applied
 
 
-def check_type(source: str, key: str, value: object, *kinds: type) -> None:
-    """Raises InputError that names `source` and `key` unless a value is of one of the kinds."""
-    if not isinstance(value, kinds):
-        expected = " or ".join(kind.__name__ for kind in kinds)
-        raise InputError(source, key, f"found {value!r:.60}, expected {expected}")
-
-
 def checked_numbers(
-    source: str,
-    key: str,
-    given: npt.ArrayLike | numbers.Real,
-    *,
-    count: int,
-    least: float = -math.inf,
+    source: str, key: str, given: npt.ArrayLike, *, count: int, least: float = -math.inf
 ) -> np.ndarray:
     """Numbers (count,) from a number for all, or a number for each. Raises InputError that names
     `source` and `key` unless they are finite and at least `least`."""
@@ -171,21 +157,19 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
     """Raises InputError that names `source` and `key` unless the constants of a law are numbers
     that it can have: finite and not negative."""
     for name, value in constants.items():
-        if not isinstance(value, numbers.Real):
-            problem = f"found {value!r:.60}, expected a number"
+        if not (isinstance(value, numbers.Real) and 0.0 <= float(value) < math.inf):
+            problem = f"found {value!r:.60}, expected a number of 0 or more"
             raise InputError(source, f"{key}.{name}", problem)
-        checked_numbers(source, f"{key}.{name}", value, count=1, least=0.0)
 
 
 def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:
     """Raises InputError that names `source` unless a system called `name` can be attached to a
     plant: a finalized one of the builder, with a mass matrix that can be inverted."""
     check_type(source, "builder", builder, DiagramBuilder)
-    check_type(source, "plant", plant, MultibodyPlant)
     check_type(source, "name", name, str)
     if builder.already_built():
         raise InputError(source, "builder", "has built its diagram already")
-    check_part(source, "plant", builder, plant)
+    check_part(source, "plant", builder, plant, MultibodyPlant)
     if not plant.is_finalized():
         raise InputError(source, "plant", "is not finalized; call plant.Finalize() first")
     for taken in (name, f"{name}_actuators", f"{name}_geometry", f"forces_of_{name}"):
@@ -194,14 +178,17 @@ def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, n
     try:
         np.linalg.cholesky(plant.CalcMassMatrix(plant.CreateDefaultContext()))
     except np.linalg.LinAlgError as error:
-        bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
-        light = ", ".join(body.name() for body in bodies if not body.default_mass() > 0.0)
+        light = ", ".join(one.name() for one in _bodies(plant) if not one.default_mass() > 0.0)
         problem = "has a body that moves without mass or moments of inertia"
         raise InputError(source, "plant", f"{problem}: {light}".removesuffix(": ")) from error
 
 
-def check_part(source: str, key: str, builder: DiagramBuilder, system: System) -> None:
-    """Raises InputError that names `source` and `key` unless a system is one of the builder's."""
+def check_part(
+    source: str, key: str, builder: DiagramBuilder, system: System, kind: type[System]
+) -> None:
+    """Raises InputError that names `source` and `key` unless a system is of a kind, and one of the
+    builder's."""
+    check_type(source, key, system, kind)
     if not any(part is system for part in builder.GetSystems()):
         raise InputError(source, key, "is no system of the builder; add it first")
 
@@ -248,13 +235,17 @@ def BodyStatePort(builder: DiagramBuilder, plant: MultibodyPlant) -> OutputPort:
 
 def _has_free_bodies(plant: MultibodyPlant) -> bool:
     """True if all bodies of a plant are free, and its state has them in their order."""
-    bodies = [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
     return all(
         body.is_floating_base_body()
         and body.has_quaternion_dofs()
         and body.floating_positions_start() == 7 * number
-        for number, body in enumerate(bodies)
+        for number, body in enumerate(_bodies(plant))
     )
+
+
+def _bodies(plant: MultibodyPlant) -> list[RigidBody]:
+    """The bodies of a plant without the world."""
+    return [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
 
 
 def _Add(

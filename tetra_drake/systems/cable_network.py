@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,7 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import Integrator
 
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.physics import actuator, cable, kinematics
 from tetra_drake.physics.forces import Forces, compute_cable_forces
 from tetra_drake.physics.model import Model
@@ -28,7 +29,6 @@ from tetra_drake.systems.attachment import (
     check_frame,
     check_host,
     check_part,
-    check_type,
     checked_numbers,
 )
 from tetra_drake.systems.cable_geometry import AddCableGeometry
@@ -93,54 +93,51 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
         self.DeclareVectorOutputPort("ends", 6 * count, self._calc_ends, motion)
 
-    def _compute(self, context: Context, force: np.ndarray) -> None:
-        """Writes the generalized force to `force`, and the table `cable_forces`."""
+    def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
+        """The table `cable_forces`. Writes the generalized force to `force`, if given."""
         if self._drives is not None:
             self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
         signals = self._no_signals if self._signals is None else self._signals.Eval(context)
-        self._fill(context, signals, force)
+        return self._filled(context, signals, self._force if force is None else force)
 
-    def _move(self, context: Context) -> np.ndarray:
+    def _moved(self, context: Context) -> np.ndarray:
         """The table `cable_forces`; only lengths and rates are valid."""
-        self._fill(context, self._no_signals, self._force)
-        return self._forces.cable_forces
+        return self._filled(context, self._no_signals, self._force)
 
-    def _fill(self, context: Context, signals: np.ndarray, force: np.ndarray) -> None:
-        """Writes the generalized force to `force`, and the table `cable_forces`. Raises
+    def _filled(self, context: Context, signals: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The table `cable_forces`. Writes the generalized force to `force`. Raises
         SimulationFailure if a number of a cable is not finite although the state is."""
         state, table = self._state.Eval(context), self._forces.cable_forces
         self._compute_forces(self._parts, state, signals, force)
         # The product is NaN if a number is not finite. It is the fastest way to see that.
         if self._zeros.dot(table.ravel()) == 0.0 or not np.isfinite(state).all():
-            return
+            return table
         place = int(np.argmin(np.isfinite(table).all(axis=1)))
         reason = f"the ends of cable '{self._names[place]}' meet, or its forces are too large"
         raise SimulationFailure(time=context.get_time(), reason=reason)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, output.get_mutable_value())
+        self._table(context, output.get_mutable_value())
 
     def _calc_tensions(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, self._force)
-        output.SetFromVector(self._forces.cable_forces[:, cable.TENSION])
+        output.SetFromVector(self._table(context)[:, cable.TENSION])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._move(context)[:, cable.LENGTH])
+        output.SetFromVector(self._moved(context)[:, cable.LENGTH])
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._move(context)[:, cable.RATE])
+        output.SetFromVector(self._moved(context)[:, cable.RATE])
 
     def _calc_table(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, self._force)
-        output.SetFromVector(self._forces.cable_forces.ravel())
+        output.SetFromVector(self._table(context).ravel())
 
     def _calc_ends(self, context: Context, output: BasicVector) -> None:
-        self._move(context)
+        self._moved(context)
         p_WN = self._forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
         output.SetFromVector(p_WN[self._ends].ravel())
 
     def _calc_drive_rates(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, self._force)
+        self._table(context)
         output.SetFromVector(self._forces.drives[:, actuator.RATE])
 
 
@@ -200,27 +197,24 @@ def AddCables(
     driven = np.flatnonzero(table["signal"] != cable.PASSIVE)
     law, signals = cable.CableLaw.of(table[driven]), np.zeros(driven.size)
     default = actuation.drives(DrivenCables.at_rest(law, lengths[driven], signals))
-    if drives is None:
-        drives = default
-    elif not len(default) and np.size(drives):
+    starts = default if drives is None else drives
+    if np.size(starts) and not len(default):
         raise InputError("AddCables", "drives", f"found {drives!r:.60}, expected none")
-    drives = checked_numbers("AddCables", "drives", drives, count=len(default))
+    starts = checked_numbers("AddCables", "drives", starts, count=len(default))
     names = [one.name for one in cables]
     if scene_graph is not None:
-        check_type("AddCables", "scene_graph", scene_graph, SceneGraph)
-        check_part("AddCables", "scene_graph", builder, scene_graph)
-    model = Model.of_nodes(
-        nodes.p_BN,
-        nodes.first_node,
-        cables=cable.Cables.of(table),
-        actuator=actuation.actuator(),
-        slack=slack,
-    )
+        check_part("AddCables", "scene_graph", builder, scene_graph, SceneGraph)
+    laws: dict[str, Any] = {
+        "cables": cable.Cables.of(table),
+        "actuator": actuation.actuator(),
+        "slack": slack,
+    }
+    model = Model.of_nodes(nodes.p_BN, nodes.first_node, **laws)
     network = CableNetwork(model, names=names, signals=len(actuated))
     builder.AddNamedSystem(name, network)
     Attach(builder, plant, network)
-    if len(drives):
-        actuators = builder.AddNamedSystem(f"{name}_actuators", Integrator(drives))
+    if len(starts):
+        actuators = builder.AddNamedSystem(f"{name}_actuators", Integrator(starts))
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None and names:
@@ -232,14 +226,12 @@ def AddCables(
 def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
     """Raises InputError unless the cables can be between frames of a plant."""
     check_type("AddCables", "cables", cables, Sequence)
-    names: set[str] = set()
     for place, one in enumerate(cables):
         check_type("AddCables", f"cables[{place}]", one, Cable)
         check_type("AddCables", f"cables[{place}].name", one.name, str)
         key = f"cables.{one.name}"
-        if one.name in names:
+        if any(one.name == earlier.name for earlier in cables[:place]):
             raise InputError("AddCables", key, "is given twice")
-        names.add(one.name)
         check_type("AddCables", f"{key}.law", one.law, cable.CableLaw)
         check_constants("AddCables", key, one.law._asdict())
         for end in ("frame_a", "frame_b"):
@@ -278,7 +270,6 @@ def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> np.ndarr
     lengths: np.ndarray = np.linalg.norm(np.reshape(offsets, (-1, 3)), axis=1)
     for one, length in zip(cables, lengths, strict=True):
         if not _LEAST_LENGTH <= length < np.inf:
-            expected = "expected its ends apart at the plant's default positions"
-            problem = f"found a length of {length:.3g} m, {expected}"
-            raise InputError("AddCables", f"cables.{one.name}", problem)
+            problem = f"found a length of {length:.3g} m at the plant's default positions"
+            raise InputError("AddCables", f"cables.{one.name}", f"{problem}, expected more")
     return lengths

@@ -98,7 +98,7 @@ def MakeTensegrityDiagram(
     cables = AddCables(
         builder,
         plant,
-        cables=_cables(structure, nodes),
+        cables=cables_of(structure, nodes),
         actuated={
             oscillator: [structure.cable_names[cable] for cable in group]
             for oscillator, group in zip(structure.oscillators, structure.groups, strict=True)
@@ -149,7 +149,7 @@ def MakeTensegrityDiagram(
     return diagram
 
 
-def _cables(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
+def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
     """The cables of a structure between the frames of its nodes."""
     return [
         Cable(name, nodes[a], nodes[b], CableLaw(**law))
@@ -162,10 +162,8 @@ def _cables(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
 def _AddController(builder: DiagramBuilder, controller: System, *, size: int) -> OutputPort:
     """Adds `controller`. Returns its port `signals`, and raises InputError if there is none."""
     if not controller.HasOutputPort("signals"):
-        ports = [
-            controller.get_output_port(i).get_name() for i in range(controller.num_output_ports())
-        ]
-        found = ", ".join(ports) or "no output ports"
+        ports = map(controller.get_output_port, range(controller.num_output_ports()))
+        found = ", ".join(port.get_name() for port in ports) or "no output ports"
         problem = f"found {found}, expected an output port 'signals' of size {size}"
         raise InputError("MakeTensegrityDiagram", "controller", problem)
     signals = controller.GetOutputPort("signals")

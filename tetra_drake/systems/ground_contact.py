@@ -19,7 +19,7 @@ from pydrake.systems.framework import (
     WitnessFunctionDirection,
 )
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.physics import contact
 from tetra_drake.physics.forces import Forces, compute_ground_forces
 from tetra_drake.physics.mode_change import mode_margin, modes_after_step, next_mode_change
@@ -32,7 +32,6 @@ from tetra_drake.systems.attachment import (
     check_constants,
     check_frame,
     check_host,
-    check_type,
     checked_numbers,
 )
 
@@ -127,25 +126,23 @@ class GroundContact(LeafSystem):
     def _margin(self, context: Context) -> float:
         return mode_margin(self._parts, self._state.Eval(context), self._modes(context))
 
-    def _compute(self, context: Context, force: np.ndarray) -> None:
-        """Writes the generalized force to `force`, and the table `ground_forces`."""
+    def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
+        """The table `ground_forces`. Writes the generalized force to `force`, if given."""
         state, modes = self._state.Eval(context), self._modes(context)
-        self._compute_forces(self._parts, state, modes, force)
+        self._compute_forces(self._parts, state, modes, self._force if force is None else force)
+        return self._forces.ground_forces
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, output.get_mutable_value())
+        self._table(context, output.get_mutable_value())
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, self._force)
-        output.SetFromVector(self._forces.ground_forces[:, contact.NORMAL])
+        output.SetFromVector(self._table(context)[:, contact.NORMAL])
 
     def _calc_friction(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, self._force)
-        output.SetFromVector(self._forces.ground_forces[:, : contact.NORMAL].ravel())
+        output.SetFromVector(self._table(context)[:, : contact.NORMAL].ravel())
 
     def _calc_table(self, context: Context, output: BasicVector) -> None:
-        self._compute(context, self._force)
-        output.SetFromVector(self._forces.ground_forces.ravel())
+        output.SetFromVector(self._table(context).ravel())
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._modes(context)[:, : contact.STICK_POINT].ravel())
@@ -181,8 +178,8 @@ def AddGroundContact(
     check_type("AddGroundContact", "frames", frames, Sequence)
     check_type("AddGroundContact", "ground", ground, contact.Ground)
     check_type("AddGroundContact", "witness", witness, bool)
-    normal = contact.NormalForce(*ground.normal.tolist())
-    check_constants("AddGroundContact", "ground", normal._asdict())
+    normal = contact.NormalForce(*ground.normal.tolist())._asdict()
+    check_constants("AddGroundContact", "ground", normal)
     for place, frame in enumerate(frames):
         key = f"frames[{place}]"
         check_frame("AddGroundContact", key, plant, frame)
@@ -192,12 +189,9 @@ def AddGroundContact(
             raise InputError("AddGroundContact", key, f"frame '{frame.name()}' is given twice")
     nodes = Nodes.of(plant, frames)
     contacts = np.array([nodes.of_frame[frame.index()] for frame in frames], dtype=np.int64)
-    placed = ground.under(
-        contacts,
-        carriers=nodes.carriers[contacts],
-        radius=checked_numbers("AddGroundContact", "radius", radius, count=len(frames), least=0.0),
-        nodes=len(nodes.p_BN),
-    )
+    radii = checked_numbers("AddGroundContact", "radius", radius, count=len(frames), least=0.0)
+    carriers = nodes.carriers[contacts]
+    placed = ground.under(contacts, carriers=carriers, radius=radii, nodes=len(nodes.p_BN))
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
     system = builder.AddNamedSystem(name, GroundContact(model, witness=witness))
     Attach(builder, plant, system)

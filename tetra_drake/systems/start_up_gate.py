@@ -61,16 +61,11 @@ class _Timer(LeafSystem):
             output.set_value(after if started else before)
 
         self.DeclareDiscreteState([0.0 if start_up > 0.0 else 1.0])
-        self.DeclareAbstractOutputPort(
-            "selector",
-            alloc=lambda: Value(InputPortIndex(0)),
-            calc=select,
-            prerequisites_of_calc={self.xd_ticket()},
-        )
+        before_any, sources = Value(InputPortIndex(0)), {self.xd_ticket()}
+        self.DeclareAbstractOutputPort("selector", before_any.Clone, select, sources)
         if start_up > 0.0:
-            self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=_LONGER_THAN_ANY_SIMULATION, offset_sec=start_up, update=self._start
-            )
+            period = _LONGER_THAN_ANY_SIMULATION
+            self.DeclarePeriodicDiscreteUpdateEvent(period, start_up, self._start)
 
     def _start(self, context: Context, values: DiscreteValues) -> None:
         values.set_value([1.0])

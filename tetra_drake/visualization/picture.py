@@ -42,22 +42,18 @@ def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
     ends, depth = _seen(p_WN[np.vstack([structure.struts, structure.cable_ends, points])], camera)
     colours = [COLOURS["rear"]] * len(struts), cables, [COLOURS["node"]] * len(nodes)
     radii = np.concatenate([struts, np.full(len(cables), 0.5 * THICKEST * struts.min()), nodes])
-    order = np.argsort(-depth.mean(axis=1))
-    widths = _widths(radii, depth)[order]
-    lines = LineCollection(
-        list(ends[order]), colors=np.concatenate(colours)[order], linewidths=widths
-    )
-    drawn = [lines]
-    if robot.scenario.terrain.is_ground:
-        reach = float(np.linalg.norm(around, axis=1).max())
-        drawn = [*_floor(robot, p_WN, camera, reach=reach), lines]
+    order, reach = np.argsort(-depth.mean(axis=1)), float(np.linalg.norm(around, axis=1).max())
+    colour, width = np.concatenate(colours)[order], _widths(radii, depth)[order]
+    is_ground = robot.scenario.terrain.is_ground
+    drawn = _floor(robot, p_WN, camera, reach=reach) if is_ground else []
+    drawn.append(LineCollection(list(ends[order]), colors=colour, linewidths=width))
     size = ASPECT * _HEIGHT / _DPI, _HEIGHT / _DPI
     canvas = FigureCanvasAgg(Figure(size, dpi=_DPI, facecolor=COLOURS["sky"]))
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(-ASPECT * _SLOPE, ASPECT * _SLOPE), ylim=(-_SLOPE, _SLOPE))
     axes.axis("off")
-    for order_of_drawing, collection in enumerate(drawn):
-        collection.set(zorder=order_of_drawing, capstyle="round")
+    for collection in drawn:  # matplotlib keeps the order of equals
+        collection.set(capstyle="round")
         axes.add_collection(collection, autolim=False)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
