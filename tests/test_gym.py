@@ -120,7 +120,7 @@ def test_robots_side_by_side_do_what_environments_of_one_robot_do(short, mode):
 
 
 def test_wrappers_of_gymnasium_take_robots_side_by_side(short):
-    options = {"scenario": short, "max_episode_steps": 3, "autoreset_mode": "NextStep"}
+    options = {"scenario": short, "max_episode_steps": 3}
     many = RecordEpisodeStatistics(gymnasium.make_vec(WALK, num_envs=2, **options))
     many = NormalizeObservation(many)
     many.reset(seed=0)

@@ -248,8 +248,9 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     """Environments of robots side by side, in the lanes and threads of the compiled engine; see
     tetra_drake.gym. They behave like environments of one robot in Gymnasium's SyncVectorEnv.
 
-    By default a robot whose episode ends begins the next one in the same step; its last observation
-    is in `final_obs` of the info. The argument `autoreset_mode` has Gymnasium's other ways.
+    By default a robot whose episode ends begins the next one in the next step, without a motion.
+    With the `autoreset_mode` "SameStep" it begins in the same step; its last observation is in
+    `final_obs` of the info.
     """
 
     metadata: Info = {"render_modes": [_RENDERED]}  # noqa: RUF012
@@ -263,11 +264,11 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         grouped: bool = False,
         workers: int | None = None,
         max_episode_steps: int | None = None,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
     ) -> None:
         """See TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes
-        are truncated after `max_episode_steps`. `autoreset_mode` is "SameStep", "NextStep" or
+        are truncated after `max_episode_steps`. `autoreset_mode` is "NextStep", "SameStep" or
         "Disabled"."""
         options: Info = {"grouped": grouped, "render_mode": render_mode}
         made: Info = {"control_period": control_period, "workers": workers}

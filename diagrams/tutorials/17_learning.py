@@ -66,7 +66,8 @@ class Robots(VecEnv):
 
 
 # %% PPO, with the same digits for the same seed on the same processor.
-together = Robots(gymnasium.make_vec(name, num_envs=robots, grouped=grouped))
+options: dict[str, Any] = {"num_envs": robots, "grouped": grouped, "autoreset_mode": "SameStep"}
+together = Robots(gymnasium.make_vec(name, **options))
 scaled = VecNormalize(VecMonitor(together), gamma=0.99)
 learner = PPO(
     "MlpPolicy",

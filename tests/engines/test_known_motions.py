@@ -148,7 +148,7 @@ def test_a_point_mass_between_two_cables_has_a_self_stress_and_two_mechanisms():
 
 def test_a_mass_that_nothing_holds_is_refused(refused):
     lonely = StructureFile.model_validate(HANGING).model_dump() | {"cables": {}}
-    with refused("file", "masses.p", "cable"):
+    with refused("file", "nodes.p", "cable"):
         StructureFile.from_tree(written(lonely), "file")
 
 
