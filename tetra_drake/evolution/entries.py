@@ -266,8 +266,8 @@ def _unpacked(path: Path) -> bytes:
 
 
 def _parse(content: bytes, file: Path, *, is_packed: bool) -> Iterator[dict[str, Any]]:
-    """The entries of a file's lines, each of which has a checksum unless it is packed. A kill may
-    have cut the last line, but not before it was packed."""
+    """The entries of a file's lines. A line has a checksum unless it is packed. A kill may have cut
+    the last line, but not before it was packed."""
     for number, line in enumerate(io.BytesIO(content), start=1):
         is_whole, problem = line.endswith(b"\n"), ""
         if not (is_whole or is_packed):
