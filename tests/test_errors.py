@@ -9,10 +9,7 @@ LONG = 100_000 * "x"
 
 @pytest.mark.parametrize(
     ("problem", "kept"),
-    [
-        (f"found '{LONG}', expected a number", "', expected a number"),
-        ("word " * 20_000, "word"),
-    ],
+    [(f"found '{LONG}', expected a number", "', expected a number"), ("word " * 20_000, "word")],
 )
 def test_little_is_quoted_of_what_is_long(problem, kept):
     error = InputError(LONG[:4000], LONG, problem)

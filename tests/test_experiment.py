@@ -110,18 +110,10 @@ def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
     assert (tmp_path / "run" / "trial_00").is_dir()
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("workers", 0),
-        ("workers", 1.5),
-        ("seed", "1"),
-        ("optimizer", "!CmaEs"),
-        ("objective", 1.0),
-        ("executor", 2),
-        ("progress", print),
-    ],
-)
+WRONG = {"workers": 0, "seed": "1", "optimizer": "!CmaEs", "objective": 1.0, "executor": 2}
+
+
+@pytest.mark.parametrize(("key", "value"), [*WRONG.items(), ("progress", print)])
 def test_wrong_arguments_are_refused_at_once(tiny, tmp_path, run_small, refused, key, value):
     run = run_small()
     before = read_record(run)

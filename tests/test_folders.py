@@ -42,13 +42,9 @@ WRITERS = {
 RESULTS = {"simulate", "play_force", "play_motor"}
 RUNS = {"evolve", "evolve_map"}
 READERS = {
-    "replay {}": RESULTS | RUNS,
-    "figures {}": RESULTS | RUNS,
-    "simulate {}": RUNS,
-    "export {}": RUNS,
-    "cpg {}": RUNS,
+    **dict.fromkeys(("replay {}", "figures {}"), RESULTS | RUNS),
+    **dict.fromkeys(("simulate {}", "export {}", "cpg {}", "compare {}"), RUNS),
     "robustness {} --draws 1 --workers 1": RUNS,
-    "compare {}": RUNS,
 }
 """Commands that take a folder, with the folders that they read."""
 

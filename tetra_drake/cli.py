@@ -7,7 +7,7 @@ import itertools
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -76,23 +76,9 @@ def make_parser() -> Command:
         help="units of lengths and forces in texts, pages and figures (default: the units in which "
         "the robot's lengths are round, or mm if it is given in mm)",
     )
-    parser.add_commands(
-        [
-            _simulate,
-            _evolve,
-            _export,
-            _replay,
-            _video,
-            _figures,
-            _robustness,
-            _compare,
-            _fit,
-            _cpg,
-            _structure,
-            _prepare,
-        ],
-        common=common,
-    )
+    of_gaits: list[Callable[..., None]] = [_simulate, _evolve, _export, _replay, _video, _figures]
+    others: list[Callable[..., None]] = [_robustness, _compare, _fit, _cpg, _structure, _prepare]
+    parser.add_commands([*of_gaits, *others], common=common)
     return parser
 
 
@@ -101,8 +87,7 @@ File = Annotated[Path, Option(metavar="FILE", type=Path)]
 Count = Annotated[int, Option(metavar="N", type=integer(1))]
 Seed = Annotated[int, Option(metavar="N", type=integer(0))]
 Rate = Annotated[
-    float,
-    Option(metavar="RATE", type=quantity("Hz", "100 Hz", least="0.001 Hz", most="1 MHz")),
+    float, Option(metavar="RATE", type=quantity("Hz", "100 Hz", least="0.001 Hz", most="1 MHz"))
 ]
 Reach = Annotated[
     float,
@@ -280,11 +265,8 @@ def _evolve(
     from tetra_drake.report.summary import run_text
     from tetra_drake.scenario.load import load_scenario
 
-    changes: dict[str, Any] = {}
-    if trials is not None:
-        changes["evolution.trials"] = trials
-    if evaluations is not None:
-        changes["evolution.evaluations"] = evaluations
+    counts = {"evolution.trials": trials, "evolution.evaluations": evaluations}
+    changes = {key: count for key, count in counts.items() if count is not None}
     chosen: Scenario | None = None  # None means the scenario of the run
     if scenario is not None or not resume:
         chosen = load_scenario(scenario or "quick")

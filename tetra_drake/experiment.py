@@ -85,7 +85,9 @@ def evolve(
             run can then be resumed.
     """
     check_guard()
-    _check_counts(seed=(seed, 0), workers=(workers, 1))
+    for name, value, least in (("seed", seed, 0), ("workers", workers, 1)):
+        if value is not None:
+            check_whole("evolve", name, value, least=least)
     _check_functions("evolve", optimizer=optimizer, objective=objective)
     make_executor = maker_of(executor)
     if progress is True:
@@ -101,8 +103,10 @@ def evolve(
     if scenario is None:
         raise InputError("scenario", "", "is needed to begin a run")
     check_scenario(scenario)
-    if optimizer is None:
-        _check_budget(scenario)
+    kind, evaluations = scenario.optimizer, scenario.evolution.evaluations
+    if optimizer is None and isinstance(kind, SteadyState) and evaluations < kind.population:
+        expected = f"expected at least the population, {kind.population}"
+        raise InputError(scenario.name, "evolution.evaluations", f"found {evaluations}, {expected}")
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
@@ -199,21 +203,6 @@ def fit(
 
         save_fit(found, folder)
     return found
-
-
-def _check_budget(scenario: Scenario) -> None:
-    """Raises InputError if a trial would end before the first population is evaluated."""
-    evaluations, kind = scenario.evolution.evaluations, scenario.optimizer
-    if isinstance(kind, SteadyState) and evaluations < kind.population:
-        expected = f"expected at least the population, {kind.population}"
-        raise InputError(scenario.name, "evolution.evaluations", f"found {evaluations}, {expected}")
-
-
-def _check_counts(**given: tuple[int | None, int]) -> None:
-    """Raises InputError for an argument that is no integer or below its least value."""
-    for name, (value, least) in given.items():
-        if value is not None:
-            check_whole("evolve", name, value, least=least)
 
 
 def _check_functions(source: str, **given: object) -> None:

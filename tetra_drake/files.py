@@ -38,14 +38,12 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     _check_no_other(path)
     make_folder(path.parent, source=path)
-    try:
+    with writing(path):
         _remove_stale(path)
         handle, name = tempfile.mkstemp(
             dir=path.parent, prefix=f".{path.stem}.{os.getpid()}.", suffix=path.suffix
         )
         os.close(handle)
-    except (OSError, ValueError) as error:
-        raise InputError(path, "", f"cannot be written: {_reason(error)}") from error
     temporary = Path(name)
     try:
         yield temporary
@@ -60,6 +58,16 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+@contextlib.contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Context manager: errors of the system become InputError, which says that `path` cannot be
+    written."""
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"cannot be written: {_reason(error)}") from error
+
+
 def _remove_stale(path: Path) -> None:
     """Removes temporary files for `path` that belong to processes that have ended."""
     ours = re.compile(rf"\.{re.escape(path.stem)}\.(\d+)\.\w{{8}}{re.escape(path.suffix)}")
@@ -72,10 +80,8 @@ def _remove_stale(path: Path) -> None:
 def _is_alive(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:  # the process of another user
-        return True
+    except (OSError, OverflowError) as error:
+        return isinstance(error, PermissionError)  # the process of another user
     return True
 
 
@@ -91,14 +97,13 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
     """Names for files or folders, by names that may be any texts, such as those from a file. They
     are no paths, and different even where upper and lower case are the same."""
     found: dict[str, str] = {}
-    taken: set[str] = set()
     for name in names:
+        taken = {other.casefold() for other in found.values()}
         plain = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFKC", name))[:_LONGEST_NAME]
         plain = plain.strip("._-") or "unnamed"
         numbered = (f"{plain}_{number}" for number in itertools.count(2))
         free = (one for one in itertools.chain([plain], numbered) if one.casefold() not in taken)
         found[name] = next(free)
-        taken.add(found[name].casefold())
     return found
 
 
@@ -124,12 +129,8 @@ def check_file(path: str | Path) -> None:
 
 def _check_name(path: str | Path) -> None:
     """Raises InputError if no file can have this name, such as one that is too long."""
-    try:
+    with writing(path), contextlib.suppress(FileNotFoundError, NotADirectoryError):
         os.stat(path)
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except (OSError, ValueError) as error:
-        raise InputError(path, "", f"cannot be written: {_reason(error)}") from error
 
 
 def _check_no_other(path: str | Path) -> None:
@@ -166,11 +167,10 @@ def json_number(value: Any) -> Any:
 
 def read_json(path: str | Path, what: str) -> Any:
     """Content of a JSON file. Raises InputError like read_bytes(), and if a key is given twice."""
+    text = read_text(path, what)
     try:
-        return json.loads(read_text(path, what), object_pairs_hook=_unique_keys)
+        return json.loads(text, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(path, "", f"is not JSON: {error}") from error
 
 

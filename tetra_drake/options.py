@@ -106,8 +106,7 @@ def integer(least: int) -> Callable[[str], int]:
     def read(text: str) -> int:
         if text.isascii() and text.isdecimal() and int(text) >= least:
             return int(text)
-        problem = f"found '{text}', expected an integer, {least} or more"
-        raise argparse.ArgumentTypeError(problem)
+        raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, {least} or more")
 
     return read
 
@@ -116,15 +115,15 @@ def size(text: str) -> tuple[int, int]:
     """Width and height in pixels from a text, such as "1920x1080". Both are even."""
     found = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text, re.ASCII)
     width, height = map(int, found.groups()) if found else (0, 0)
-    least, most = _PIXELS
-    if width % 2 or height % 2 or not (least <= width <= most and least <= height <= most):
-        expected = f"expected two even numbers of {least} to {most}, such as 1920x1080"
+    if width not in _PIXELS or height not in _PIXELS:
+        limits = f"{_PIXELS[0]} to {_PIXELS[-1]}"
+        expected = f"expected two even numbers of {limits}, such as 1920x1080"
         raise argparse.ArgumentTypeError(f"found '{text}', {expected}")
     return width, height
 
 
-_PIXELS = 64, 4096
-"""Limits of the size of a picture."""
+_PIXELS = range(64, 4097, 2)
+"""Sizes of a picture."""
 
 
 def number(least: float, most: float) -> Callable[[str], float]:

@@ -49,9 +49,8 @@ def test_the_map_is_that_of_pyribs(run_of):
     places = np.transpose(places).tolist()
     ours = elites(run_of(dict(zip(fitnesses, places, strict=True))))
     ranges = [tuple(ends) for ends in KIND.measures.values()]
-    archive = GridArchive(
-        solution_dim=1, dims=KIND.cells, ranges=ranges, threshold_min=FLOOR, learning_rate=1.0
-    )
+    map_of = {"dims": KIND.cells, "ranges": ranges, "threshold_min": FLOOR}
+    archive = GridArchive(solution_dim=1, learning_rate=1.0, **map_of)
     archive.add(np.arange(200)[:, None], fitnesses, places)
     theirs = archive.data(["index", "solution"])
     cells = archive.int_to_grid_index(theirs["index"]).tolist()
@@ -70,17 +69,13 @@ def test_all_trials_are_on_one_map_without_failures_and_what_lacks_a_measure(run
 
 
 def test_the_fittest_and_those_next_to_the_corners_are_chosen_without_lucky_ones(run_of):
-    run = run_of(
-        {9.0: (0.09, 0.7), 8.0: (0.05, 0.5), 3.0: (0.01, 0.3), 2.0: (0.03, 0.7), 4.0: (0.07, 0.3)}
-    )
+    gaits = {9.0: (0.09, 0.7), 8.0: (0.05, 0.5), 3.0: (0.01, 0.3), 2.0: (0.03, 0.7)}
+    run = run_of(gaits | {4.0: (0.07, 0.3)})
     keep(run, {0: 0.4, 1: 0.5, 2: 1.0})
     assert keys(kept_gaits(elites(run))) == [(0, 1), (0, 4), (0, 2), (0, 3)]
     chosen = {name: gait["index"] for name, gait in notable_gaits(run).items()}
-    assert [*chosen][:3] == [
-        "fittest of the map",
-        "low speed, low lifted",
-        "low speed, high lifted",
-    ]
+    corners = ["low speed, low lifted", "low speed, high lifted"]
+    assert [*chosen][:3] == ["fittest of the map", *corners]
     assert list(chosen.values()) == [1, 2, 3, 4, 1]
     keep(run, dict.fromkeys(range(5), 0.0))
     assert notable_gaits(run) == {}

@@ -27,7 +27,8 @@ from tetra_drake.scenario.scenario import Scenario
 
 STIFFNESS, FREE_LENGTH = "robot.cables.line.stiffness", "robot.cables.line.free_length"
 DAMPING, MASSES = "robot.cables.line.damping", "robot.masses.a, robot.masses.b"
-BOUNDS = {STIFFNESS: (100.0, 400.0), FREE_LENGTH: (0.3, 0.5)}
+ALONE = {STIFFNESS: (100.0, 400.0)}
+BOUNDS = ALONE | {FREE_LENGTH: (0.3, 0.5)}
 NOISE, PULLS = 2e-4, (0.0, 4.0, 8.0, 12.0)
 
 
@@ -87,16 +88,14 @@ def test_derivatives_are_central_and_one_sided_where_a_neighbour_fails(limit, sl
 
 
 def test_a_parameter_without_influence_is_told_and_stays():
-    bounds = BOUNDS | {DAMPING: (0.0, 5.0)}
-    found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), bounds)
+    cases, damping = pulled_down(210.0, 0.39, np.zeros(4)), {DAMPING: (0.0, 5.0)}
+    found = fit_values(hung(), cases, BOUNDS | damping)
     assert found.parameters["determined"].to_list() == [True, True, False]
-    assert found.parameters["value"][DAMPING] == pytest.approx(0.0, abs=1e-6)
     assert math.isnan(found.parameters["low"][DAMPING])
-    assert [DAMPING in warning for warning in found.warnings] == [True]
     assert found.parameters["value"].to_list()[:2] == pytest.approx([210.0, 0.39], rel=1e-5)
-    alone = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), {DAMPING: (0.0, 5.0)})
-    assert alone.parameters["value"][DAMPING] == pytest.approx(0.0, abs=1e-6)
-    assert [DAMPING in warning for warning in alone.warnings] == [True]
+    for each in (found, fit_values(hung(), cases, damping)):
+        assert each.parameters["value"][DAMPING] == pytest.approx(0.0, abs=1e-6)
+        assert [DAMPING in warning for warning in each.warnings] == [True]
 
 
 def test_two_values_that_act_alike_are_not_determined():
@@ -118,8 +117,7 @@ def test_a_tension_and_a_frequency_give_mass_and_stiffness():
     frequencies = measurements.study_equilibrium(robot).frequencies.tolist()
     assert min(abs(np.array(frequencies) / bounce - 1.0)) < 1e-8
     case = Rest(tensions={"line top a": mass * gravity}, frequencies=frequencies)
-    bounds = {"robot.masses.a": (0.1, 0.5), STIFFNESS: (100.0, 400.0)}
-    found = fit_values(scenario, [case], bounds)
+    found = fit_values(scenario, [case], {"robot.masses.a": (0.1, 0.5)} | ALONE)
     assert found.parameters["value"].to_list() == pytest.approx([0.3, stiffness], rel=1e-4)
     assert found.residuals["uncertainty"].unique().tolist() == [1.0, 0.05]
 
@@ -165,8 +163,7 @@ def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
     monkeypatch.setattr("tetra_drake.analysis.fit.MOST", 160)
     cases = pulled_down(310.0, 0.4, np.zeros(4))[:: len(PULLS) - 1]
     add_waves(5e-3, 0.2)
-    bounds = {STIFFNESS: (100.0, 400.0)}
-    near, found = (fit_values(hung(), cases, bounds, search=search) for search in (False, True))
+    near, found = (fit_values(hung(), cases, ALONE, search=search) for search in (False, True))
     assert near.misfit > 10.0
     assert found.parameters["value"][STIFFNESS] == pytest.approx(310.0, rel=1e-4)
     assert found.misfit < 1e-3
@@ -312,7 +309,7 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
         ({}, "parameters"),
         ([STIFFNESS], "parameters"),
         (BOUNDS, "parameters"),  # two for one number
-        ({STIFFNESS: (100.0, 400.0), f"{DAMPING}, {STIFFNESS}": (0.0, 5.0)}, "parameters"),
+        (ALONE | {f"{DAMPING}, {STIFFNESS}": (0.0, 5.0)}, "parameters"),
     ],
 )
 def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, tmp_path, refused):
@@ -362,14 +359,13 @@ def test_a_log_in_parquet_has_the_numbers_of_the_csv_file(lab, tmp_path, monkeyp
 
 
 def test_what_is_no_list_of_measurements_and_unknown_names_are_refused(refused):
-    bounds = {STIFFNESS: (100.0, 400.0)}
     for given in (Rest(positions={"a z": 0.5}), [{"positions": {"a z": 0.5}}], [], None):
         with pytest.raises(InputError, match="measurements"):
-            fit(hung(), given, bounds)
+            fit(hung(), given, ALONE)
     with refused("measurement 1", "positions.c z"):
-        fit_values(hung(), [Rest(positions={"c z": 0.1})], bounds)
+        fit_values(hung(), [Rest(positions={"c z": 0.1})], ALONE)
     with refused("measurement 1", "tensions.line"):
-        fit_values(hung(), [Rest(tensions={"line": 0.1})], bounds)
+        fit_values(hung(), [Rest(tensions={"line": 0.1})], ALONE)
 
 
 SLIDING = SIDE | {"friction.kinetic": (0.1, 0.26)}

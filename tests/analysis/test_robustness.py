@@ -142,9 +142,8 @@ def test_the_summary_of_gaits(made):
     found = robustness.by_gait(made)
     a, b = found.loc["a"], found.loc["b"]
     # Linear interpolation between 8.9, 9 and 12: at 5 % a tenth of the way to the second one.
-    assert a[["5 %", "25 %", "50 %", "75 %", "95 %"]].tolist() == pytest.approx(
-        [8.91, 8.95, 9.0, 10.5, 11.7]
-    )
+    quantiles = pytest.approx([8.91, 8.95, 9.0, 10.5, 11.7])
+    assert a[["5 %", "25 %", "50 %", "75 %", "95 %"]].tolist() == quantiles
     assert a[["undisturbed", "mean", "kept"]].tolist() == pytest.approx([10.0, 29.9 / 3.0, 0.5])
     assert found[["failed", "missed"]].to_numpy().tolist() == [[1, 0], [0, 1]]
     assert a[["kept_low", "kept_high"]].tolist() == list(share_interval(2, 4))
@@ -155,18 +154,15 @@ def test_the_summary_of_gaits(made):
 def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):
     # START: -6 and +1. p: -1, -0.5, -0.25 and a failure.
     found = robustness.by_change(made)
-    assert found[["median", "worst", "failed"]].reset_index().to_numpy().tolist() == [
-        [robustness.START, 3.5, -6.0, 0],
-        ["p", 0.5, -1.0, 1],
-    ]
+    rows = found[["median", "worst", "failed"]].reset_index().to_numpy().tolist()
+    assert rows == [[robustness.START, 3.5, -6.0, 0], ["p", 0.5, -1.0, 1]]
     # Ranks of a's distances 3, 2, 1 with p's 1, 2, 3: -1; with q's 3, 2, 1: +1. Of b's 2, 1, 3, 4
     # with p's 1, 2, 3, 4: 1 - 6 (1 + 1) / 60 = 0.8; with q's 3, 2, 1, 4: 1 - 6 (1 + 1 + 4) / 60.
     expected = [[-1.0, 1.0], [0.8, 0.4]]
     np.testing.assert_allclose(robustness.rank_correlations(made)[["p", "q"]], expected, rtol=1e-12)
-    assert found.loc["p", ["correlation", "correlation_size"]].tolist() == pytest.approx(
-        [-0.1, 0.9]
-    )
-    assert found.loc[robustness.START, ["correlation", "correlation_size"]].isna().all()
+    correlations = found[["correlation", "correlation_size"]]
+    assert correlations.loc["p"].tolist() == pytest.approx([-0.1, 0.9])
+    assert correlations.loc[robustness.START].isna().all()
 
 
 def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement, tmp_path):

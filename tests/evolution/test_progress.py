@@ -7,9 +7,8 @@ from tetra_drake.evolution.progress import Display, overview
 from tetra_drake.evolution.trials import TrialStatus
 
 FRESH = TrialStatus(number=0, evaluations_at_most=140)
-STATUS = replace(
-    FRESH, iteration=9, evaluations=40, failures=1, best_fitness=4.25, best_distance=0.127
-)
+BEST = {"best_fitness": 4.25, "best_distance": 0.127}
+STATUS = replace(FRESH, iteration=9, evaluations=40, failures=1, **BEST)
 ENDED = replace(STATUS, evaluations=100, best_fitness=6.0, stop="levelled off")
 
 

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -192,9 +193,7 @@ def test_a_run_is_replaced_when_the_first_line_of_the_new_one_is_written(
     (run / "report.html").touch()
     before = read_record(run)
 
-    def fail(*_):
-        raise InputError(run, "", "disk full")
-
+    fail = Mock(side_effect=InputError(run, "", "disk full"))
     with RunRecord.create(run, scenario=small_scenario(), seed=6, overwrite=True) as record:
         trial = TrialRecord(record, 0)
         assert trial.recall(0, np.zeros(26)) is None

@@ -43,9 +43,8 @@ def bars(figure):
 
 
 def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
-    run = run_of(
-        initial(4.0, -6.0, None, 1.0), initial(None, None), [*initial(2.0, 3.0), [(9.0, 0)]]
-    )
+    later = [*initial(2.0, 3.0), [(9.0, 0)]]
+    run = run_of(initial(4.0, -6.0, None, 1.0), initial(None, None), later)
     best, worst = bars(initial_distances(run))
     assert best == pytest.approx([4.0 / PER_DISTANCE, 3.0 / PER_DISTANCE])
     assert worst == pytest.approx([-6.0 / PER_DISTANCE, 2.0 / PER_DISTANCE])

@@ -64,9 +64,8 @@ def test_stance_bars_show_when_feet_bear_load(walk):
     feet = [label.get_text() for label in stance.get_yticklabels()]
     expected = [f"T{i} {side}" for i in range(1, 6) for side in ("right", "left")]
     assert feet == expected, "the rear is below; the tip never stands"
-    for i, (bars, row_of_foot) in enumerate(
-        zip(stance.collections, stance.get_yticks(), strict=True)
-    ):
+    rows = zip(stance.collections, stance.get_yticks(), strict=True)
+    for i, (bars, row_of_foot) in enumerate(rows):
         corners = np.array([path.vertices[[0, 2]] for path in bars.get_paths()])
         np.testing.assert_allclose(corners[..., 1].mean(axis=1), row_of_foot)
         begins = np.arange(0.0, 10.0, PERIOD) + (0.0 if i // 2 % 2 else PERIOD / 2)

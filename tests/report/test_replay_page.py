@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -20,9 +21,8 @@ from tetra_drake.scenario.units import INCH
 
 def test_the_title_is_by_the_scenarios_objective(folder, tiny, gait, result):
     assert load_or_simulate(folder).title == f"{gait.name}: {headline(tiny, vars(result.metrics))}"
-    (folder / "scenario.yaml").write_text(
-        dump_scenario(tiny.with_changes({"objective": {"heading_change": "1 /rad"}}))
-    )
+    turning = tiny.with_changes({"objective": {"heading_change": "1 /rad"}})
+    (folder / "scenario.yaml").write_text(dump_scenario(turning))
     turned = abs(np.rad2deg(result.metrics.heading_change))
     assert load_or_simulate(folder).title == f"{gait.name}: turns {turned:.0f} degrees in 0.3 s"
 
@@ -100,9 +100,7 @@ def test_a_damaged_result_is_refused_by_its_key(folder, key, refused):
 
 
 def test_a_result_stands_for_files_that_are_complete(folder, tiny, gait, result, monkeypatch):
-    def fail(*arguments, **options):
-        raise OSError("disk full")
-
+    fail = Mock(side_effect=OSError("disk full"))
     monkeypatch.setattr("tetra_drake.results.trajectory.save_dataset", fail)
     with pytest.raises(OSError, match="disk full"):
         save_result_folder(folder, result)

@@ -118,12 +118,8 @@ def compare(
         rows = _trials(progress, common, reach)
         trials.append(rows.assign(run=label))
         curves.append(_curve(progress).assign(run=label))
-        run = runs[label]
-        summaries[label] = {
-            "draws": run.scenario.draw_count,
-            **_summary(rows),
-            "wall_time": run.evaluations["wall_time_s"].mean(),
-        }
+        summaries[label] = {"draws": runs[label].scenario.draw_count, **_summary(rows)}
+        summaries[label]["wall_time"] = runs[label].evaluations["wall_time_s"].mean()
         if going_on := summaries[label]["going_on"]:
             notes.append(f"{label}: {going_on} of {len(rows)} trials go on")
         if failed := int(np.isneginf(rows["fitness"]).sum()):
@@ -203,8 +199,7 @@ def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
     rows = []
     for (run, other), values in probabilities.items():
         low, high = interval_of_resamples(np.mean(resamples[run, other], axis=0))
-        probability = float(np.mean(values))
-        rows.append((run, other, probability, low, high))
+        rows.append((run, other, float(np.mean(values)), low, high))
     columns = ["run", "other", "probability", "low", "high"]
     return pandas.DataFrame(rows, columns=columns).set_index(["run", "other"])
 

@@ -76,16 +76,14 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
         return
     file.repair()
     run = load_run(directory)
-    scenario, gaits_of_map = run.scenario, elites(run)
+    gaits_of_map = elites(run)
     missing = gaits_of_map[gaits_of_map["kept"].isna()]
     if missing.empty:
         return
     keys = missing[_KEY].to_numpy().tolist()
     gaits = {i: run.gait(trial, index) for i, (trial, index) in enumerate(keys)}
-    seed = run.manifest.seed
-    judgement = robustness(
-        scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers
-    )
+    settings: Any = {"draws": kind.draws, "seed": manifest.seed, "workers": workers}
+    judgement = robustness(run.scenario, gaits, alone=False, **settings)
     table = by_gait(judgement)
     lines = [
         {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}

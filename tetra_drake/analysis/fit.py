@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 import time
@@ -130,15 +131,10 @@ class Fit:
     @property
     def table(self) -> Table:
         """Values and intervals."""
-        rows = [
-            [
-                str(key),
-                _with_uncertainty(row["value"], row["high"] - row["value"]),
-                rounded(row["start"]),
-                row["unit"] or "1",
-            ]
-            for key, row in self.parameters.iterrows()
-        ]
+        rows = []
+        for key, row in self.parameters.iterrows():
+            value = _with_uncertainty(row["value"], row["high"] - row["value"])
+            rows.append([str(key), value, rounded(row["start"]), row["unit"] or "1"])
         return Table(["key", "value, 95 % interval", "start", "unit"], rows, text_columns=(0, 3))
 
 
@@ -253,30 +249,26 @@ def _digest(scenario: Scenario, measurements: Sequence[Measurement]) -> str:
     return digest.hexdigest()
 
 
+@dataclass(eq=False)
 class _Problem:
     """Weighted residuals and their derivatives by relative parameters. All scenarios of an
     iteration are simulated side by side."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        parameters: Sequence[Parameter],
-        measured: Sequence[Measured],
-        digest: str,
-        folder: Path | None,
-        say: Say,
-    ) -> None:
-        self.scenario, self.parameters, self.measured = scenario, parameters, measured
-        self.scale = np.array([parameter.scale for parameter in parameters])
-        self.bounds = (
-            np.array([parameter.least for parameter in parameters]) / self.scale,
-            np.array([parameter.most for parameter in parameters]) / self.scale,
-        )
-        tables = [each.numbers.assign(measurement=each.name) for each in measured]
+    scenario: Scenario
+    parameters: Sequence[Parameter]
+    measured: Sequence[Measured]
+    digest: str
+    folder: Path | None
+    say: Say
+
+    def __post_init__(self) -> None:
+        self.scale = np.array([parameter.scale for parameter in self.parameters])
+        limits = np.array([[parameter.least, parameter.most] for parameter in self.parameters])
+        self.bounds = limits.T / self.scale
+        tables = [each.numbers.assign(measurement=each.name) for each in self.measured]
         self.numbers = pandas.concat(tables, ignore_index=True)
         self.values = self.numbers["measured"].to_numpy(dtype=float)
         self.uncertainty = self.numbers["uncertainty"].to_numpy(dtype=float)
-        self._digest, self._folder, self._say = digest, folder, say
         self._known: dict[str, list[Prediction]] = {}
 
     @property
@@ -336,7 +328,7 @@ class _Problem:
 
     def tell(self, residuals: np.ndarray) -> None:
         """Tells the user of an iteration that ended with these residuals."""
-        self._say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
+        self.say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
 
     def predictions(self, x: np.ndarray) -> list[Prediction]:
         """Predictions for each measurement at a point that was evaluated."""
@@ -371,11 +363,11 @@ class _Problem:
     def _name(self, x: np.ndarray) -> str:
         """Name of an evaluation: a digest of the data, keys and values."""
         keys = [parameter.key for parameter in self.parameters]
-        text = f"{self._digest} {keys} {(x * self.scale).tolist()}"
+        text = f"{self.digest} {keys} {(x * self.scale).tolist()}"
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
     def _file(self, name: str) -> Path | None:
-        return self._folder and self._folder / EVALUATIONS / f"{name}.bin"
+        return self.folder and self.folder / EVALUATIONS / f"{name}.bin"
 
     def _save(self, name: str) -> None:
         if file := self._file(name):
@@ -386,11 +378,9 @@ class _Problem:
     def _restore(self, name: str) -> bool:
         """Takes an evaluation from the folder. Returns False if it is not there, or damaged."""
         counts = [len(each.numbers) + 1 for each in self.measured]
-        try:
-            file = self._file(name)
+        file, content = self._file(name), b""
+        with contextlib.suppress(InputError):  # it is simulated again
             content = read_bytes(file, "evaluation") if file else b""
-        except InputError:  # it is simulated again
-            return False
         numbers = content[SEAL:]
         if content[:SEAL] != _seal(name, numbers):
             return False
@@ -426,32 +416,20 @@ def _result(problem: _Problem, start: np.ndarray, x: np.ndarray, wall_time: floa
     determined, smooth = np.isfinite(half), problem.roughness(x) < ROUGH
     explained = misfit <= 1.0 + LIKELY * math.sqrt(2.0 / max(1, last.size - x.size))
     known = determined & (smooth | ~determined).all()
-    values, given = x * problem.scale, pandas.DataFrame(problem.parameters).set_index("key")
-    table = pandas.DataFrame(
-        {
-            "value": values,
-            "low": np.where(known, values - half, np.nan),
-            "high": np.where(known, values + half, np.nan),
-            **given,
-            "determined": determined,
-            "smooth": smooth,
-        },
-        index=given.index,
-    )
-    predicted = {
-        "start": problem.values + problem.uncertainty * first,
-        "fitted": problem.values + problem.uncertainty * last,
-    }
+    values, width = x * problem.scale, np.where(known, half, np.nan)
+    given = pandas.DataFrame(problem.parameters).set_index("key")
+    ends = {"value": values, "low": values - width, "high": values + width}
+    table = pandas.DataFrame(ends, given.index).join(given)
+    table = table.assign(determined=determined, smooth=smooth)
+    predicted = [problem.values + problem.uncertainty * each for each in (first, last)]
     correlations = pandas.DataFrame(correlation, index=given.index, columns=given.index)
+    clocks = zip(problem.measured, problem.predictions(x), strict=True)
     return Fit(
         scenario=problem.scenario_at(x),
         parameters=table,
         correlations=correlations,
-        residuals=problem.numbers.assign(**predicted),
-        clock_offsets={
-            each.name: prediction.clock_offset
-            for each, prediction in zip(problem.measured, problem.predictions(x), strict=True)
-        },
+        residuals=problem.numbers.assign(start=predicted[0], fitted=predicted[1]),
+        clock_offsets={each.name: found.clock_offset for each, found in clocks},
         misfit=misfit,
         start_misfit=problem.misfit(first),
         warnings=_warnings(table, correlations, explained=explained),

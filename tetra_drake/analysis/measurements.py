@@ -172,11 +172,8 @@ class Rest(Section):
         """Checks the names. Raises InputError for a node or cable that there is not."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
         places = _coordinates(structure.node_names)
-        for key, given, known in (
-            ("positions", self.positions, places),
-            ("tensions", self.tensions, structure.cable_names),
-        ):
-            for label in given:
+        for key, known in {"positions": places, "tensions": structure.cable_names}.items():
+            for label in getattr(self, key):
                 if label not in known:
                     raise InputError(name, f"{key}.{label}", f"is unknown; {hint(label, known)}")
         counts = [len(self.positions), len(self.tensions), len(self.frequencies)]

@@ -185,8 +185,7 @@ def _simulated(
     for (row, _, _), result in zip(walking, results, strict=True):
         if isinstance(result, SimulationResult):
             row["missed"] = ", ".join(unmet_requirements(result.metrics, scenario.require))
-            row["fitness"] = result.fitness
-            row |= result.metrics.to_json()
+            row |= {"fitness": result.fitness, **result.metrics.to_json()}
         else:
             row["failure"] = str(result)
     return rows

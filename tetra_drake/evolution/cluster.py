@@ -59,8 +59,7 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
             if cluster is None:
                 cluster = stack.enter_context(local_cluster(workers or available_cores()))
             # A default client would stay Dask's default even if its scheduler does not answer.
-            client = distributed.Client(cluster, set_as_default=False)
-            stack.enter_context(client)
+            client = stack.enter_context(distributed.Client(cluster, set_as_default=False))
         except RuntimeError as error:
             raise InputError("executor", "", f"Dask's workers do not start: {error}") from error
         except (OSError, ValueError) as error:
@@ -76,7 +75,11 @@ def executors_of(client: Client) -> DaskExecutors:
         found = "asynchronous" if client.asynchronous else client.status
         raise InputError("executor", "", f"found a Dask client that is {found}, expected running")
     for name in ("tetra_drake", "drake"):
-        _check_version(client, name)
+        ours = metadata.version(name)
+        for worker, theirs in client.run(metadata.version, name, on_error="return").items():
+            if theirs != ours:
+                problem = f"{name} on worker {worker}: found {theirs!r}, expected '{ours}' as here"
+                raise InputError("executor", "", problem)
     return DaskExecutors(client)
 
 
@@ -92,15 +95,6 @@ def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
         return executor
     expected = "an Executor, a Dask client, or a function that makes an Executor"
     raise InputError("evolve", "executor", f"found {executor!r:.60}, expected {expected}")
-
-
-def _check_version(client: Client, name: str) -> None:
-    """Raises InputError if a running worker lacks a package or has another version of it."""
-    ours = metadata.version(name)
-    for worker, theirs in client.run(metadata.version, name, on_error="return").items():
-        if theirs != ours:
-            problem = f"{name} on worker {worker}: found {theirs!r}, expected '{ours}' as here"
-            raise InputError("executor", "", problem)
 
 
 def local_cluster(workers: int) -> LocalCluster:

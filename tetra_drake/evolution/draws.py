@@ -21,10 +21,8 @@ def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
     if failures:
         return Evaluation(-math.inf, metrics, failures[0], wall_time)
     fitnesses = [draw.fitness for draw in draws]
-    distances = [draw.metrics["distance"] for draw in draws]
-    lists = {"fitness": fitnesses, "distance": distances}
-    fitness = worst_mean(fitnesses, share)
-    return Evaluation(fitness, metrics, wall_time=wall_time, draws=lists)
+    lists = {"fitness": fitnesses, "distance": [draw.metrics["distance"] for draw in draws]}
+    return Evaluation(worst_mean(fitnesses, share), metrics, wall_time=wall_time, draws=lists)
 
 
 def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

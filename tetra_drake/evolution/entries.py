@@ -16,6 +16,7 @@ has its own checksums.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import itertools
 import json
@@ -24,7 +25,7 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -32,7 +33,7 @@ from typing import Annotated, Any, NoReturn
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import json_number, make_folder, read_bytes
+from tetra_drake.files import json_number, make_folder, read_bytes, writing
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.scenario.metrics import wrong_metric
 
@@ -117,9 +118,7 @@ class _EliteLine(_Line):
 
 
 _LINES: dict[str, type[_Line]] = {
-    EVALUATIONS: _EvaluationLine,
-    IN_PROGRESS: _EvaluationLine,
-    REEVALUATIONS: _EvaluationLine,
+    **dict.fromkeys((EVALUATIONS, IN_PROGRESS, REEVALUATIONS), _EvaluationLine),
     ITERATIONS: _IterationLine,
     ELITES: _EliteLine,
 }
@@ -186,7 +185,8 @@ class RecordFile:
         packed, entries = compressed(self.path), []
         earlier = _parse(_unpacked(packed), packed, is_packed=True)
         later = _parse(_read(self.path), self.path, is_packed=False)
-        counter = _COUNTERS.get(self.path.name)
+        counter, unique = _COUNTERS.get(self.path.name), _UNIQUE.get(self.path.name, ())
+        seen = set()
         for row, entry in enumerate(itertools.chain(earlier, later)):
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
@@ -195,8 +195,11 @@ class RecordFile:
             if counter is not None and entry.get(counter) != row:
                 problem = f"is damaged: {counter} is {entry.get(counter)}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
+            values = tuple(entry[key] for key in unique)
+            if unique and values in seen:
+                self.refuse(row, f"has {' and '.join(unique)} of a line before it; {REMEDY}")
+            seen.add(values)
             entries.append(entry)
-        self._check_unique(entries)
         return entries
 
     def _check_types(self, row: int, entry: Mapping[str, Any]) -> None:
@@ -207,34 +210,20 @@ class RecordFile:
             key = ".".join(str(part) for part in first["loc"])
             self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
 
-    def _check_unique(self, entries: Sequence[Mapping[str, Any]]) -> None:
-        keys, seen = _UNIQUE.get(self.path.name, ()), set()
-        for row, entry in enumerate(entries if keys else ()):
-            values = tuple(entry.get(key) for key in keys)
-            if values in seen:
-                self.refuse(row, f"has {' and '.join(keys)} of a line before it; {REMEDY}")
-            seen.add(values)
-
     def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
         """Appends lines; creates the folder if it is missing. On return the operating system has
         the lines. A kill during the call damages at most the last line."""
         make_folder(self.path.parent)
         text = "".join(json_line({**self.owner, **entry}) for entry in entries)
-        try:
-            with self.path.open("ab") as file:
-                file.write(text.encode())
-        except OSError as error:
-            raise InputError(self.path, "", f"cannot be written: {error.strerror}") from error
+        with writing(self.path), self.path.open("ab") as file:
+            file.write(text.encode())
 
     def repair(self) -> None:
         """Cuts off an incomplete last line."""
         content = _read(self.path)
-        if not content or content.endswith(b"\n"):
-            return
-        try:
-            os.truncate(self.path, content.rfind(b"\n") + 1)
-        except OSError as error:
-            raise InputError(self.path, "", f"cannot be written: {error.strerror}") from error
+        if content and not content.endswith(b"\n"):
+            with writing(self.path):
+                os.truncate(self.path, content.rfind(b"\n") + 1)
 
     def refuse(self, row: int, problem: str) -> NoReturn:
         """Raises InputError about the line with this number, counted from 0."""
@@ -277,13 +266,18 @@ def _unpacked(path: Path) -> bytes:
 
 
 def _parse(content: bytes, file: Path, *, is_packed: bool) -> Iterator[dict[str, Any]]:
-    """The entries of a file's lines. Each line has a checksum unless it is packed. A kill may have
-    cut the last line, but not before it was packed."""
+    """The entries of a file's lines. A line has a checksum unless it is packed. A kill may have cut
+    the last line, but not before it was packed."""
     for number, line in enumerate(io.BytesIO(content), start=1):
-        problem, is_whole = "", line.endswith(b"\n")
+        is_whole, problem = line.endswith(b"\n"), ""
         if not (is_whole or is_packed):
             return
         match = _CHECKSUM.fullmatch(line.removesuffix(b"\n"))
+        entry: Any = None
+        with contextlib.suppress(ValueError, RecursionError):
+            entry = json.loads(line if match is None else match[1] + b"}")
+        if not isinstance(entry, dict):
+            problem = "it is no object of JSON"
         if match is None and not is_packed:
             problem = "it has no checksum"
         if not is_whole:
@@ -292,11 +286,4 @@ def _parse(content: bytes, file: Path, *, is_packed: bool) -> Iterator[dict[str,
             problem = "its checksum does not match its content"
         if problem:
             raise InputError(file, f"line {number}", f"is damaged: {problem}; {REMEDY}")
-        try:
-            entry = json.loads(line if match is None else match[1] + b"}")
-        except (ValueError, RecursionError):
-            entry = None
-        if not isinstance(entry, dict):
-            problem = f"is damaged: it is no object of JSON; {REMEDY}"
-            raise InputError(file, f"line {number}", problem)
         yield entry

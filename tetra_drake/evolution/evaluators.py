@@ -85,15 +85,11 @@ def evaluator_of(
     return InProcesses(evaluate, workers)
 
 
-class InLanes:
+class InLanes(contextlib.AbstractContextManager["InLanes"]):
     """Evaluates gaits in the lanes of the compiled engine."""
 
     def __init__(self, evaluate: GaitEvaluation, lanes: LanePool) -> None:
         self._evaluate, self._lanes = evaluate, lanes
-
-    def __enter__(self) -> Self:
-        self._lanes.__enter__()
-        return self
 
     def __exit__(self, *error: object) -> None:
         self._lanes.__exit__(*error)
@@ -148,10 +144,8 @@ class InProcesses(contextlib.AbstractContextManager["InProcesses"]):
         try:
             executor.submit(_load, self._evaluate).result()
         except BrokenExecutor as error:
-            problem = (
-                f"do not start, as they say above; it may be that {_UNGUARDED}, or that memory is "
-                "short"
-            )
+            cause = f"it may be that {_UNGUARDED}, or that memory is short"
+            problem = f"do not start, as they say above; {cause}"
             raise InputError(_SOURCE, "", problem) from error
         return executor
 
@@ -279,10 +273,8 @@ class Evaluations:
         try:
             return task, _result(self._evaluator.submit(task))
         except BrokenExecutor as error:
-            problem = (
-                "its worker died, and once more when nothing else ran, as if memory is short; it "
-                "is not recorded, and the run can be resumed"
-            )
+            died = "its worker died, and once more when nothing else ran, as if memory is short"
+            problem = f"{died}; it is not recorded, and the run can be resumed"
             raise InputError(task, "", problem) from error
 
 

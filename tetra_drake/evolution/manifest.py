@@ -55,17 +55,11 @@ class Method:
 
     @classmethod
     def of(
-        cls,
-        scenario: Scenario,
-        *,
-        objective: object | None = None,
-        optimizer: object | None = None,
+        cls, scenario: Scenario, *, objective: object = None, optimizer: object = None
     ) -> Method:
         """The method of a run. By default objective and optimiser are the scenario's."""
-        return cls(
-            objective=FITNESS if objective is None else _name(objective),
-            optimizer=_name(scenario.optimizer if optimizer is None else optimizer),
-        )
+        name = FITNESS if objective is None else _name(objective)
+        return cls(name, _name(scenario.optimizer if optimizer is None else optimizer))
 
     def __str__(self) -> str:
         return f"optimiser {self.optimizer}, objective {self.objective}"

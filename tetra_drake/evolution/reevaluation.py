@@ -49,10 +49,10 @@ def reevaluate(
     files = [run.file(REEVALUATIONS, trial) for trial in range(scenario.evolution.trials)]
     for file in files:
         file.repair()
-    done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
+    known = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
     best = run.best(max(1, BEST_GAITS // scenario.draw_count))
     rows = best[["trial", "index", "iteration"]].itertuples(index=False, name=None)
-    missing = [row for row in rows if row[:2] not in done]
+    missing = [row for row in rows if row[:2] not in known]
     if not missing:
         return run
     tasks = []
@@ -64,8 +64,7 @@ def reevaluate(
     progress.stage(_TITLE, 0, len(missing))
     chosen = evaluator_of(evaluate, workers=workers, executor=executor, warn=progress.warn)
     with chosen as evaluator:
-        for finished, evaluated in enumerate(evaluate_all(evaluator, tasks), start=1):
-            task, _ = evaluated
-            files[task.trial].append([evaluation_entry(*evaluated)])
-            progress.stage(_TITLE, finished, len(missing))
+        for done, (task, evaluation) in enumerate(evaluate_all(evaluator, tasks), start=1):
+            files[task.trial].append([evaluation_entry(task, evaluation)])
+            progress.stage(_TITLE, done, len(missing))
     return load_run(run.directory)

@@ -209,18 +209,12 @@ def run_trials(
 def check_fitness(trials: Sequence[Trial], directory: Path, evaluator: Evaluator) -> None:
     """Evaluates the first recorded gait with a fitness again. Raises InputError if its fitness
     differs, so that a record never mixes two objectives."""
-    for trial in trials:
-        if trial.recalled is None:
-            continue
-        task, recorded = trial.recalled
+    recalled = [trial.recalled for trial in trials if trial.recalled is not None]
+    for task, recorded in recalled[:1]:
         ((_, again),) = evaluate_all(evaluator, [task])
-        fitness = recorded.fitness
-        if again.fitness == fitness:
-            return
-        outcome = again.failure or f"fitness {again.fitness!r}"
-        problem = (
-            f"{task} has fitness {fitness!r}, and evaluated again {outcome}; resume the run "
-            "with the objective, the versions of the packages and the kind of processor it was "
-            "begun with"
-        )
-        raise InputError(directory, "objective", problem)
+        if again.fitness != recorded.fitness:
+            outcome = again.failure or f"fitness {again.fitness!r}"
+            found = f"{task} has fitness {recorded.fitness!r}, and evaluated again {outcome}"
+            same = "the objective, the versions of the packages and the kind of processor"
+            problem = f"{found}; resume the run with {same} it was begun with"
+            raise InputError(directory, "objective", problem)

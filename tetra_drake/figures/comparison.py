@@ -51,9 +51,8 @@ def comparison(compared: Compared, *, figure: Page | None = None) -> Drawn:
     If a distance to reach was given, a second panel shows the share of trials that have reached it.
     Finished trials keep their last values. A dot marks the end of a run."""
     panel_count, unit = 1 if compared.reach is None else 2, compared.scenario.units
-    labels = []
-    for label, count in compared.runs["trials"].items():
-        labels.append(f"{label} (1 trial)" if count == 1 else f"{label} ({count} trials)")
+    counts = compared.runs["trials"].items()
+    labels = [f"{label} ({count} {'trial' if count == 1 else 'trials'})" for label, count in counts]
     is_narrow = page_width(figure) < _BESIDE * rcParams["font.size"] / Look.font_size
     rows, columns = (panel_count, 1) if is_narrow else (1, panel_count)
     page = page_of(figure, height_in=1.2 + 2.2 * rows + 0.1 * len(labels))

@@ -26,13 +26,7 @@ from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import Units
 
 _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}
-_NUMBER: Any = {
-    "ha": "center",
-    "va": "center",
-    "fontsize": "small",
-    "fontweight": "bold",
-    "zorder": 4,
-}
+_NUMBER: Any = {"ha": "center", "va": "center", "size": "small", "weight": "bold", "zorder": 4}
 _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
 
 
@@ -68,9 +62,8 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
         panel.set(xlabel=x_label)
         for number, (_, gait) in enumerate(named, start=1):
             panel.text(*_middles(gait, edges), str(number), bbox=_DISC, **_NUMBER)
-    notes = []
-    for number, (names, gait) in enumerate(named, start=1):
-        notes.append(f"{number}  {listed(names)}: {gait_label(gait)}")
+    notes = [f"{listed(names)}: {gait_label(gait)}" for names, gait in named]
+    notes = [f"{number}  {note}" for number, note in enumerate(notes, start=1)]
     page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize="small", wrap=True)
     set_title(page, "Map of gaits")
     return page
@@ -97,10 +90,8 @@ def _draw_cells(
 
 def _middles(gaits: Any, edges: Sequence[np.ndarray]) -> list[Any]:
     """Centres of the cells of one gait, or of a table of gaits, along each axis."""
-    middles = []
-    for edge, cell in zip(edges, CELLS, strict=True):
-        middles.append((edge[:-1] + edge[1:])[gaits[cell]] / 2.0)
-    return middles
+    along = zip(edges, CELLS, strict=True)
+    return [(edge[:-1] + edge[1:])[gaits[cell]] / 2.0 for edge, cell in along]
 
 
 def _label(name: str, units: Units) -> str:

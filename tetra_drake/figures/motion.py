@@ -381,8 +381,7 @@ def _name_ends(panel: Axes, nodes: np.ndarray, structure: Structure) -> None:
     """Writes the names of the first and the last body at the centres of their nodes, as seen from
     above. `nodes` (nodes, 3) are the positions of all nodes."""
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+    look: Any = {"ha": "center", "va": "center", "fontsize": "small", "bbox": box}
     for body in (0, len(structure.bodies) - 1):
         x, y, _ = nodes[structure.carriers == body].mean(axis=0)
-        panel.text(
-            x, y, structure.bodies[body], ha="center", va="center", fontsize="small", bbox=box
-        )
+        panel.text(x, y, structure.bodies[body], **look)

@@ -35,14 +35,7 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import fixed
 from tetra_drake.scenario.units import Units
 
-_DOTS: Any = {
-    "color": OKABE_ITO["sky_blue"],
-    "linestyle": "",
-    "marker": "o",
-    "markersize": 2.0,
-    "alpha": 0.4,
-    "zorder": 0,
-}
+_DOTS: Any = {"color": OKABE_ITO["sky_blue"], "markersize": 2.0, "alpha": 0.4, "zorder": 0}
 _LINE = {"color": OKABE_ITO["blue"], "linewidth": 1.2}
 _BOX: Any = {
     "orientation": "horizontal",
@@ -50,10 +43,7 @@ _BOX: Any = {
     "whis": (5, 95),
     "showfliers": False,
     "manage_ticks": False,
-    "boxprops": _LINE,
-    "medianprops": _LINE,
-    "whiskerprops": _LINE,
-    "capprops": _LINE,
+    **dict.fromkeys(("boxprops", "medianprops", "whiskerprops", "capprops"), _LINE),
 }
 _GREATEST: Any = {"color": "black", "linewidth": 1.0}
 
@@ -67,10 +57,8 @@ def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
 
     Returns the names of the files. Raises InputError if a file cannot be written.
     """
-    tables = {
-        "draws": judgement.compared(judgement.draws),
-        "alone": judgement.compared(judgement.alone),
-    }
+    given = {"draws": judgement.draws, "alone": judgement.alone}
+    tables = {name: judgement.compared(table) for name, table in given.items()}
     figure, summary = robustness(judgement), robustness_numbers(judgement)
     return save_findings(figure, folder, "robustness", tables=tables, summary=summary)
 
@@ -94,9 +82,8 @@ def robustness(judgement: Judgement, *, figure: Page | None = None) -> Drawn:
     what = [folded(str(name), width) for name in changes.index]
     rows = [max(most_lines(texts) * len(texts) + 1, 4) for texts in (names, what)]
     page = page_of(figure, height_in=_ROW * sum(rows) + 1.8)
-    panels = page.subplot_mosaic(
-        [["distances", "distances"], ["alone", "together"]], height_ratios=rows
-    )
+    places: Any = [["distances", "distances"], ["alone", "together"]]
+    panels = page.subplot_mosaic(places, height_ratios=rows)
     _draw_distances(panels["distances"], judgement, gaits)
     _draw_alone(panels["alone"], changes, unit)
     _draw_correlations(panels["together"], changes, chance(count))
@@ -115,18 +102,15 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
         shares = simulated["distance"] / simulated["undisturbed"]
         # Multiples of the golden ratio spread any number of dots evenly.
         heights = row + 0.6 * (simulated["draw"] * 0.618034 % 1.0 - 0.5)
-        axes.plot(shares, heights, **_DOTS)
+        axes.plot(shares, heights, "o", **_DOTS)
         axes.boxplot(shares, positions=[row], **_BOX)
     axes.axvline(1.0 - LOSS, **REFERENCE)
     axes.axvline(1.0, color="black", linewidth=0.8)
     for row, kept in enumerate(gaits["kept"]):
         write_beside(axes, row, f"{fixed(100.0 * kept, 0)} %")
     margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
-    axes.set(
-        xlabel="distance / undisturbed distance",
-        ylim=(-margin, len(gaits) - 1 + margin),
-        xmargin=0.02,
-    )
+    axes.set(xlabel="distance / undisturbed distance", xmargin=0.02)
+    axes.set_ylim(-margin, len(gaits) - 1 + margin)
     name_panel(axes, "distance in each draw")
     axes.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
     axes.grid(visible=False, axis="y")

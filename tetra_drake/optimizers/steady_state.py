@@ -73,20 +73,12 @@ class SteadyState:
 
     def _breed(self) -> list[Vector]:
         settings, generator = self.settings, self.generator
-        first, second = cross_over(
-            self._select_parent(),
-            self._select_parent(),
-            probability=settings.crossover_probability,
-            generator=generator,
-        )
-        mutation = draw_mutation(
-            self._steps, probability=settings.mutation_probability, generator=generator
-        )
-        children = []
-        for crossed in (first, second):
-            child = mutate(crossed, mutation=mutation, floors=self.space.floors)
-            children.append(self.space.repair(child))
-        return children
+        parents = self._select_parent(), self._select_parent()
+        swap, change = settings.crossover_probability, settings.mutation_probability
+        crossed = cross_over(*parents, probability=swap, generator=generator)
+        mutation = draw_mutation(self._steps, probability=change, generator=generator)
+        children = [mutate(each, mutation=mutation, floors=self.space.floors) for each in crossed]
+        return [self.space.repair(child) for child in children]
 
     def _select_parent(self) -> Vector:
         tournament, generator = self.settings.tournament, self.generator

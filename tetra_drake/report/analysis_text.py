@@ -65,10 +65,8 @@ def _changes_table(changes: pandas.DataFrame, units: Units) -> Table:
 def comparison_text(compared: Compared) -> str:
     """Tables of the fitnesses and distances of compared runs."""
     units = compared.scenario.units
-    distances = (
-        f"Distance in {units.length_word} of the best gait of each trial, also as interquartile "
-        "mean."
-    )
+    distances = f"Distance in {units.length_word} of the best gait of each trial, also as "
+    distances += "interquartile mean."
     if compared.reach is not None:
         distances += (
             f"\nSimulations until a trial's best gait walks {units.shown(compared.reach, 'm')}: "

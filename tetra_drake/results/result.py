@@ -22,7 +22,7 @@ from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.path import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.metrics import UNITS, Metrics
@@ -175,7 +175,8 @@ def make_result(
     if record:
         samples = sample_times(simulation.duration, simulation.sample_period)
         trajectory = make_dataset(robot, motion.at(samples))
-    path = follow(instants, _poses(way.states, structure), structure)
+    poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
+    path = follow(instants, poses, structure)
     metrics = compute_metrics(
         robot,
         nodes=np.array([node_positions(structure, state) for state in ends.states]),
@@ -197,12 +198,6 @@ def make_result(
         path=path,
         recorded=trajectory,
     )
-
-
-def _poses(states: np.ndarray, structure: Structure) -> np.ndarray:
-    """Poses (k, bodies, 7) of the bodies in states (k, 13 bodies)."""
-    bodies = len(structure.bodies)
-    return states[:, : 7 * bodies].reshape(len(states), bodies, 7)
 
 
 def save_result(path: str | Path, result: SimulationResult) -> None:

@@ -117,10 +117,7 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (modes[..., 1:], "1", robot.scenario.friction.modes),
     }
-    data: dict[str, Any] = {
-        name: (DIMENSIONS[name], _stored(name, values), _attributes(name, unit, meaning))
-        for name, (values, unit, meaning) in variables.items()
-    }
+    data: dict[str, Any] = {name: _stored(name, *about) for name, about in variables.items()}
     clock = {"units": "s", "long_name": "time since the start"}
     data["time"] = "time", motion.times, clock, {"_FillValue": None}
     named = tuple((name, along, *values) for name, (along, values) in labels(structure).items())
@@ -137,19 +134,16 @@ def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
     return with_indexes(xarray.Dataset(coords=given)).coords
 
 
-def _stored(name: str, values: np.ndarray) -> np.ndarray:
-    """A copy of a variable's values, with its type. A view would keep a whole table in memory."""
-    kinds = {"v_WN": np.float32, **dict.fromkeys(_FLAGS, np.int8)}
-    return np.array(values, dtype=kinds.get(name, np.float64))
-
-
-def _attributes(name: str, unit: str, meaning: str) -> dict[str, Any]:
-    """Attributes of a variable. Flags are as the CF convention for netCDF has them."""
-    given, flags = {"units": unit, "long_name": meaning}, _FLAGS.get(name, {})
-    if not flags:
-        return given
-    values = np.array(list(flags), dtype=np.int8)
-    return {**given, "flag_values": values, "flag_meanings": " ".join(flags.values())}
+def _stored(name: str, values: np.ndarray, unit: str, meaning: str) -> tuple[Any, ...]:
+    """Dimensions, values and attributes of a variable. Flags are as the CF convention for netCDF
+    has them. The values are a copy, because a view would keep a whole table in memory."""
+    kind: Any = np.float32 if name == "v_WN" else np.float64
+    attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
+    if flags := _FLAGS.get(name):
+        kind = np.int8
+        attributes["flag_values"] = np.array(list(flags), dtype=kind)
+        attributes["flag_meanings"] = " ".join(flags.values())
+    return DIMENSIONS[name], np.array(values, dtype=kind), attributes
 
 
 def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:

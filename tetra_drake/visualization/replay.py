@@ -121,8 +121,13 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     """
     structure = robot.structure
     bodies, contacts = structure.bodies, structure.contacts
-    paths = node_paths(structure)
-    _, node_radius = drawn_radii(structure)
+    nodes = {
+        "path": [_parts(path) for path in node_paths(structure)],
+        "body": structure.carriers.tolist(),
+        "place": structure.p_BN.round(6).tolist(),
+        "colour": [COLOURS[name] for name in node_colours(structure)],
+        "radius": [round(radius, 6) for radius in drawn_radii(structure)[1].tolist()],
+    }
     tension, force = frames["tension"].values, ground_forces(robot, frames)
     greatest = np.percentile(tension, _USUAL) if tension.size else 0.0
     per_newton = radius_per_newton(structure, greatest)
@@ -133,6 +138,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     force_of_square = round_force(usual_force / max(arrow, 1.0), units)
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
     ends = structure.cables[["node_a", "node_b"]].tolist()
+    cables = zip(cable_paths(structure), ends, strict=True)
     return {
         "times": frames["time"].values.round(5).tolist(),
         "resolution": RESOLUTION,
@@ -140,21 +146,9 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "bodies": bodies,
         "named": len(bodies) <= MOST_NAMES and not any(" " in name for name in bodies),
         "nodes": [
-            {"path": _parts(path), "body": int(body), "place": place.round(6).tolist()}
-            | {"colour": COLOURS[colour], "radius": round(float(radius), 6)}
-            for path, body, place, colour, radius in zip(
-                paths,
-                structure.carriers,
-                structure.p_BN,
-                node_colours(structure),
-                node_radius,
-                strict=True,
-            )
+            dict(zip(nodes, node, strict=True)) for node in zip(*nodes.values(), strict=True)
         ],
-        "cables": [
-            {"path": _parts(path), "nodes": nodes}
-            for path, nodes in zip(cable_paths(structure), ends, strict=True)
-        ],
+        "cables": [{"path": _parts(path), "nodes": joined} for path, joined in cables],
         "contacts": contacts.tolist(),
         "colours": COLOURS,
         "anchored": bool(structure.held.any()),
@@ -179,9 +173,8 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
 
 def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
     """Forces (frames, contacts, 3) of the ground on the robot, in the world frame, in N."""
-    forces = np.concatenate(
-        [frames["friction_force"].values, frames["normal_force"].values[..., np.newaxis]], axis=-1
-    )
+    friction, normal = frames["friction_force"].values, frames["normal_force"].values
+    forces = np.concatenate([friction, normal[..., np.newaxis]], axis=-1)
     if robot.ground.flat:
         return forces
     p_WN = frames["p_WN"].values[:, robot.structure.contacts]

@@ -71,6 +71,11 @@ TO_SUN = np.array([0.25, 0.35, 1.0])
 """Direction to the light that casts shadows."""
 
 
+_SHADOWS = {"left": -1.2, "right": 1.2, "top": 1.2, "bottom": -1.2, "near": 1.0, "far": 8.0}
+"""Limits of the space with shadows around the target of the light, in halves of the robot's
+length."""
+
+
 def add_robot(meshcat: Meshcat, structure: Structure) -> None:
     """Adds bodies (struts and nodes) and cables to the scene. place_robot() moves them."""
     names, p_BN = structure.node_names, structure.p_BN
@@ -154,9 +159,8 @@ def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float)
     """Drawn radii of cables (frames, cables) in m: proportional to tension, between a least and a
     greatest radius."""
     strut = least_drawn_radius(structure)
-    radii: np.ndarray = (per_newton * frames["tension"].values).clip(
-        min=THINNEST * strut, max=1.3 * THICKEST * strut
-    )
+    least, most = THINNEST * strut, 1.3 * THICKEST * strut
+    radii: np.ndarray = (per_newton * frames["tension"].values).clip(least, most)
     return radii
 
 
@@ -212,12 +216,7 @@ def _set_lights(meshcat: Meshcat, *, reach: float) -> None:
         "castShadow": True,
         "shadow.mapSize.width": 2048.0,
         "shadow.mapSize.height": 2048.0,
-        "shadow.camera.left": -1.2 * reach,
-        "shadow.camera.right": 1.2 * reach,
-        "shadow.camera.top": 1.2 * reach,
-        "shadow.camera.bottom": -1.2 * reach,
-        "shadow.camera.near": reach,
-        "shadow.camera.far": 8.0 * reach,
+        **{f"shadow.camera.{side}": share * reach for side, share in _SHADOWS.items()},
         "shadow.bias": -0.0005,
         "shadow.normalBias": 0.002,
     }

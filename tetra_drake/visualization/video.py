@@ -54,10 +54,8 @@ def check_video(path: Path, *, fps: float) -> None:
     if path.suffix not in KINDS:
         raise InputError(path, "", f"expected a file that ends in {' or '.join(KINDS)}")
     if path.suffix == ".gif" and fps > _MOST_FPS_OF_GIF:
-        problem = (
-            f"found {fps:g} frames per second, expected {_MOST_FPS_OF_GIF:g} at most for a GIF"
-        )
-        raise InputError("video", "fps", problem)
+        expected = f"expected {_MOST_FPS_OF_GIF:g} at most for a GIF"
+        raise InputError("video", "fps", f"found {fps:g} frames per second, {expected}")
     check_package("imageio_ffmpeg", extra="video", source="video")
 
 
@@ -116,21 +114,12 @@ def encode(frames: Iterable[bytes], path: Path, *, size: tuple[int, int], fps: f
     """
     import imageio_ffmpeg
 
-    given = [
-        "-f",
-        "rawvideo",
-        "-pix_fmt",
-        "rgb24",
-        "-s",
-        f"{size[0]}x{size[1]}",
-        "-r",
-        f"{fps:.9g}",
-    ]
+    given = f"-f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {fps:.9g} -i -".split()
     with whole_file(path) as temporary, tempfile.TemporaryFile() as log:
         try:
             ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error"]
             process = subprocess.Popen(
-                [*ffmpeg, *given, "-i", "-", *KINDS[path.suffix], str(temporary)],
+                [*ffmpeg, *given, *KINDS[path.suffix], str(temporary)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=log,
