@@ -79,13 +79,13 @@ class Assembly:
     def add_file(self, file: Path, *, part: str = "", above: tuple[Path, ...] = ()) -> None:
         """Adds a file. `above` are the files that contain it. The names of its nodes begin with
         `part`."""
-        if file.resolve() in above:
-            raise InputError(file, "substructures", "the structure contains itself")
         if file not in self._read:
             keys, what = keys_of(NtrtFile), "structure file of NTRT"
             content = read_mapping(file, what, keys=keys, most=MOST_BYTES)
             self._read[file] = NtrtFile.from_tree(content, file)
         given = self._read[file]
+        if file.resolve() in above:
+            raise InputError(file, "substructures", "the structure contains itself")
         self.parts.append(part)
         _check_size(len(self.parts), MOST_PARTS, Place(file, "substructures"))
         self._add_parts(given.substructures, file, part, (*above, file.resolve()))
