@@ -74,13 +74,8 @@ def test_bodies_stay_where_they_are_if_their_cable_is_slack(gravity, height):
 
 def test_a_chain_of_bars_hangs_straight_from_wherever_it_is_let_go():
     # A mechanism that only gravity holds: two bars and two cables, all bent at first.
-    nodes = {
-        "top": [0.0, 0.0, 2.0],
-        "a": [0.3, 0.1, 2.0],
-        "b": [0.5, 0.1, 2.1],
-        "c": [0.6, 0.3, 2.1],
-        "d": [0.8, 0.3, 2.0],
-    }
+    nodes = {"top": [0.0, 0.0, 2.0], "a": [0.3, 0.1, 2.0], "b": [0.5, 0.1, 2.1]}
+    nodes |= {"c": [0.6, 0.3, 2.1], "d": [0.8, 0.3, 2.0]}
     struts = {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}}
     line = {"pairs": [["top", "a"], ["b", "c"]], "free_length": 0.2}
     tree = {"nodes": nodes, "struts": struts, "cables": {"line": LOOSE | line}}

@@ -92,15 +92,11 @@ def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
         robot.network(gait)
 
 
-@pytest.mark.parametrize(
-    ("name", "gain", "problem"),
-    [
-        ("thesis", "0.05 N", "0.0048"),
-        ("thesis", "2 lbf", ""),
-        ("winch", "900 N", "-25 mm"),
-        ("motors", "90 N", "22.5 N"),
-    ],
-)
+GAINS = [("thesis", "0.05 N", "0.0048"), ("thesis", "2 lbf", "")]
+GAINS += [("winch", "900 N", "-25 mm"), ("motors", "90 N", "22.5 N")]
+
+
+@pytest.mark.parametrize(("name", "gain", "problem"), GAINS)
 def test_a_gain_that_hardly_acts_or_asks_too_much_is_named(name, gain, problem):
     remark = Robot.of(load_scenario(name).with_changes({"cpg.gain": gain})).gain_remark()
     assert bool(remark) == bool(problem)

@@ -5,13 +5,11 @@ import math
 import numpy as np
 import pytest
 from helpers.states import disturbed
-from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame
 
 from tetra_drake.physics.kinematics import V_WN
 from tetra_drake.robot.robot import Robot, make_structure
-from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes, node_positions
+from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import NODES, STRUTS
 
@@ -113,11 +111,7 @@ def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(name):
     structure = make_structure(load_scenario(name))
     plant = MultibodyPlant(time_step=0.0)
     bodies = AddBodies(plant, structure)
-    nodes = zip(structure.carriers, structure.node_names, structure.p_BN, strict=True)
-    frames = [
-        plant.AddFrame(FixedOffsetFrame(node, bodies[body], RigidTransform(p_BNi)))
-        for body, node, p_BNi in nodes
-    ]
+    frames = AddNodes(plant, structure, bodies)
     plant.Finalize()
     context, state = plant.CreateDefaultContext(), disturbed(structure, 0, pose=1.0, speed=1.0)
     plant.SetPositionsAndVelocities(context, state)

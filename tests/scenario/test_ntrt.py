@@ -179,9 +179,7 @@ QUARTER = "rotation: {axis: [0, 1, 0], angle: 90}"
         ("offset: [5, 5, 5]", [1, 2, 1], 0),
     ],
 )
-def test_places_of_substructures(
-    entry: str, front: list[float], lowest: float, tmp_path: Path
-) -> None:
+def test_places_of_substructures(entry, front, lowest, tmp_path) -> None:
     """Turned, then scaled about their centre, then moved; then the whole is set on the ground."""
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     file = write(tmp_path, f"substructures: {{v: {{path: vertebra.yaml, {entry}}}}}")

@@ -219,10 +219,8 @@ def test_a_bad_file_is_refused(tmp_path, text, key, found, refused):
 
 ASTRAY = [("robot.cables.dampin", 0.1, "'robot.cables.damping'")]
 ASTRAY += [("robot.tetrahedra", 0.1, "no number"), ("robot.cables.damping", 0.7, "0.7")]
-ASTRAY += [
-    ("optimizer.mutation_probability", 0.5, "1"),
-    ("friction.kinetic", 0.1, "at most static"),
-]
+ASTRAY += [("optimizer.mutation_probability", 0.5, "1")]
+ASTRAY += [("friction.kinetic", 0.1, "at most static")]
 
 
 @pytest.mark.parametrize(("key", "spread", "found"), ASTRAY)

@@ -102,8 +102,7 @@ class Gait:
             content["tau_b_s"] = self.tau_b
         if self.turn:
             content["turn"] = self.turn
-        gains = {name: gain for name, gain in self.gains if gain}
-        if gains:
+        if gains := {name: gain for name, gain in self.gains if gain}:
             content["gains"] = gains
         return content
 
@@ -347,9 +346,8 @@ def check_gait(
     prefix = f"{key}." if key else ""
     count, expected = len(gait.weights), len(weights.couplings)
     if count != expected:
-        problem = f"found {count} numbers, expected {expected}"
-        problem += f" for {weights.blueprint.signals} oscillators"
-        raise InputError(source, f"{prefix}weights", problem)
+        needed = f"{expected} for {weights.blueprint.signals} oscillators"
+        raise InputError(source, f"{prefix}weights", f"found {count} numbers, expected {needed}")
     for name, gain in gait.gains:
         if gain and name not in scenario.cpg.feedback:
             problem = f"found {gain}, expected 0: cpg.feedback is {scenario.cpg.feedback}"

@@ -292,9 +292,8 @@ def undisturbed_structure(scenario: Scenario, *, may_overlap: bool = False) -> S
         before = elongation
         elongation = axial_forces_at_rest(scenario, resting) / blueprint.strut_stiffness
         longer = with_elongations(placed, elongation)
-        resting = _at_rest(
-            scenario, dataclasses.replace(longer, q_WB=resting.q_WB, p_WB=resting.p_WB)
-        )
+        longer = dataclasses.replace(longer, q_WB=resting.q_WB, p_WB=resting.p_WB)
+        resting = _at_rest(scenario, longer)
         if np.abs(elongation - before).max() < SAME_LENGTH:
             return resting
     problem = "are too soft: their lengths find no equilibrium; give more axial_stiffness"
@@ -305,9 +304,8 @@ def _at_rest(scenario: Scenario, structure: Structure) -> Structure:
     """The structure in equilibrium, near its initial pose."""
     equilibrium = equilibrium_of(scenario, structure)
     poses = equilibrium.state[: 7 * len(structure.bodies)].reshape(-1, 7)
-    return dataclasses.replace(
-        structure, q_WB=poses[:, :4], p_WB=poses[:, 4:], equilibrium=equilibrium
-    )
+    q_WB, p_WB = poses[:, :4], poses[:, 4:]
+    return dataclasses.replace(structure, q_WB=q_WB, p_WB=p_WB, equilibrium=equilibrium)
 
 
 def axial_forces_at_rest(scenario: Scenario, structure: Structure) -> np.ndarray:
@@ -333,10 +331,8 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
         what = f"a foot of radius {shown(radius[i], 'm')}" if stays and radius[i] else "it"
         found = f"{what} starts {shown(below[i], 'm')} below the ground"
         raise InputError(scenario.name, key, f"{found}, expected on it or above")
-    lift = float((radius + depths).max())
-    if placed.held.any():
-        return 0.0 if stays else max(0.0, lift)
-    return lift
+    lift = 0.0 if stays else float((radius + depths).max())
+    return max(0.0, lift) if placed.held.any() else lift
 
 
 def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:

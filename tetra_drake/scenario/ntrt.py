@@ -16,28 +16,19 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.blueprint import WORLD
-from tetra_drake.scenario.ntrt_assembly import Assembly, Ends, Place, Rule
-from tetra_drake.scenario.ntrt_file import Builder
+from tetra_drake.scenario.ntrt_assembly import Assembly, Place, Rule, TaggedPair
+from tetra_drake.scenario.ntrt_file import CLASSES, Builder
 from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.robot_structure import Member, StructureFile, components
 from tetra_drake.scenario.section import Tree
 
 SAME_PLACE = 1e-6
 """Distance in NTRT's unit below which nodes are one node."""
-
-DEFAULTS = {
-    "rod": "tgRodInfo",
-    "string": "tgBasicActuatorInfo",
-    "box": "tgBoxInfo",
-    "sphere": "tgSphereInfo",
-}
-"""Classes of the builders for pairs and nodes without a builder in their files, by tag."""
 
 _PARAMETERS = {"diameter": "radius", "tension": "pretension"}
 """NTRT's names of settings with other names here."""
@@ -53,35 +44,29 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     dots separate keys. What is left out is noted in the log. Raises InputError that names file and
     key, for substructures too.
     """
-    defaults = {tag: Builder.model_validate({"class": name}) for tag, name in DEFAULTS.items()}
-    at = Place(file, "builders")
-    whole = Assembly(rules=[Rule(frozenset([tag]), one, at) for tag, one in defaults.items()])
+    whole = Assembly()
+    for name, (_, _, tag) in CLASSES.items():
+        builder = Builder.model_validate({"class": name})
+        whole.rules += [Rule(frozenset([tag]), builder, Place(file, "builders"))] if tag else []
     whole.add_file(file)
     made = _Translation(whole, unit)
     made.add_all()
     try:
         StructureFile.from_tree(made.tree, file)
     except InputError as error:
-        raise made.error_in_file(error, file) from None
+        key = error.key
+        keys = [one for one in made.places if re.match(rf"{re.escape(one)}([.[]|$)", key)]
+        place = made.places[max(keys, key=len)] if keys else Place(file, "pair_groups")
+        earlier = r"(struts|cables)\.[^.]+\.pairs\[\d+\]"
+        problem = re.sub(earlier, lambda found: made.places[found[0]].key, error.problem)
+        raise InputError(*place, problem) from None
     for what, names in made.notes.items():
         _LOG.warning("%s: %s: %s", file, what, ", ".join(names))
     return made.tree
 
 
-class _Part(NamedTuple):
-    """Rod, box, sphere or cable."""
-
-    group: str
-    """Tags by which its group is named."""
-    ends: Ends
-    """Its nodes; the node of a sphere twice."""
-    rule: Rule
-    place: Place
-
-    @property
-    def builder(self) -> Builder:
-        """Class and parameters."""
-        return self.rule.builder
+_Part = tuple[TaggedPair, Builder, Place]
+"""Rod, box or cable, or the node of a sphere twice; its builder and the builder's place."""
 
 
 @dataclass
@@ -91,67 +76,61 @@ class _Translation:
     whole: Assembly
     unit: float
     tree: Tree = field(default_factory=dict)
-    notes: dict[str, list[str]] = field(default_factory=dict)
+    places: dict[str, Place] = field(default_factory=dict)
+    notes: dict[str, dict[str, None]] = field(default_factory=dict)
     """What is left out or changed: names by texts."""
-    _places: dict[str, Place] = field(default_factory=dict)
-    _names: dict[tuple[str, str, Place], str] = field(default_factory=dict)
-    """Names of groups by kind, tags, and place of the builder."""
 
     def add_all(self) -> None:
         """Adds what moves, and what it hangs on."""
-        ignored = (name for rule in self.whole.rules for name in rule.builder.parameters.ignored)
-        if names := list(dict.fromkeys(ignored)):
-            self.tree["ignored"] = self.notes["not used, as the scenario has its own"] = names
+        ignored = [name for rule in self.whole.rules for name in rule.builder.ignored]
+        for name in ignored:
+            self._note("not used, as the scenario has its own", name)
+        self.tree |= {"ignored": list(dict.fromkeys(ignored))} if ignored else {}
         self.tree |= {"nodes": {}, "struts": {}, "cables": {}, "spheres": {}}
-        parts = self._parts()
-        solids = [part for part in parts if part.builder.kind != "cables"]
-        bodies = components(Member("", "", solid.ends) for solid in solids)
+        parts = list(self._parts())
+        solids = [(pair.nodes, made) for pair, made, _ in parts if made.kind != "cables"]
+        bodies = components(Member("", "", nodes) for nodes, _ in solids)
         body_of = {node: number for number, nodes in enumerate(bodies) for node in nodes}
-        dense = {body_of[solid.ends[0]] for solid in solids if solid.builder.has_mass}
+        dense = {body_of[first] for (first, _), made in solids if made.parameters.density}
         body_of = {node: body if body in dense else WORLD for node, body in body_of.items()}
         used: dict[str, None] = {}
+        groups: dict[tuple[str, str, Place], list[_Part]] = {}
         for part in self._effective(parts, body_of):
-            self._add_part(part)
-            used |= dict.fromkeys(part.ends)
+            pair, builder, at = part
+            groups.setdefault((builder.kind, pair.group, at), []).append(part)
+            used |= dict.fromkeys(pair.nodes)
+        for group in groups.values():
+            self._add_group(group)
         fixed = [name for name in used if body_of.get(name) == WORLD]
         self.tree["anchors"] = {_name(name): "xyz" for name in fixed}
         ground = min((self.whole.nodes[name][1] for name in used), default=0.0)
         if fixed:
-            ground = min(0.0, ground - max(solid.builder.parameters.radius for solid in solids))
-        self._add_nodes(list(used), ground)
+            ground = min(0.0, ground - max(made.parameters.radius for _, made in solids))
+        for name in used:  # in the axes of structure files
+            p = self.unit * (self.whole.nodes[name][[2, 0, 1]] - [0.0, 0.0, ground])
+            self.tree["nodes"][_name(name)] = [f"{x!r} m" for x in p.tolist()]
+            self.places[f"nodes.{_name(name)}"] = self.whole.places[name]
         for name, one in self._one_of.items():
             if one not in used and one not in body_of:
                 self._note("left out, as nothing uses them", name)
 
     def _effective(self, parts: list[_Part], body_of: dict[str, int]) -> Iterator[_Part]:
         """Parts that have an effect. `body_of` has the body of each node of one."""
-        solid = {frozenset(part.ends) for part in parts if part.builder.has_mass}
-        for part in parts:
-            first, second = (body_of.get(end, end) for end in part.ends)
-            if part.builder.kind == "cables":
-                if first == second and part.ends[0] != part.ends[1]:
-                    self._note("left out, as they join a body to itself", " ".join(part.ends))
-                    continue
-            elif first == WORLD:
-                self._note("held in space, as their density is 0", part.group)
-                continue
-            elif not part.builder.has_mass and frozenset(part.ends) in solid:
-                self._note("left out, as parts with mass have their place", part.group)
-                continue
-            yield part
-
-    def error_in_file(self, error: InputError, file: Path) -> InputError:
-        """An error about the tree as one about NTRT's files."""
-        keys = [key for key in self._places if re.match(rf"{re.escape(key)}([.[]|$)", error.key)]
-        place = self._places[max(keys, key=len)] if keys else Place(file, "pair_groups")
-        earlier = r"(struts|cables)\.[^.]+\.pairs\[\d+\]"
-        problem = re.sub(earlier, lambda found: self._places[found[0]].key, error.problem)
-        return InputError(*place, problem)
+        dense = {frozenset(pair.nodes) for pair, made, _ in parts if made.parameters.density}
+        for pair, builder, at in parts:
+            (first, second), is_cable = pair.nodes, builder.kind == "cables"
+            body, other = body_of.get(first, first), body_of.get(second, second)
+            if is_cable and body == other and first != second:
+                self._note("left out, as they join a body to itself", f"{first} {second}")
+            elif body == WORLD and not is_cable:
+                self._note("held in space, as their density is 0", pair.group)
+            elif not is_cable and not builder.parameters.density and {*pair.nodes} in dense:
+                self._note("left out, as parts with mass have their place", pair.group)
+            else:
+                yield pair, builder, at
 
     def _note(self, what: str, name: str) -> None:
-        names = self.notes.setdefault(what, [])
-        if name not in names:
-            names.append(name)
+        self.notes.setdefault(what, {})[name] = None
 
     @functools.cached_property
     def _one_of(self) -> dict[str, str]:
@@ -163,13 +142,11 @@ class _Translation:
         firsts = [int((np.abs(p - at).max(axis=1) < SAME_PLACE).argmax()) for at in p]
         return {name: names[first] for name, first in zip(names, firsts, strict=True)}
 
-    def _parts(self) -> list[_Part]:
+    def _parts(self) -> Iterator[_Part]:
         """Rods, boxes, cables and spheres, with the last builders that fit."""
-        whole, parts = self.whole, []
+        whole = self.whole
         for pair in whole.pairs:
-            kinds = "struts", "cables"
-            found = (whole.rule(pair.part, pair.tags, kind) for kind in kinds)
-            rule = next(filter(None, found), None)
+            rule = whole.rule(pair, "struts") or whole.rule(pair, "cables")
             if rule is None:
                 tags = [" ".join(rule.tags) for rule in whole.rules]
                 problem = f"found no builder for '{pair.group}'; {hint(pair.group, tags)}"
@@ -177,57 +154,44 @@ class _Translation:
             first, second = (self._one_of[node] for node in pair.nodes)
             if first == second and rule.builder.kind == "struts" and len({*pair.nodes}) == 2:
                 self._note("left out, as their length is 0", pair.group)
-                continue
-            parts.append(_Part(pair.group, (first, second), rule, pair.place))
-        for name in whole.nodes:
-            own, one = name.rpartition(".")[2], self._one_of[name]
-            rule = whole.rule(name.removesuffix(own), frozenset(own.split()), "spheres")
-            if rule is not None:
-                group = " ".join(sorted(rule.tags))
-                parts.append(_Part(group, (one, one), rule, whole.places[name]))
-        return parts
+            else:
+                yield pair._replace(nodes=(first, second)), rule.builder, rule.place
+        for name, place in whole.places.items():
+            (part, _, own), one = name.rpartition("."), self._one_of[name]
+            pair = TaggedPair(own, frozenset(own.split()), part, place, (one, one))
+            if rule := whole.rule(pair, "spheres"):
+                yield pair._replace(group=" ".join(sorted(rule.tags))), rule.builder, rule.place
 
-    def _add_part(self, part: _Part) -> None:
-        """Adds a part to its group."""
-        kind = part.builder.kind
-        groups = self.tree[kind]
-        made_by = kind, part.group, part.rule.place
-        if made_by not in self._names:
-            name = _name(part.group.replace(" ", "/"))
-            while name in groups:  # pairs with the same tags may have two builders
-                name += "+"
-            self._names[made_by] = name
-            groups[name] = self._settings(part.builder)
-            self._places[f"{kind}.{name}"] = part.place
-            for ours in groups[name]:
-                theirs = f"{part.rule.place.key}.parameters.{_PARAMETERS.get(ours, ours)}"
-                self._places[f"{kind}.{name}.{ours}"] = part.rule.place._replace(key=theirs)
-            if part.builder.made_as == "tgBoxInfo":
-                self._note("round rods in place of boxes", name)
-        members = "nodes" if kind == "spheres" else "pairs"
-        own = groups[self._names[made_by]].setdefault(members, [])
-        self._places[f"{kind}.{self._names[made_by]}.{members}[{len(own)}]"] = part.place
-        own.append(_name(part.ends[0]) if kind == "spheres" else [_name(end) for end in part.ends])
-
-    def _settings(self, builder: Builder) -> Tree:
-        """Settings of a group."""
-        given, unit = builder.parameters, self.unit
-        if builder.kind == "cables":
-            return {
+    def _add_group(self, parts: list[_Part]) -> None:
+        """Adds a group of parts with one builder."""
+        (pair, builder, at), unit = parts[0], self.unit
+        kind, given = builder.kind, builder.parameters
+        name = _name(pair.group.replace(" ", "/"))
+        while name in self.tree[kind]:  # pairs with the same tags may have two builders
+            name += "+"
+        if builder.made_as == "tgBoxInfo":
+            self._note("round rods in place of boxes", name)
+        if kind == "cables":
+            settings = {
                 "stiffness": f"{given.stiffness!r} N/m",
                 "damping": f"{given.damping!r} N*s/m",
                 "tension": f"{given.pretension * unit!r} N",
             }
-        size = {"diameter": f"{2.0 * given.radius * unit!r} m"}
-        size["density"] = f"{given.density / unit**3!r} kg/m^3"
-        return size if builder.kind == "spheres" else size | {"node_diameter": "0 m"}
-
-    def _add_nodes(self, names: list[str], ground: float) -> None:
-        """Adds nodes in the axes of structure files. `ground` is its height in NTRT's unit."""
-        for name in names:
-            p = self.unit * (self.whole.nodes[name][[2, 0, 1]] - [0.0, 0.0, ground])
-            self.tree["nodes"][_name(name)] = [f"{x!r} m" for x in p.tolist()]
-            self._places[f"nodes.{_name(name)}"] = self.whole.places[name]
+        else:
+            size, density = 2.0 * given.radius * unit, given.density / unit**3
+            settings = {"diameter": f"{size!r} m", "density": f"{density!r} kg/m^3"}
+        if kind == "struts":
+            settings["node_diameter"] = "0 m"
+        key, members = f"{kind}.{name}", "nodes" if kind == "spheres" else "pairs"
+        self.places[key] = pair.place
+        for ours in settings:
+            theirs = f"{at.key}.parameters.{_PARAMETERS.get(ours, ours)}"
+            self.places[f"{key}.{ours}"] = at._replace(key=theirs)
+        for i, (one, _, _) in enumerate(parts):
+            self.places[f"{key}.{members}[{i}]"] = one.place
+        ends = [[_name(node) for node in one.nodes] for one, _, _ in parts]
+        all_members = [node for node, _ in ends] if kind == "spheres" else ends
+        self.tree[kind][name] = settings | {members: all_members}
 
 
 def _name(path: str) -> str:

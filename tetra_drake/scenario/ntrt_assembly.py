@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,6 @@ MOST_PARTS = MOST_NODES // 2
 
 LEAST_PAIRS = 3
 """Least number of pairs in a bond of nodes and edges."""
-
-_NO_TURN = np.eye(3)
 
 Tags = frozenset[str]
 Ends = tuple[str, str]
@@ -51,15 +49,15 @@ class Rule(NamedTuple):
 
 
 class TaggedPair(NamedTuple):
-    """Pair of nodes."""
+    """Pair of nodes. Without nodes: what the pairs of a list share, with the place of the list."""
 
     group: str
     """Key of its list: tags, separated by single blanks."""
     tags: Tags
     part: str
     """Beginning of the names of nodes in the part that the pair belongs to."""
-    nodes: Ends
     place: Place
+    nodes: Ends = ("", "")
 
 
 @dataclass
@@ -81,43 +79,42 @@ class Assembly:
     def add_file(self, file: Path, *, part: str = "", above: tuple[Path, ...] = ()) -> None:
         """Adds a file. `above` are the files that contain it. The names of its nodes begin with
         `part`."""
-        given = self._content(file)
+        if file not in self._read:
+            keys, what = keys_of(NtrtFile), "structure file of NTRT"
+            content = read_mapping(file, what, keys=keys, most=MOST_BYTES)
+            self._read[file] = NtrtFile.from_tree(content, file)
+        given = self._read[file]
         if file.resolve() in above:
             raise InputError(file, "substructures", "the structure contains itself")
         self.parts.append(part)
         _check_size(len(self.parts), MOST_PARTS, Place(file, "substructures"))
-        self._add_parts(given, file, part, (*above, file.resolve()))
+        self._add_parts(given.substructures, file, part, (*above, file.resolve()))
         for tags, builder in given.builders.items():
             self.rules.append(Rule(_tags(tags), builder, Place(file, f"builders.{tags}")))
         self.nodes |= {part + name: np.array(p) for name, p in given.nodes.items()}
         self.places |= {part + name: Place(file, f"nodes.{name}") for name in given.nodes}
         _check_size(len(self.nodes), MOST_NODES, Place(file, "nodes"))
         for tags, pairs in given.pair_groups.items():
-            for pair, place in _numbered(pairs, Place(file, f"pair_groups.{tags}")):
-                nodes = self._node(part, pair[0], place), self._node(part, pair[1], place)
-                self._add_pair(tags, part, nodes, place)
+            shared = _shared(tags, part, Place(file, f"pair_groups.{tags}"))
+            self._add_pairs(shared, pairs, (part, part))
         for outer, groups in given.bond_groups.items():
             for inner, pairs in groups.items():
                 bond, tags = (outer, inner) if "/" in outer else (inner, outer)
-                self._add_bond(bond, tags, pairs, part, Place(file, f"bond_groups.{outer}.{inner}"))
+                place = Place(file, f"bond_groups.{outer}.{inner}")
+                self._add_bond(bond, _shared(tags, part, place), pairs)
 
-    def rule(self, part: str, tags: Tags, kind: str) -> Rule | None:
-        """The last rule of a kind for tags in a part, whose own tags count, too."""
-        tags |= _tags(_last(part.removesuffix(".")))
+    def rule(self, pair: TaggedPair, kind: str) -> Rule | None:
+        """The last rule of a kind for a pair. The tags of its part count, too."""
+        tags = pair.tags | _tags(_last(pair.part))
         fitting = (one for one in reversed(self.rules) if one.tags <= tags)
         return next((one for one in fitting if one.builder.kind == kind), None)
 
-    def _content(self, file: Path) -> NtrtFile:
-        if file not in self._read:
-            keys, what = keys_of(NtrtFile), "structure file of NTRT"
-            content = read_mapping(file, what, keys=keys, most=MOST_BYTES)
-            self._read[file] = NtrtFile.from_tree(content, file)
-        return self._read[file]
-
-    def _add_parts(self, given: NtrtFile, file: Path, part: str, above: tuple[Path, ...]) -> None:
+    def _add_parts(
+        self, given: dict[str, Substructure], file: Path, part: str, above: tuple[Path, ...]
+    ) -> None:
         """Adds the substructures of a file, then turns all, then scales and moves them."""
         entries: list[tuple[str, int, Substructure, Place]] = []
-        for names, entry in given.substructures.items():
+        for names, entry in given.items():
             place = Place(file, f"substructures.{names}")
             entries += [(name, i, entry, place) for i, name in enumerate(names.split("/"))]
         for name, _, entry, place in entries:
@@ -126,29 +123,22 @@ class Assembly:
                     raise InputError(*place, f"found a second path of '{name}', expected one")
                 self.add_file(file.parent / entry.path, part=f"{part}{name}.", above=above)
         for name, _, entry, place in entries:
-            start = self._part(part, name, place)
-            if entry.rotation is not None:
-                self._move(start, place, turn=_turn(entry.rotation), about=entry.rotation.reference)
+            if (rotation := entry.rotation) is not None:
+                start, turn = self._part(part, name, place), _turn(rotation, place)
+                self._move(start, place, turn, about=rotation.reference)
         for name, i, entry, place in entries:
             shift = i * np.array(entry.offset) + entry.translation
-            self._move(self._part(part, name, place), place, scale=entry.scale, shift=shift)
+            self._move(self._part(part, name, place), place, entry.scale * np.eye(3), shift=shift)
 
     def _move(
-        self,
-        part: str,
-        place: Place,
-        *,
-        turn: np.ndarray = _NO_TURN,
-        about: Sequence[float] | None = None,
-        scale: float = 1.0,
-        shift: np.ndarray | float = 0.0,
+        self, part: str, place: Place, matrix: np.ndarray, *, about: Any = None, shift: Any = 0.0
     ) -> None:
-        """Turns and scales the nodes of a part about a point, by default their centre, and shifts
-        them. `turn` is a matrix."""
+        """Turns and scales the nodes of a part by a matrix about a point, by default their centre,
+        and shifts them."""
         if names := [name for name in self.nodes if name.startswith(part)]:
             p = np.array([self.nodes[name] for name in names])
             centre = p.mean(axis=0) if about is None else np.array(about)
-            p = centre + scale * (p - centre) @ turn.T + shift
+            p = centre + (p - centre) @ matrix.T + shift
             if not (farthest := np.abs(p).max()) <= LARGEST:
                 problem = f"'{part[:-1]}' reaches {farthest:g}, expected at most {LARGEST:g}"
                 raise InputError(*place, problem)
@@ -156,36 +146,33 @@ class Assembly:
 
     def _part(self, part: str, tags: str, place: Place) -> str:
         """The least nested part with all tags inside a part."""
-        inside = [one for one in self.parts if one.startswith(part) and one != part]
-        fitting = [one for one in inside if _tags(tags) <= _tags(_last(one[:-1]))]
-        if not fitting:
-            names = [one.removeprefix(part)[:-1] for one in inside]
-            raise InputError(*place, f"found no path of the part '{tags}'; {hint(tags, names)}")
-        return min(fitting, key=lambda one: one.count("."))
+        return _least_nested(self.parts, part, tags, place, f"no path of the part '{tags}'")
 
     def _node(self, part: str, path: str, place: Place) -> str:
         """The least nested node with a path, such as PART.NODE, inside a part."""
-        start, (*parts, tags) = part, path.split(".")
+        *parts, tags = path.split(".")
         for one in parts:
-            start = self._part(start, one, place)
-        inside = [name for name in self.nodes if name.startswith(start)]
-        fitting = [name for name in inside if _tags(tags) <= _tags(_last(name))]
-        if not fitting or not tags:
-            names = [name.removeprefix(part) for name in inside]
-            raise InputError(*place, f"found unknown node '{path}'; {hint(path, names)}")
-        return min(fitting, key=lambda name: name.count("."))
+            part = self._part(part, one, place)
+        return _least_nested(self.nodes, part, tags, place, f"unknown node '{path}'")
 
-    def _add_pair(
-        self, tags: str, part: str, nodes: Ends, place: Place, *, more_tags: str = ""
-    ) -> None:
-        _check_size(len(self.pairs) + 1, MOST_PAIRS, place)
-        group, all_tags = " ".join(tags.split()), _tags(f"{tags} {more_tags}")
-        self.pairs.append(TaggedPair(group, all_tags, part, nodes, place))
+    def _add_pairs(self, shared: TaggedPair, pairs: list[Pair], starts: Ends) -> None:
+        """Adds pairs from nodes of one part to nodes of another. `starts` are the parts."""
+        for pair, one in self._numbered(shared, pairs):
+            first, second = map(self._node, starts, pair, (one.place, one.place))
+            self.pairs.append(one._replace(nodes=(first, second)))
 
-    def _add_bond(self, bond: str, tags: str, pairs: list[Pair], part: str, place: Place) -> None:
+    def _numbered(self, shared: TaggedPair, pairs: list[Pair]) -> Iterator[tuple[Pair, TaggedPair]]:
+        """Pairs of a list, with what they share and their own places."""
+        _check_size(len(self.pairs) + len(pairs), MOST_PAIRS, shared.place)
+        for number, pair in enumerate(pairs):
+            place = shared.place._replace(key=f"{shared.place.key}[{number}]")
+            yield pair, shared._replace(place=place)
+
+    def _add_bond(self, bond: str, shared: TaggedPair, pairs: list[Pair]) -> None:
         """Adds the pairs of a bond such as "a/b/c/node_node" between neighbours in a row of
         parts."""
         *names, kind = bond.split("/")
+        part, place = shared.part, shared.place
         _check_size(len(names), MOST_PARTS, place)
         if kind not in ("node_node", "node_edge") or len(names) < 2:
             expected = "expected parts and a kind, 'A/B/node_node' or 'A/B/node_edge'"
@@ -193,69 +180,53 @@ class Assembly:
         for first, second in itertools.pairwise(names):
             starts = self._part(part, first, place), self._part(part, second, place)
             if kind == "node_edge":
-                self._bond_edges(starts, tags, pairs, part, place)
-                continue
-            # Builders may ask for the names of both parts.
-            more = f"{first} {second} {first}/{second}"
-            for pair, at in _numbered(pairs, place):
-                nodes = self._node(starts[0], pair[0], at), self._node(starts[1], pair[1], at)
-                self._add_pair(tags, part, nodes, at, more_tags=more)
+                self._bond_edges(shared, pairs, starts)
+            else:  # builders may ask for the names of both parts
+                tags = shared.tags | _tags(f"{first} {second} {first}/{second}")
+                self._add_pairs(shared._replace(tags=tags), pairs, starts)
 
-    def _bond_edges(
-        self, starts: Ends, tags: str, pairs: list[Pair], part: str, place: Place
-    ) -> None:
+    def _bond_edges(self, shared: TaggedPair, pairs: list[Pair], starts: Ends) -> None:
         """Bonds nodes of a part to the middles of edges NODE/NODE of another.
 
-        The second part is moved onto the first. Each cable at an edge becomes two cables, from its
-        ends to the node. Cables between the nodes are removed.
+        The second part is moved onto the first: the centres of the bonded points meet, and the
+        planes of the first three; then the first points have the same direction from the centre.
+        Each cable at an edge becomes two cables, from its ends to the node. Cables between the
+        nodes are removed. Rods stay, but are refused as edges.
         """
         bonds, middles = [], []
-        for pair, at in _numbered(pairs, place):
+        for pair, one in self._numbered(shared, pairs):
             ends = [
-                [self._node(start, name, at) for name in end.split("/", 1)]
+                [self._node(start, name, one.place) for name in end.split("/", 1)]
                 for start, end in zip(starts, pair, strict=True)
             ]
             if sorted(map(len, ends)) != [1, 2]:
-                raise InputError(*at, f"found {pair}, expected a node and an edge NODE/NODE")
+                problem = f"found {pair}, expected a node and an edge NODE/NODE"
+                raise InputError(*one.place, problem)
             (node,), edge = sorted(ends, key=len)
-            bonds.append((node, edge, at))
+            bonds.append((node, edge, one))
             middles.append([np.mean([self.nodes[name] for name in end], axis=0) for end in ends])
-        self._dock(starts[1], *np.array(middles).reshape(-1, 2, 3).swapaxes(0, 1), place=place)
-        self._remove_cables(starts, {node for node, _, _ in bonds}, place, inside=True)
-        for node, edge, at in bonds:
-            self._remove_cables(starts, {*edge}, at)
-            self._add_pair(tags, part, (edge[0], node), at)
-            self._add_pair(tags, part, (node, edge[1]), at)
-
-    def _dock(self, part: str, there: np.ndarray, own: np.ndarray, *, place: Place) -> None:
-        """Moves a part so that its `own` points (points, 3) come to points of another part: the
-        centres meet, and the planes of the first three points; then the first points have the same
-        direction from the centre."""
-        frames = [_frame(p) for p in (there, own)]
-        if not np.isfinite(frames).all():
-            raise InputError(*place, "the first three pairs form no triangle, expected one")
+        there, own = np.array(middles).reshape(-1, 2, 3).swapaxes(0, 1)
         centre = own.mean(axis=0)
-        turn, shift = frames[0].T @ frames[1], there.mean(axis=0) - centre
-        self._move(part, place, turn=turn, about=centre.tolist(), shift=shift)
+        turn = _frame(there, shared.place).T @ _frame(own, shared.place)
+        self._move(starts[1], shared.place, turn, about=centre, shift=there.mean(axis=0) - centre)
+        nodes = {node for node, _, _ in bonds}
+        edges = {frozenset(edge): one.place for _, edge, one in bonds}
+        for old in self.pairs.copy():
+            joined = frozenset(old.nodes)
+            if old.part.startswith(starts) and (joined in edges or joined <= nodes):
+                if self.rule(old, "struts") is None:
+                    self.pairs.remove(old)
+                elif joined in edges:
+                    problem = f"found the rod {'/'.join(old.nodes)}, expected an edge of cables"
+                    raise InputError(*edges[joined], problem)
+        for node, (first, second), one in bonds:
+            self.pairs.append(one._replace(nodes=(first, node)))
+            self.pairs.append(one._replace(nodes=(node, second)))
 
-    def _remove_cables(
-        self, starts: Ends, nodes: set[str], place: Place, *, inside: bool = False
-    ) -> None:
-        """Removes the cables among some nodes from two parts. Rods are refused, or stay if they are
-        `inside`."""
-        rods = [rule for rule in self.rules if rule.builder.kind == "struts"]
-        found = [one for one in self.pairs if nodes >= {*one.nodes} and one.part.startswith(starts)]
-        stay = [one for one in found if any(rule.tags <= one.tags for rule in rods)]
-        if stay and not inside:
-            problem = f"found the rod {'/'.join(stay[0].nodes)}, expected an edge of cables"
-            raise InputError(*place, problem)
-        self.pairs = [one for one in self.pairs if one not in found or one in stay]
 
-
-def _numbered(pairs: list[Pair], place: Place) -> Iterator[tuple[Pair, Place]]:
-    """Pairs of a list with their places. `place` is the list's."""
-    for number, pair in enumerate(pairs):
-        yield pair, place._replace(key=f"{place.key}[{number}]")
+def _shared(tags: str, part: str, place: Place) -> TaggedPair:
+    """What the pairs of a list share. `tags` is its key."""
+    return TaggedPair(" ".join(tags.split()), _tags(tags), part, place)
 
 
 def _check_size(count: int, most: int, place: Place) -> None:
@@ -265,33 +236,47 @@ def _check_size(count: int, most: int, place: Place) -> None:
         raise InputError(*place, problem)
 
 
+def _least_nested(names: Iterable[str], part: str, tags: str, place: Place, what: str) -> str:
+    """The least nested name inside a part with all tags. `what` tells what is missing."""
+    inside = [name for name in names if name.startswith(part) and name != part]
+    fitting = [name for name in inside if _tags(tags) <= _tags(_last(name))]
+    if not fitting or not tags:
+        close = hint(tags, [name.removeprefix(part).rstrip(".") for name in inside])
+        raise InputError(*place, f"found {what}; {close}")
+    return min(fitting, key=lambda name: name.count("."))
+
+
 @functools.lru_cache(maxsize=4096)
 def _tags(text: str) -> Tags:
     return frozenset(text.split())
 
 
 def _last(path: str) -> str:
-    return path.rpartition(".")[2]
+    """Tags of a node or a part: the end of its path."""
+    return path.rstrip(".").rpartition(".")[2]
 
 
-def _turn(rotation: Rotation) -> np.ndarray:
+def _turn(rotation: Rotation, place: Place) -> Any:
     """Matrix (3, 3) of a rotation."""
     from scipy.spatial import transform
 
+    if not any(rotation.axis):
+        problem = "found a vector of length 0, expected a direction"
+        raise InputError(place.file, f"{place.key}.rotation.axis", problem)
     axis = np.array(rotation.axis) / np.abs(rotation.axis).max()  # its square must not be 0
     vector = rotation.angle * axis / np.linalg.norm(axis)
-    matrix: np.ndarray = transform.Rotation.from_rotvec(vector, degrees=True).as_matrix()
-    return matrix
+    return transform.Rotation.from_rotvec(vector, degrees=True).as_matrix()
 
 
-def _frame(p: np.ndarray) -> np.ndarray:
+def _frame(p: np.ndarray, place: Place) -> Any:
     """Axes (3, 3) of points (points, 3), in rows: across the plane of the first three, along it
-    towards the first one from the centre, and across both. Not finite if there is no plane."""
-    if len(p) < LEAST_PAIRS:
-        return np.full((3, 3), np.nan)
-    normal = np.cross(p[1] - p[0], p[2] - p[0])
-    across = np.cross(normal, p[0] - p.mean(axis=0))
-    axes = np.array([normal, across, np.cross(across, normal)])
-    with np.errstate(invalid="ignore"):
-        unit: np.ndarray = axes / np.linalg.norm(axes, axis=1)[:, np.newaxis]
-    return unit
+    towards the first one from the centre, and across both."""
+    axes = np.zeros((3, 3))
+    if len(p) >= LEAST_PAIRS:
+        axes[0] = np.cross(p[1] - p[0], p[2] - p[0])
+        axes[1] = np.cross(axes[0], p[0] - p.mean(axis=0))
+        axes[2] = np.cross(axes[1], axes[0])
+    sizes = np.linalg.norm(axes, axis=1, keepdims=True)
+    if not sizes.all():
+        raise InputError(*place, "the first three pairs form no triangle, expected one")
+    return axes / sizes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import pydantic
 from pydantic import Field
@@ -28,12 +28,6 @@ class Rotation(Section):
     """Angle in degrees."""
     reference: Point | None = None
 
-    @pydantic.model_validator(mode="after")
-    def _check(self) -> Rotation:
-        if not any(self.axis):
-            refuse("axis", "found a vector of length 0, expected a direction")
-        return self
-
 
 class Substructure(Section):
     """File that is one part of a structure, or several equal parts (a name such as a/b/c).
@@ -50,19 +44,9 @@ class Substructure(Section):
     translation: Point = Field(default=[0.0, 0.0, 0.0])
 
 
-class Parameters(Section):
-    """Parameters of a builder, with NTRT's defaults. Fields of type Any have no effect, as the
-    scenario has its own friction, ground and actuators."""
-
-    @property
-    def ignored(self) -> list[str]:
-        """Names of the given parameters that have no effect."""
-        fields, given = type(self).model_fields.items(), self.model_fields_set
-        return [name for name, one in fields if one.annotation is Any and name in given]
-
-
-class RigidParameters(Parameters):
-    """Parameters of a rigid part."""
+class RigidParameters(Section):
+    """Parameters of a rigid part. As for all parts, defaults are those of NTRT, and fields of type
+    Any have no effect: a scenario has its own friction, ground and actuators."""
 
     density: NotNegative = 1.0
     friction: Any = None
@@ -90,9 +74,10 @@ class BoxParameters(RigidParameters):
         return math.sqrt(4.0 * self.width * self.height / math.pi)
 
 
-class CableParameters(Parameters):
+class CableParameters(Section):
     """Parameters of a cable."""
 
+    density: ClassVar[float] = 0.0
     stiffness: Positive = 1000.0
     damping: NotNegative = 10.0
     pretension: NotNegative = 0.0
@@ -121,16 +106,17 @@ class KinematicCableParameters(CableParameters):
     back_drivable: Any = None
 
 
-CLASSES: dict[str, tuple[str, type[Parameters]]] = {
-    "tgRodInfo": ("struts", RoundParameters),
-    "tgBoxInfo": ("struts", BoxParameters),
-    "tgSphereInfo": ("spheres", RoundParameters),
-    "tgBasicActuatorInfo": ("cables", BasicCableParameters),
-    "tgBasicContactCableInfo": ("cables", BasicCableParameters),
-    "tgKinematicActuatorInfo": ("cables", KinematicCableParameters),
-    "tgKinematicContactCableInfo": ("cables", KinematicCableParameters),
+CLASSES: dict[str, tuple[str, type[Section], str]] = {
+    "tgRodInfo": ("struts", RoundParameters, "rod"),
+    "tgBoxInfo": ("struts", BoxParameters, "box"),
+    "tgSphereInfo": ("spheres", RoundParameters, "sphere"),
+    "tgBasicActuatorInfo": ("cables", BasicCableParameters, "string"),
+    "tgBasicContactCableInfo": ("cables", BasicCableParameters, ""),
+    "tgKinematicActuatorInfo": ("cables", KinematicCableParameters, ""),
+    "tgKinematicContactCableInfo": ("cables", KinematicCableParameters, ""),
 }
-"""Groups of a structure file and parameters, by the class of a builder."""
+"""Groups of a structure file, parameters, and the tag of what is made without a builder in a file
+("" for none), by the class of a builder."""
 
 
 class Builder(Section):
@@ -159,9 +145,10 @@ class Builder(Section):
         return CLASSES[self.made_as][0]
 
     @property
-    def has_mass(self) -> bool:
-        """True for rods, boxes and spheres, unless their density is 0."""
-        return self.kind != "cables" and self.parameters.density > 0.0
+    def ignored(self) -> list[str]:
+        """Names of the given parameters that have no effect."""
+        fields, given = type(self.parameters).model_fields, self.parameters.model_fields_set
+        return [name for name, one in fields.items() if one.annotation is Any and name in given]
 
 
 class NtrtFile(Section):

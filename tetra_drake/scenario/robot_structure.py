@@ -301,7 +301,8 @@ class StructureFile(Section):
         point masses and spheres at other nodes."""
         of_struts = components(self.all_struts)
         used = {node for body in of_struts for node in body}
-        with_mass = dict.fromkeys([*self.masses, *self._nodes_of_spheres])
+        spheres = (node for group in self.spheres.values() for node in group.nodes)
+        with_mass = dict.fromkeys([*self.masses, *spheres])
         return *of_struts, *((node,) for node in with_mass if node not in used | self._fixed)
 
     @cached_property
@@ -335,10 +336,6 @@ class StructureFile(Section):
         """Nodes with an anchor along all axes."""
         return {node for node, axes in self.anchors.items() if len(axes) == len("xyz")}
 
-    @property
-    def _nodes_of_spheres(self) -> list[str]:
-        return [node for group in self.spheres.values() for node in group.nodes]
-
     @cached_property
     def sphere_of_node(self) -> dict[str, Sphere]:
         """Sphere of each node with one: its own one, or by the node's first strut."""
@@ -356,19 +353,15 @@ class StructureFile(Section):
     def _contact_radius(self, node: str) -> float:
         """Radius (m) of the foot at a node."""
         sphere = self.sphere_of_node.get(node)
-        if sphere is None:
-            return 0.0
-        if sphere.contact_radius is not None:
+        if sphere is not None and sphere.contact_radius is not None:
             return sphere.contact_radius
-        return 0.0 if "z" in self._held(node) else sphere.touching_radius
+        return 0.0 if sphere is None or "z" in self._held(node) else sphere.touching_radius
 
     @cached_property
     def free_lengths(self) -> tuple[float, ...]:
         """Free lengths of the cables in m. If the file has a tension, they are computed from it."""
-        return tuple(
-            self.cables[cable.group].free_length_at(self._length(cable))
-            for cable in self.all_cables
-        )
+        cables = ((self.cables[cable.group], self._length(cable)) for cable in self.all_cables)
+        return tuple(group.free_length_at(length) for group, length in cables)
 
     @cached_property
     def cables_of_oscillator(self) -> dict[str, tuple[int, ...]]:
@@ -377,23 +370,21 @@ class StructureFile(Section):
         for number, cable in enumerate(self.all_cables):
             backward = cable._replace(nodes=cable.nodes[::-1])
             numbers[cable.name] = numbers[backward.name] = number
+        driven = {}
         for oscillator, names in self.actuated.items():
             for place, name in enumerate(names):
                 if name not in numbers:
                     problem = f"found unknown cable '{name}'; {hint(name, numbers)}"
                     refuse(f"actuated.{oscillator}[{place}]", problem)
-        return {
-            oscillator: tuple(numbers[name] for name in names)
-            for oscillator, names in self.actuated.items()
-        }
+            driven[oscillator] = tuple(numbers[name] for name in names)
+        return driven
 
     @property
     def contact_nodes(self) -> tuple[str, ...]:
         """Names of the nodes that the ground can touch, in the order of `nodes`."""
-        if self.contacts == "all":
-            moving = {node for body in self.bodies for node in body}
-            return tuple(node for node in self.nodes if node in moving)
-        return tuple(node for node in self.nodes if node in self.contacts)
+        moving = {node for body in self.bodies for node in body}
+        touching = moving if self.contacts == "all" else self.contacts
+        return tuple(node for node in self.nodes if node in touching)
 
     def _held(self, node: str) -> str:
         """Axes along which an anchor holds the node of a strut."""
@@ -441,11 +432,10 @@ class StructureFile(Section):
         for kind in ("struts", "cables") if isinstance(tree, dict) else ():
             given = tree.get(kind)
             groups = given.items() if isinstance(given, dict) else ()
-            mappings = [(str(name), group) for name, group in groups if isinstance(group, dict)]
-            whole = [name for name, group in mappings if "pairs" in group]
-            for name, group in mappings:
-                if "pairs" not in group:
-                    refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, whole)}")
+            whole = {str(name): "pairs" in group for name, group in groups if type(group) is dict}
+            for name in (name for name, has_pairs in whole.items() if not has_pairs):
+                names = filter(whole.get, whole)
+                refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, names)}")
         return tree
 
     @pydantic.model_validator(mode="after")
@@ -460,7 +450,8 @@ class StructureFile(Section):
         self._check_elastic_struts()
         self._check_tensions()
         self._check_actuated()
-        self._check_anchors()
+        if not any(map(self._can_move, self.bodies)):
+            refuse("anchors", "hold every body, expected one that can move")
         if not self.contact_nodes:
             refuse("contacts", "found none, expected one node at least")
         check_one_per_body("offsets", self.offsets, self.body_count)
@@ -482,12 +473,10 @@ class StructureFile(Section):
     @property
     def _moving_nodes(self) -> Iterator[tuple[str, str]]:
         """Keys and nodes that must be able to move."""
-        for node in self.masses:
-            yield f"masses.{node}", node
+        yield from ((f"masses.{node}", node) for node in self.masses)
         for name, group in self.spheres.items():
             yield from ((f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes))
-        for node in self.loads:
-            yield f"loads.{node}", node
+        yield from ((f"loads.{node}", node) for node in self.loads)
         if self.contacts != "all":
             yield from ((f"contacts[{i}]", node) for i, node in enumerate(self.contacts))
 
@@ -507,10 +496,6 @@ class StructureFile(Section):
             refuse("nodes", "none can move, expected struts, masses or spheres")
         for node in (node for node, *others in self.bodies if not others and node not in ends):
             refuse(f"nodes.{node}", "is on no strut and no cable, expected a cable to it")
-
-    def _check_anchors(self) -> None:
-        if not any(map(self._can_move, self.bodies)):
-            refuse("anchors", "hold every body, expected one that can move")
 
     def _can_move(self, body: tuple[str, ...]) -> bool:
         """True if a body with these nodes can move in spite of its anchors. The spin of a straight
