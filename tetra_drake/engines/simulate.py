@@ -40,7 +40,7 @@ def simulate(
 
     Args:
         scenario: a scenario, its name or file, or a run.
-        gait: a gait, its file, or a run; a run means its best gait.
+        gait: a gait, its file, or a run (see load_run()), which means its best gait.
         command: a command in place of a gait; see load_command().
         controller: a function in place of a gait, from the time (s) and the readings of the robot
             (see robot.readings.Readings) to an action for each driven cable (see Simulation).
@@ -56,6 +56,7 @@ def simulate(
         InputError: if an argument does not fit the scenario, or the engine has no viewer.
     """
     scenario = given_scenario(scenario)
+    check_type("simulate", "record", record, bool)
     if steering is not None and not callable(steering):
         steering = constant_steering(steering)
     if viewer is not None:
@@ -111,6 +112,7 @@ def simulate_many(
         InputError: if the numbers of scenarios and gaits differ, or a gait does not fit.
     """
     check_type("simulate_many", "gaits", gaits, Sequence)
+    check_type("simulate_many", "record", record, bool)
     if isinstance(scenario, Sequence) and not isinstance(scenario, str):
         scenarios = [given_scenario(each) for each in scenario]
     else:
