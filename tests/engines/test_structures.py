@@ -106,7 +106,7 @@ BRIEF = {"cpg.start_up": "0.2 s", "simulation.duration": "1 s", "simulation.stea
 def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_name, allowed):
     # Seen: 5e-11 m, as nodes at height 0 are in the ground by rounding or not; where moments of
     # inertia are general, too, 1e-10 m, and 8e-8 m on the thesis's friction, which enlarges that.
-    row = Robot.of(load_scenario(scenario_name).with_changes({"engine": "!Compiled"} | BRIEF))
+    row = Robot.of(load_scenario(scenario_name).on_engine("compiled").with_changes(BRIEF))
     written = row.scenario.with_sections(robot=row_as_kind(row))
     structure = make_structure(written)  # at rest; the row starts where it is balanced
     start = {"p_WB": row.structure.p_WB, "q_WB": row.structure.q_WB}

@@ -145,8 +145,9 @@ class _Simulator:
         self.stepped = self.pulled or self._touches
         """True if a law of the other engines computes forces at each step."""
         self._parts = Packed((robot.model, Forces.of(robot.model)))
+        model = make_mjcf(robot, own_laws=True)
         try:
-            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot, own_laws=True))
+            self._model = mujoco.MjModel.from_xml_string(model)
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
