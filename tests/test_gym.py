@@ -120,9 +120,8 @@ def test_robots_side_by_side_do_what_environments_of_one_robot_do(short, mode):
 
 
 def test_wrappers_of_gymnasium_take_robots_side_by_side(short):
-    options = {"scenario": short, "max_episode_steps": 3}
-    many = RecordEpisodeStatistics(gymnasium.make_vec(WALK, num_envs=2, **options))
-    many = NormalizeObservation(many)
+    options = {"num_envs": 2, "scenario": short, "max_episode_steps": 3}
+    many = NormalizeObservation(RecordEpisodeStatistics(gymnasium.make_vec(WALK, **options)))
     many.reset(seed=0)
     steps = [many.step(many.action_space.sample()) for _ in range(3)]
     assert [step[3].tolist() for step in steps] == [[False] * 2, [False] * 2, [True] * 2]
@@ -167,22 +166,22 @@ def test_the_best_recorded_gait_scores_more_than_standing_still():
     assert scores[0] > 20.0 and scores[1] == pytest.approx(0.0, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("use", "key", "fact"),
-    [
-        (lambda one, many: one.step(np.zeros((2, 4))), "actions", "(4,)"),
-        (lambda one, many: one.step("left"), "actions", "(4,)"),
-        (lambda one, many: many.step(np.zeros(8)), "actions", f"numbers of shape ({LANES}, 8)"),
-        (lambda one, many: one.reset(seed=-1), "seed", "-1"),
-        (lambda one, many: many.reset(seed=[1]), "seed", f"expected {LANES}"),
-        (lambda one, many: one.reset(options={"scenario": "incline"}), "options", "scenario"),
-        (lambda one, many: many.reset(options={"mask": True}), "options", "reset_mask"),
-        (lambda one, many: many.reset(options={"reset_mask": 1}), "options['reset_mask']", "1"),
-        (lambda one, many: TensegrityEnv("walk", render_mode="x"), "render_mode", "'rgb_array'"),
-        (lambda *_: TensegrityVectorEnv(2, "walk", autoreset_mode="x"), "autoreset_mode", "'x'"),
-        (lambda *_: TensegrityVectorEnv(2, "walk", max_episode_steps=0), "max_episode_steps", "0"),
-    ],
-)
+MISUSES = [
+    (lambda one, many: one.step(np.zeros((2, 4))), "actions", "(4,)"),
+    (lambda one, many: one.step("left"), "actions", "(4,)"),
+    (lambda one, many: many.step(np.zeros(8)), "actions", f"numbers of shape ({LANES}, 8)"),
+    (lambda one, many: one.reset(seed=-1), "seed", "-1"),
+    (lambda one, many: many.reset(seed=[1]), "seed", f"expected {LANES}"),
+    (lambda one, many: one.reset(options={"scenario": "incline"}), "options", "scenario"),
+    (lambda one, many: many.reset(options={"mask": True}), "options", "reset_mask"),
+    (lambda one, many: many.reset(options={"reset_mask": 1}), "options['reset_mask']", "1"),
+    (lambda one, many: TensegrityEnv("walk", render_mode="x"), "render_mode", "'rgb_array'"),
+    (lambda *_: TensegrityVectorEnv(2, "walk", autoreset_mode="x"), "autoreset_mode", "'x'"),
+    (lambda *_: TensegrityVectorEnv(2, "walk", max_episode_steps=0), "max_episode_steps", "0"),
+]
+
+
+@pytest.mark.parametrize(("use", "key", "fact"), MISUSES)
 def test_what_cannot_be_used_is_told_in_a_line(short, refused, use, key, fact):
     one, many = TensegrityEnv(short, grouped=True), TensegrityVectorEnv(LANES, short)
     one.reset(seed=0)

@@ -53,17 +53,12 @@ def swaying(actuation: Actuation, *, damping: float) -> Scenario:
     """A bar between the ends of a frame, for 80 ms."""
     make = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.016}
     law = {"stiffness": STIFFNESS, "damping": damping, "free_length": FREE_LENGTH}
+    bars, between = {"frame": "ad", "bar": "bc"}, {"passive": "ab", "driven": "cd"}
     along = {"a": 0.0, "b": LENGTH, "c": 2.0 * LENGTH, "d": 3.0 * LENGTH}
     tree = {
         "nodes": {name: [x, 0.0, 0.5] for name, x in along.items()},
-        "struts": {
-            "frame": {"pairs": [["a", "d"]], **make},
-            "bar": {"pairs": [["b", "c"]], **make},
-        },
-        "cables": {
-            "passive": law | {"pairs": [["a", "b"]]},
-            "driven": law | {"pairs": [["c", "d"]]},
-        },
+        "struts": {name: make | {"pairs": [[*ends]]} for name, ends in bars.items()},
+        "cables": {name: law | {"pairs": [[*ends]]} for name, ends in between.items()},
         "actuated": {"one": ["driven c d"]},
         "gravity": 0.0,
     }
@@ -147,14 +142,10 @@ def test_a_bar_on_an_actuator_is_a_linear_system(one, engine):
 def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
     # Without damping: kinetic and elastic energy, k (l - x)² / 2 of a taut cable, grow by the
     # integral of T (-x').
-    floating = {
-        "robot.tetrahedra": 3,
-        "robot.gravity": 0.0,
-        "robot.offsets": with_unit(np.random.default_rng(0).normal([0, 0, 1], 0.005, (3, 3)), "m"),
-        "robot.cables.damping": 0.0,
-        "simulation.sample_period": "0.1 ms",
-        "actuation": LIMITED["winch"],
-    }
+    places = np.random.default_rng(0).normal([0, 0, 1], 0.005, (3, 3))
+    floating = {"robot.tetrahedra": 3, "robot.gravity": 0.0, "robot.cables.damping": 0.0}
+    floating |= {"robot.offsets": with_unit(places, "m"), "actuation": LIMITED["winch"]}
+    floating["simulation.sample_period"] = "0.1 ms"
     robot = Robot.of(shortly(scenario, 0.1, engine=engine, **floating))
     structure, bodies, motion = robot.structure, robot.model.bodies, trajectory_of(robot)
     v_WB, w_WB = body_velocities(motion, structure)

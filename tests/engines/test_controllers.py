@@ -107,17 +107,17 @@ def test_a_controller_makes_no_algebraic_loop_and_may_have_further_outputs(walki
     np.testing.assert_allclose(found, robot.starting_cables().length, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("inputs", "outputs", "facts"),
-    [
-        ({}, {}, ("no output ports", "'signals'", "8")),
-        ({}, {"y": 8}, ("found y", "'signals'", "8")),
-        ({}, {"signals": 7}, ("'signals'", "size 7", "8")),
-        ({"lengths": 23}, {"signals": 8}, ("'lengths'", "size 23", "24")),
-        ({"state": 12}, {"signals": 8}, ("'state'", "size 12", "65")),
-        ({"length": 24}, {"signals": 8}, ("'length'",)),
-    ],
-)
+OTHER_PORTS = [
+    ({}, {}, ("no output ports", "'signals'", "8")),
+    ({}, {"y": 8}, ("found y", "'signals'", "8")),
+    ({}, {"signals": 7}, ("'signals'", "size 7", "8")),
+    ({"lengths": 23}, {"signals": 8}, ("'lengths'", "size 23", "24")),
+    ({"state": 12}, {"signals": 8}, ("'state'", "size 12", "65")),
+    ({"length": 24}, {"signals": 8}, ("'length'",)),
+]
+
+
+@pytest.mark.parametrize(("inputs", "outputs", "facts"), OTHER_PORTS)
 def test_a_controller_of_other_ports_is_refused(walking, refused, inputs, outputs, facts):
     robot = controlled_robot(walking)
     with refused("MakeTensegrityDiagram", "controller", *facts):

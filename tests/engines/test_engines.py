@@ -73,15 +73,11 @@ def test_recording_and_watching_change_nothing(walk, engine):
     assert wound.any() == (walk == "winch")
 
 
-@pytest.mark.parametrize(
-    ("what", "key"),
-    [
-        ([], "gait"),
-        (["gait", "command"], "command"),
-        (["command", "steering"], "command"),
-        (["gait", "controller"], "controller"),
-    ],
-)
+WRONG_DRIVES = [([], "gait"), (["gait", "command"], "command")]
+WRONG_DRIVES += [(["command", "steering"], "command"), (["gait", "controller"], "controller")]
+
+
+@pytest.mark.parametrize(("what", "key"), WRONG_DRIVES)
 def test_a_robot_follows_a_gait_or_a_command(scenario, what, key, refused):
     chosen = {"gait": seeded_gait(scenario), "command": WAVES, "steering": 0.5}
     chosen["controller"] = lambda time, readings: np.zeros(8)
@@ -126,16 +122,12 @@ def test_failures_cross_process_borders(kind):
     assert (failure.time, failure.reason) == (1.5, "why")
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("cpg.feedback", ["load"]),
-        ("friction.static", 0.6),
-        ("friction.stiffness", "1 kN/m"),
-        ("friction.lateral", 2.0),
-        ("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2)),
-    ],
-)
+BEYOND_MUJOCO = [("cpg.feedback", ["load"]), ("friction.static", 0.6)]
+BEYOND_MUJOCO += [("friction.stiffness", "1 kN/m"), ("friction.lateral", 2.0)]
+BEYOND_MUJOCO += [("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2))]
+
+
+@pytest.mark.parametrize(("key", "value"), BEYOND_MUJOCO)
 def test_what_mujoco_cannot_simulate_is_refused(scenario, key, value, monkeypatch, refused):
     monkeypatch.setattr("tetra_drake.engines.mujoco.installed", lambda: True)
     level = scenario.with_changes({"engine": "!Mujoco", "friction": Coulomb()})

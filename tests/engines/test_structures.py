@@ -5,6 +5,7 @@ In tests/data/structures.json sines pull at the cables of structures at rest. Af
 """
 
 import dataclasses
+import functools
 import json
 from unittest.mock import Mock
 
@@ -89,14 +90,11 @@ def row_as_kind(row: Robot) -> StructureFile:
             actuated[oscillators[cable["signal"]]].append(" ".join([group, *pair]))
     strut = {"density": law.density, "diameter": law.strut_diameter, "contact_radius": 0.0}
     strut |= {"pairs": [[names[a], names[b]] for a, b in structure.struts]}
-    return StructureFile(
-        nodes=dict(zip(names, p_WN, strict=True)),
-        struts={"strut": strut | {"node_diameter": law.node_diameter}},
-        cables=cables,
-        actuated=actuated,
-        contacts=[names[i] for i in structure.contacts],
-        gravity=law.gravity,
-    )
+    strut |= {"node_diameter": law.node_diameter}
+    tree = {"struts": {"strut": strut}, "cables": cables, "actuated": actuated}
+    tree["nodes"] = dict(zip(names, p_WN, strict=True))
+    contacts = [names[i] for i in structure.contacts]
+    return StructureFile(**tree, contacts=contacts, gravity=law.gravity)
 
 
 BRIEF = {"cpg.start_up": "0.2 s", "simulation.duration": "1 s", "simulation.steady_from": "0.4 s"}
@@ -121,14 +119,10 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
 
 
 def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
-    changes = {
-        "robot.tetrahedra": 2,
-        "robot.actuation": [["outer bottom_left"], ["outer bottom_right"]],
-        "engine": "!Compiled",
-        "cpg.signals": "live",
-        "gait_bounds.mirrored": True,
-    }
-    row = Robot.of(load_scenario("coulomb").with_changes(changes | BRIEF))
+    changes = BRIEF | {"engine": "!Compiled", "cpg.signals": "live", "gait_bounds.mirrored": True}
+    sides = [["outer bottom_left"], ["outer bottom_right"]]
+    changes |= {"robot.tetrahedra": 2, "robot.actuation": sides}
+    row = Robot.of(load_scenario("coulomb").with_changes(changes))
     walks = {"robot": row_as_kind(row), "objective": {"speed": "1 s/in"}}
     scenario = row.scenario.with_changes(walks)
     gait = seeded_gait(scenario, 3)
@@ -236,10 +230,9 @@ def test_parallel_cables_add_and_a_load_needs_no_strut(engine):
 
 
 def test_a_robot_that_nothing_drives_has_no_gaits_to_search(undriven, refused, tmp_path):
-    with refused(undriven.name, "robot.actuated", "oscillator"):
-        check_scenario(undriven)
-    with refused(undriven.name, "robot.actuated", "oscillator"):
-        evolve(undriven, tmp_path / "run")
+    for search in (check_scenario, functools.partial(evolve, out=tmp_path / "run")):
+        with refused(undriven.name, "robot.actuated", "oscillator"):
+            search(undriven)
     assert not (tmp_path / "run").exists()
 
 

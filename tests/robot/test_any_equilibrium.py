@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -95,10 +96,9 @@ def test_a_pendulum_swings_down_however_stiff_its_cable(stiffness, monkeypatch):
     line = HUNG["cables"]["line"] | {"stiffness": stiffness}
     aside = {"top": [0.0, 0.0, 1.0], "a": [0.4, 0.0, 1.0], "b": [0.6, 0.0, 1.0]}
     robot = Robot.of(scenario_of(HUNG | {"nodes": aside, "cables": {"line": line}}))
-    weight = robot.weight
-    length = 0.4 + weight / stiffness
-    assert places(robot)["a"] == pytest.approx([0.0, 0.0, 1.0 - length], abs=1e-8)
-    assert tensions(robot) == pytest.approx([weight], rel=1e-6)
+    below = [0.0, 0.0, 0.6 - robot.weight / stiffness]
+    assert places(robot)["a"] == pytest.approx(below, abs=1e-8)
+    assert tensions(robot) == pytest.approx([robot.weight], rel=1e-6)
 
 
 def scaled(mass: float, stiffness: float, **changes: Any) -> Robot:
@@ -131,20 +131,19 @@ def test_a_heavy_structure_rests_on_its_own_struts():
     heights = np.array([place[2] for place in places(robot).values()])
     load = robot.scenario.ground.stiffness * np.maximum(0.0, -heights).sum()
     assert load == pytest.approx(robot.weight, rel=1e-5)
-    memory = Forces.of(robot.model)
-    pushes = np.empty(18)
+    memory, pushes = Forces.of(robot.model), np.empty(18)
     compute_state_forces(Packed((robot.model, memory)), robot.structure.initial_state, pushes)
     assert pushes.any() and np.ptp(heights) < 0.1
 
 
-@pytest.mark.parametrize(
-    ("tree", "force"),
-    [
-        ({**HUNG, "cables": {}, "anchors": {}, "nodes": SWINGING["nodes"]}, "0, 0, -"),
-        ({**SWINGING, "anchors": {"a": "yz"}, "loads": {"b": [0.3, 0.0, 0.0]}}, "0.3, 0, 0"),
-        ({**SWINGING, "anchors": {}, "loads": {"b": [0.0, 0.0, 9.0]}}, "0, 0, 8."),
-    ],
-)
+UNHELD = [
+    ({**HUNG, "cables": {}, "anchors": {}, "nodes": SWINGING["nodes"]}, "0, 0, -"),
+    ({**SWINGING, "anchors": {"a": "yz"}, "loads": {"b": [0.3, 0.0, 0.0]}}, "0.3, 0, 0"),
+    ({**SWINGING, "anchors": {}, "loads": {"b": [0.0, 0.0, 9.0]}}, "0, 0, 8."),
+]
+
+
+@pytest.mark.parametrize(("tree", "force"), UNHELD)
 def test_what_nothing_holds_is_told(tree, force, refused):
     with refused("anchored", "robot", f"nothing holds it against the force [{force}"):
         Robot.of(scenario_of(tree))
@@ -161,11 +160,10 @@ def changes(resting: Unactuated, state: np.ndarray, size: float) -> Iterator[lis
         yield [motion, 0.5 * (behind - ahead), stiffness_at_rest(resting) @ motion]
 
 
-@pytest.mark.parametrize(
-    "scenario",
-    [load_scenario("mast"), supported_prism(), floating_prism(), scenario_of(HUNG)],
-    ids=["mast", "supported prism", "floating prism", "hung"],
-)
+RESTING = [load_scenario("mast"), supported_prism(), floating_prism(), scenario_of(HUNG)]
+
+
+@pytest.mark.parametrize("scenario", RESTING, ids=attrgetter("name"))
 def test_stiffness_is_how_forces_change(scenario):
     robot = Robot.of(scenario)
     for _, found, expected in changes(Unactuated(robot.model), robot.equilibrium.state, 1e-6):

@@ -152,8 +152,7 @@ def test_boxes_spheres_on_cables_bodies_held_in_space_and_names_of_places(tmp_pa
     box, ball = 0.7 * 4.0 * 0.4 * 0.2, 3.0 * 4.0 / 3.0 * math.pi * 1.5**3  # kg
     assert Structure.of(given.blueprint()).mass == pytest.approx([box, ball])
     assert "spare" not in given.nodes
-    told = caplog.text
-    assert all(name in told for name in (": spare", ": ceiling", ": bar", ": u v, a b"))
+    assert all(name in caplog.text for name in (": spare", ": ceiling", ": bar", ": u v, a b"))
 
 
 def test_of_several_builders_the_last_counts_and_bonds_have_the_names_of_their_parts(tmp_path):
@@ -169,16 +168,16 @@ ROD, EDGES = "pair_groups.prism_rod", "bond_groups.string.v1/v2/v3/node_edge"
 QUARTER = "rotation: {axis: [0, 1, 0], angle: 90}"
 
 
+PLACES = [
+    ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1], 0),
+    ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1], -2),
+    (f"scale: 3, translation: [1, 0, 0], {QUARTER}", [4, 4, -3], -2),
+    ("offset: [5, 5, 5]", [1, 2, 1], 0),
+]
+
+
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    ("entry", "front", "lowest"),
-    [
-        ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1], 0),
-        ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1], -2),
-        (f"scale: 3, translation: [1, 0, 0], {QUARTER}", [4, 4, -3], -2),
-        ("offset: [5, 5, 5]", [1, 2, 1], 0),
-    ],
-)
+@pytest.mark.parametrize(("entry", "front", "lowest"), PLACES)
 def test_places_of_substructures(entry, front, lowest, tmp_path) -> None:
     """Turned, then scaled about their centre, then moved; then the whole is set on the ground."""
     write(tmp_path, VERTEBRA, "vertebra.yaml")
@@ -200,11 +199,8 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
         bond_groups: {a/b/node_node: {string: [[v3.right, right]]}}
     """
     given = read(write(tmp_path, text))
-    assert [cable.name for cable in given.all_cables[8:]] == [
-        "string b/left a/v2/left",
-        "string b/front a/v3/back",
-        "string a/v3/right b/right",
-    ]
+    names = ["string b/left a/v2/left", "string b/front a/v3/back", "string a/v3/right b/right"]
+    assert [cable.name for cable in given.all_cables[8:]] == names
     string = given.cables["string"]
     assert (string.stiffness, string.tension) == (7.0, 0.0), "no pretension unless it says so"
     builder = "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 9}}}"
@@ -281,6 +277,5 @@ def test_the_structure_names_settings_that_the_scenario_replaces(tmp_path, caplo
     save_scenario(tmp_path, robot_of_file(str(file), unit="dm").scenario)
     saved = load_scenario(tmp_path / "scenario.yaml")
     assert saved.robot.ignored == ["friction", "restitution", "history"]
-    [record] = caplog.records
-    assert str(file) in record.getMessage()
-    assert "friction, restitution, history" in record.getMessage()
+    [told] = caplog.messages
+    assert str(file) in told and "friction, restitution, history" in told

@@ -204,13 +204,10 @@ BAD_FILES = [
     ("[" * 1000, "", "YAML"),
     ("base: thesis\nrobot: &any {}\ncpg: {<<: *any}", "", "line 3, column 7"),
 ]
+BAD_FILES += [(f"base: thesis\n{text}", key, found) for text, key, found in BAD]
 
 
-@pytest.mark.parametrize(
-    ("text", "key", "found"),
-    [(f"base: thesis\n{text}", key, found) for text, key, found in BAD] + BAD_FILES,
-    ids=[row[0][:40] for row in BAD + BAD_FILES],
-)
+@pytest.mark.parametrize(("text", "key", "found"), BAD_FILES, ids=itertools.count())
 def test_a_bad_file_is_refused(tmp_path, text, key, found, refused):
     file = write(tmp_path, text)
     with refused(file, key, found):
@@ -274,17 +271,13 @@ PRIVATE = [
 ]
 
 
+NAMING_IT = ["base: any", "base: thesis\nrobot: !Structure {file: any}"]
+NAMING_IT += ["base: thesis\nrobot: !Structure {file: parts.yaml, unit: m}"]
+NAMING_IT += ["base: thesis\nterrain: !HeightField {file: any, cell: 1 m}"]
+
+
 @pytest.mark.parametrize("content", PRIVATE)
-@pytest.mark.parametrize(
-    "text",
-    [
-        "base: any",
-        "base: thesis\nrobot: !Structure {file: any}",
-        "base: thesis\nrobot: !Structure {file: parts.yaml, unit: m}",
-        "base: thesis\nterrain: !HeightField {file: any, cell: 1 m}",
-    ],
-    ids=["scenario", "structure", "substructure", "heights"],
-)
+@pytest.mark.parametrize("text", NAMING_IT)
 def test_nothing_is_shown_of_a_file_that_is_something_else(tmp_path, content, text):
     (tmp_path / "any").write_text(content)
     write(tmp_path, "substructures: {part: {path: any}}", "parts.yaml")

@@ -9,7 +9,6 @@ from helpers.structure_file import FILE
 from pytest import approx
 
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import shipped_structures
 from tetra_drake.scenario.structure_files import read_structure
@@ -58,7 +57,6 @@ def test_what_stands_beside_the_file_overrides_it(folder: Path) -> None:
       offsets: [[0, 0, 1 mm], [0, 0, 0], [0, 0, 0]]
     """
     given = load(folder, robot).robot
-    assert isinstance(given, StructureFile)
     assert given.nodes["d"] == approx([0.03, 0.02, 0.05])
     side, long = given.cables["side"], given.cables["long"]
     assert (side.stiffness, side.damping, long.free_length) == (50.0, 3.0, 0.05)
@@ -103,7 +101,6 @@ def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
 def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
     robot = "!Structure {file: ntrt.yaml, unit: dm, actuated: {one: [fast/string b d]}}"
     given = load(folder, robot).robot
-    assert isinstance(given, StructureFile)
     assert given.nodes["d"] == approx([0.1, 0.1, 0.0])
     assert given.cables_of_oscillator == {"one": (1,)}
 
@@ -114,31 +111,31 @@ def test_a_unit_is_that_of_bare_coordinates() -> None:
         assert in_dm.nodes[node] == approx([0.1 * x for x in place])
 
 
-@pytest.mark.parametrize(
-    ("robot", "key", "fact"),
-    [
-        ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
-        ("!Tetrahedra {file: own.yaml}", "robot.file", "unknown"),
-        ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
-        ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
-        ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.nodes", "none can move"),
-        ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
-        ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
-    ],
-)
+FAULTS = [
+    ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
+    ("!Tetrahedra {file: own.yaml}", "robot.file", "unknown"),
+    ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
+    ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
+    ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.nodes", "none can move"),
+    ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
+    ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
+]
+
+
+@pytest.mark.parametrize(("robot", "key", "fact"), FAULTS)
 def test_a_fault_of_the_scenario_names_it(folder, robot, key, fact, refused):
     with refused(folder / "mine.yaml", key, fact):
         load(folder, robot)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "key", "fact"),
-    [
-        ("stiffness: 2 N/cm, ", "", "cables.side.stiffness", "is missing; give it"),
-        ("[c, d]]", "[c, x]]", "cables.side.pairs[1]", "'x'"),
-        ("unit: cm", "unit: [", "", "YAML"),
-    ],
-)
+FILE_FAULTS = [
+    ("stiffness: 2 N/cm, ", "", "cables.side.stiffness", "is missing; give it"),
+    ("[c, d]]", "[c, x]]", "cables.side.pairs[1]", "'x'"),
+    ("unit: cm", "unit: [", "", "YAML"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "key", "fact"), FILE_FAULTS)
 def test_a_fault_of_a_structure_file_names_that(folder, old, new, key, fact, refused):
     file = folder / "own.yaml"
     file.write_text(FILE.replace(old, new))
@@ -161,14 +158,11 @@ def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name, fact, r
         read_structure(parts, unit="m")
 
 
-@pytest.mark.parametrize(
-    ("section", "value"),
-    [
-        ("require", {"twist": "0 m"}),
-        ("objective", {"twist": "1 /m"}),
-        ("optimizer", "!QualityDiversity {measures: {twist: [0 m, 1 m], lifted: [0, 1]}}"),
-    ],
-)
+OF_A_ROW = [("require", {"twist": "0 m"}), ("objective", {"twist": "1 /m"})]
+OF_A_ROW += [("optimizer", "!QualityDiversity {measures: {twist: [0 m, 1 m], lifted: [0, 1]}}")]
+
+
+@pytest.mark.parametrize(("section", "value"), OF_A_ROW)
 def test_metrics_of_a_row_are_refused(section: str, value: object, refused) -> None:
     key = "optimizer.measures" if section == "optimizer" else section
     with refused("scenario prism", f"{key}.twist", "!Structure"):

@@ -143,16 +143,15 @@ def test_a_height_file_has_rows_along_x(tmp_path, suffix):
     assert (grid.corner, grid.cell) == ((-0.5, -0.75), (0.5, 0.5))  # centred: 1 by 1.5 m
 
 
-@pytest.mark.parametrize(
-    ("heights", "found"),
-    [
-        (np.array([[0.0] * 3, [0.0, np.nan, 0.0], [0.0] * 3]), "nan in row 2, column 2"),
-        (np.array([[0.0] * 3, [0.0, 0.0, -1e7], [0.0] * 3]), "-10000000.0 in row 2, column 3"),
-        (HEIGHTS[None], "1 x 3 x 4"),
-        (np.zeros((2000, 2001), dtype=np.int8), "2000 x 2001"),
-        (np.array([[{}] * 3] * 3), "heights.npy"),
-    ],
-)
+NO_HEIGHTS = [
+    (np.diag([0.0, np.nan, 0.0]), "nan in row 2, column 2"),
+    (np.where(np.arange(9).reshape(3, 3) == 5, -1e7, 0.0), "-10000000.0 in row 2, column 3"),
+    (np.full((3, 3), {}), "heights.npy"),
+]
+NO_HEIGHTS += [(HEIGHTS[None], "1 x 3 x 4"), (np.zeros((2000, 2001), dtype=np.int8), "2000 x 2001")]
+
+
+@pytest.mark.parametrize(("heights", "found"), NO_HEIGHTS)
 def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
     np.save(tmp_path / "heights.npy", heights, allow_pickle=True)
     file = scenario_file(tmp_path, "terrain: !HeightField {file: heights.npy, cell: 1 m}")

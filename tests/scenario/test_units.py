@@ -61,13 +61,13 @@ def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, 
     assert scenario.units == SYSTEMS[expected]
 
 
-@pytest.mark.parametrize(
-    ("nodes", "expected"),
-    [
-        ("unit: mm\nnodes: {a: [0, 0, 0], b: [300, 0, 100]}", "mm"),
-        ("nodes: {a: [0 m, 0 m, 0 m], b: [3 m, 0 m, 1 m]}", "SI"),
-    ],
-)
+GIVEN = [
+    ("unit: mm\nnodes: {a: [0, 0, 0], b: [300, 0, 100]}", "mm"),
+    ("nodes: {a: [0 m, 0 m, 0 m], b: [3 m, 0 m, 1 m]}", "SI"),
+]
+
+
+@pytest.mark.parametrize(("nodes", "expected"), GIVEN)
 def test_a_structure_is_shown_in_the_unit_in_which_it_is_given(nodes, expected, tmp_path):
     strut = "{pairs: [[a, b]], diameter: 6 mm, density: 2.7 g/cm^3, node_diameter: 6 mm}"
     (tmp_path / "own.yaml").write_text(f"{nodes}\nstruts: {{rod: {strut}}}")

@@ -147,14 +147,10 @@ def test_numba_refuses(kernel):
         jit(kernel)(lane_table((3,), 4), lane_table((3, 4), 8))
 
 
-@pytest.mark.parametrize(
-    ("array", "width"),
-    [
-        (np.zeros((3, 4), np.float32), 4),
-        (np.zeros((3, 8))[:, ::2], 4),
-        (np.zeros((3, 4)), 8),
-    ],
-)
+MISREAD = [(np.zeros((3, 4), np.float32), 4), (np.zeros((3, 8))[:, ::2], 4), (np.zeros((3, 4)), 8)]
+
+
+@pytest.mark.parametrize(("array", "width"), MISREAD)
 def test_arrays_that_kernels_would_read_wrongly_are_refused(array, width):
     with pytest.raises(ValueError):
         FieldArray(array, width)

@@ -50,18 +50,16 @@ def rod_with_tendons(**constants: object) -> Arm:
     plant.AddJoint(hinge)
     tip = AddFrame(plant, "tip", rod.body_frame(), [LENGTH, 0.0, 0.0])
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -GRAVITY])
-    cables, law = [], LAW._replace(**constants)
-    for name, place in {"left": LEFT, "right": RIGHT}.items():
-        anchor = AddFrame(plant, name, plant.world_frame(), place)
-        cables.append(Cable(name, anchor, tip, law))
+    places, law = {"left": LEFT, "right": RIGHT}, LAW._replace(**constants)
+    anchors = [AddFrame(plant, name, plant.world_frame(), place) for name, place in places.items()]
+    cables = [Cable(anchor.name(), anchor, tip, law) for anchor in anchors]
     plant.Finalize()
     return builder, plant, tip, cables
 
 
 def simulated(diagram: Diagram, time: float) -> Simulator:
     simulator = Simulator(diagram)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3)
-    simulator.get_mutable_integrator().set_target_accuracy(1e-8)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3).set_target_accuracy(1e-8)
     simulator.AdvanceTo(time)
     return simulator
 
@@ -69,8 +67,7 @@ def simulated(diagram: Diagram, time: float) -> Simulator:
 def state_at(diagram: Diagram, time: float) -> np.ndarray:
     plant = diagram.GetSubsystemByName("plant")
     root = simulated(diagram, time).get_context()
-    state: np.ndarray = plant.GetPositionsAndVelocities(plant.GetMyContextFromRoot(root))
-    return state
+    return plant.GetPositionsAndVelocities(plant.GetMyContextFromRoot(root))
 
 
 def test_an_arm_comes_to_rest_where_two_tendons_balance_its_weight():
@@ -147,19 +144,15 @@ def test_a_winch_without_limits_pulls_an_arm_as_a_force_does():
     assert angle(WINCH) == pytest.approx(angle(None), abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("given", "key", "fact"),
-    [
-        ({"actuated": {"pull": ["rigth"]}}, "actuated.pull", "'right'"),
-        ({"actuated": {"a": ["left"], "b": ["left"]}}, "actuated.b", "'left'"),
-        ({"actuation": 3}, "actuation", "3"),
-        ({"drives": [0.1]}, "drives", "0.1"),
-        ({"actuated": {"a": ["left"]}, "actuation": WINCH, "drives": [1, 2]}, "drives", "1"),
-        ({"scene_graph": SceneGraph()}, "scene_graph", "builder"),
-        ({"name": "plant"}, "name", "plant"),
-        ({"plant": MultibodyPlant(0.0)}, "plant", "builder"),
-    ],
-)
+BAD = [({"actuated": {"pull": ["rigth"]}}, "actuated.pull", "'right'")]
+BAD += [({"actuated": {"a": ["left"], "b": ["left"]}}, "actuated.b", "'left'")]
+BAD += [({"actuation": 3}, "actuation", "3"), ({"drives": [0.1]}, "drives", "0.1")]
+BAD += [({"actuated": {"a": ["left"]}, "actuation": WINCH, "drives": [1, 2]}, "drives", "1")]
+BAD += [({"scene_graph": SceneGraph()}, "scene_graph", "builder")]
+BAD += [({"name": "plant"}, "name", "plant"), ({"plant": MultibodyPlant(0.0)}, "plant", "builder")]
+
+
+@pytest.mark.parametrize(("given", "key", "fact"), BAD)
 def test_arguments_that_do_not_fit_are_refused(given, key, fact, refused):
     builder, plant, _, cables = rod_with_tendons()
     with refused("AddCables", key, fact):
@@ -240,8 +233,7 @@ def test_forces_add_to_what_is_connected_to_the_plant():
 def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-    inertia = SpatialInertia.SolidSphereWithMass(1.0, 0.1)
-    ball = plant.AddRigidBody("ball", inertia)
+    ball = plant.AddRigidBody("ball", SpatialInertia.SolidSphereWithMass(1.0, 0.1))
     plant.Finalize()
     plant.SetDefaultFloatingBaseBodyPose(ball, RigidTransform([0.0, 0.0, 1.0]))
     cable = Cable("cable", plant.world_frame(), ball.body_frame(), LAW)
@@ -251,8 +243,7 @@ def test_shown_pieces_cover_a_cable_of_any_length_from_end_to_end():
     for height in (0.5, 1.0, 1.5):
         place = RigidTransform([0.0, 0.0, height])
         plant.SetFreeBodyPose(plant.GetMyMutableContextFromRoot(root), ball, place)
-        context = scene_graph.GetMyContextFromRoot(root)
-        query = scene_graph.get_query_output_port().Eval(context)
+        query = scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(root))
         inspector = query.inspector()
         pieces = inspector.GetAllGeometryIds()
         middles = np.sort([query.GetPoseInWorld(piece).translation()[2] for piece in pieces])

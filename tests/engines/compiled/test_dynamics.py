@@ -58,22 +58,13 @@ def disturbed_robot(scenario: Scenario) -> tuple[Model, np.ndarray, np.ndarray]:
 
 
 ROUND_FEET = {"robot.struts.bar.contact_radius": "8 mm"}
+ROBOTS = [("thesis", {"robot.tetrahedra": count}) for count in (2, 5, 8)]
+ROBOTS += [("prism", {}), ("six_bar", ROUND_FEET), ("mast", {})]
+ROUGH = {"terrain": Rough(amplitude=1e-4, wavelength=0.03), "friction": Coulomb()}
 
 
-@pytest.mark.parametrize(
-    ("name", "changes"),
-    [
-        ("thesis", {}),
-        ("thesis", {"robot.tetrahedra": 2}),
-        ("thesis", {"robot.tetrahedra": 8}),
-        ("prism", {}),
-        ("six_bar", ROUND_FEET),
-        ("mast", {}),
-    ],
-)
-@pytest.mark.parametrize(
-    "ground", [{}, {"terrain": Rough(amplitude=1e-4, wavelength=0.03), "friction": Coulomb()}]
-)
+@pytest.mark.parametrize(("name", "changes"), ROBOTS)
+@pytest.mark.parametrize("ground", [{}, ROUGH])
 def test_accelerations_are_those_of_the_diagram(name, changes, ground):
     scenario = load_scenario(name).with_changes(changes | ground)
     robot, state, modes = disturbed_robot(scenario)
@@ -118,18 +109,11 @@ RESET = ResetIntegrator(
     stiction_range=1e-4, stiction_damping=70.0, stiction_switch=0.7, proportional_stiction=0.0
 )
 STUCK = Coulomb(static=50.0)
+GROUNDS = [("thesis", Flat(), RESET), ("thesis", UNEVEN, STUCK), ("six_bar", UNEVEN, RESET)]
+GROUNDS += [("mast", Flat(), STUCK), ("held", None, None)]
 
 
-@pytest.mark.parametrize(
-    ("name", "terrain", "friction"),
-    [
-        ("thesis", Flat(), RESET),
-        ("thesis", UNEVEN, STUCK),
-        ("six_bar", UNEVEN, RESET),
-        ("mast", Flat(), STUCK),
-        ("held", None, None),
-    ],
-)
+@pytest.mark.parametrize(("name", "terrain", "friction"), GROUNDS)
 def test_the_implicit_matrix_is_the_derivative_of_the_forces(name, terrain, friction):
     # With stiffness left out (it enters squared in time) and the small dependence of bristles
     # on speed switched off, d force / d velocity is minus the damping matrix. (A limit of Coulomb

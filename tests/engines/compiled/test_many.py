@@ -50,6 +50,7 @@ FINER |= {"friction": Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)}
 TOUCHING = {"strut_contact": HuntCrossley(stiffness=1e4, dissipation=1.0)}
 TOUCHING |= {"robot.strut_diameter": "13 mm", "cpg.gain": "10 lbf"}
 SOFT = TOUCHING | {"strut_contact": HuntCrossley(stiffness=3e3, dissipation=0.0)}
+THINNER = TOUCHING | {"robot.strut_diameter": "12 mm"}
 LIMITS = [(70.0, 0.5, 0.02), (5.0, 0.1, 0.1), (4.0, 0.3, 0.5e-3)]
 """Force (N), speed (m/s) and time constant (s) of actuators."""
 
@@ -57,19 +58,13 @@ GOES, FAILS, ENDS = SimulationResult, Diverged, StepBudgetExceeded
 NEIGHBOURS = {
     "strength": [({}, GOES), (FAR_TOO_STRONG, FAILS), ({}, GOES), (TOO_STRONG, ENDS)],
     # They touch, each by a law of its own.
-    "struts": [
-        (TOUCHING | {"robot.strut_diameter": "12 mm"}, GOES),
-        (TOUCHING, GOES),
-        (SOFT, GOES),
-    ],
+    "struts": [(THINNER, GOES), (TOUCHING, GOES), (SOFT, GOES)],
     # Each lane has a grid of its own size, and constants of its own.
     "ground": [(FINER, GOES), (ROUGH, GOES), (ROUGH | FAR_TOO_STRONG, FAILS)],
 }
 for kind in (Winch, TensionMotor):
-    NEIGHBOURS[kind.__name__] = [
-        ({"actuation": kind(max_force=f, max_speed=v, time_constant=tau)}, GOES)
-        for f, v, tau in LIMITS
-    ]
+    actuators = (kind(max_force=f, max_speed=v, time_constant=tau) for f, v, tau in LIMITS)
+    NEIGHBOURS[kind.__name__] = [({"actuation": each}, GOES) for each in actuators]
 """Changes of scenarios that walk side by side, and how they end."""
 
 
@@ -87,8 +82,7 @@ def endings(walks: list[Prepared]) -> list[Ending]:
     """Outcomes and motions in an engine whose lanes take the next gait when one has ended."""
     widest = max(walks, key=lambda walk: walk.robot.ground.heights.size)
     engine = LaneEngine(widest)
-    waiting, found = list(enumerate(walks)), dict[int, Ending]()
-    in_place = dict[int, int]()
+    waiting, found, in_place = list(enumerate(walks)), dict[int, Ending](), dict[int, int]()
     while waiting or in_place:
         for place in engine.idle[: len(waiting)]:
             in_place[place], walk = waiting.pop(0)
@@ -103,9 +97,9 @@ def endings(walks: list[Prepared]) -> list[Ending]:
     return [found[i] for i in range(len(walks))]
 
 
-def prepared(scenario: Scenario, seed: int = 0) -> Prepared:
+def prepared(robot: Robot, seed: int = 0) -> Prepared:
     """A seeded gait to be recorded."""
-    return Prepared.of(GaitSimulation(Robot.of(scenario), seeded_gait(scenario, seed), record=True))
+    return Prepared.of(GaitSimulation(robot, seeded_gait(robot.scenario, seed), record=True))
 
 
 def same(a: Ending, b: Ending) -> bool:
@@ -123,11 +117,7 @@ def same(a: Ending, b: Ending) -> bool:
 def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, name):
     changes, expected = zip(*NEIGHBOURS[name], strict=True)
     robots = [Robot.of(short.with_changes(change)) for change in changes]
-    gaits = [seeded_gait(short, i) for i in range(11)]
-    walks = [
-        Prepared.of(GaitSimulation(robots[i % len(robots)], gait, record=True))
-        for i, gait in enumerate(gaits)
-    ]
+    walks = [prepared(robots[i % len(robots)], i) for i in range(11)]
     alone = [endings([walk])[0] for walk in walks]
     assert tuple(type(outcome) for outcome, _ in alone[: len(robots)]) == expected
     assert not any(same(one, other) for one, other in itertools.pairwise(alone))
@@ -184,21 +174,21 @@ def test_every_gait_may_have_a_scenario_of_its_own(short, workers):
 def test_robots_that_differ_in_numbers_alone_share_an_engine(short):
     """Else disturbed robots would walk one after another. Where tables are indexed otherwise, a
     robot needs an engine of its own."""
-    engine = LaneEngine(prepared(short))
+    engine = LaneEngine(prepared(Robot.of(short)))
     stiff = {"robot.cables.outer_stiffness": "0.21 lbf/in", "robot.cables.damping": "0.04 lbf*s/in"}
     wide = {"robot.spacing": "3 in", "ground.stiffness": "20 lbf/in"}
     moved = {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}
     for change in (stiff, wide, moved):
-        assert engine.accepts(prepared(short.with_changes(change))), change
+        assert engine.accepts(prepared(Robot.of(short.with_changes(change)))), change
     sides = [["outer bottom_left"], ["outer bottom_right"]]
     others = {"tetrahedra": 3, "cables.slack": True, "contacts": "all", "actuation": sides}
     for change in ({f"robot.{key}": value} for key, value in others.items()):
-        assert not engine.accepts(prepared(short.with_changes(change))), change
+        assert not engine.accepts(prepared(Robot.of(short.with_changes(change)))), change
 
 
 def test_a_table_of_indices_that_somebody_adds_is_part_of_the_kind(short):
     """Else a kernel would take a robot whose indices lead elsewhere in its tables."""
-    walk = prepared(short)
+    walk = prepared(Robot.of(short))
 
     class Added(NamedTuple):
         solver: object

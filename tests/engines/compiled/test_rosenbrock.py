@@ -51,11 +51,8 @@ class FrozenStepper(Stepper):
 def stepper(scenario: Scenario) -> FrozenStepper:
     # With a fortieth of the damping of cables and ground: the stiffer an equation, the shorter the
     # steps from which on a method shows its order.
-    soft = {
-        "robot.cables.damping": "0.2 N*s/m",
-        "friction.stiction_damping": "2.0 N*s/m",
-        "ground.damping": "5e3 N*s/m^2",
-    }
+    soft = {"robot.cables.damping": "0.2 N*s/m", "friction.stiction_damping": "2.0 N*s/m"}
+    soft["ground.damping"] = "5e3 N*s/m^2"
     soft["ground.stiffness"] = "200 N/m"  # so that the weight keeps the nodes in the ground
     return FrozenStepper(scenario.with_changes(soft))
 
