@@ -86,11 +86,9 @@ def test_the_commands_run(work: Path) -> None:
 @pytest.fixture
 def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     """All scenarios end after a second."""
-    loaded = td.load_scenario
-    short = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
-    monkeypatch.setattr(
-        td, "load_scenario", lambda name: loaded(name).with_changes(short), raising=False
-    )
+    load = td.load_scenario
+    times = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
+    monkeypatch.setattr(td, "load_scenario", lambda n: load(n).with_changes(times), raising=False)
 
 
 def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.MonkeyPatch) -> None:
