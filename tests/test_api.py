@@ -131,8 +131,7 @@ def test_an_argument_that_stands_for_nothing_is_named(call, named):
 def test_every_parameter_and_the_errors_are_described(name: str) -> None:
     function = getattr(td, name)
     about = (inspect.getdoc(function) or "").partition("\nArgs:\n")[2]
-    parameters, _, errors = about.partition("\nRaises:\n")
-    assert re.findall(r"^    (\w+): \S", parameters, re.M) == [
-        *inspect.signature(function).parameters
-    ]
+    given, _, errors = about.partition("\nRaises:\n")
+    described = re.findall(r"^    (\w+): \S", given, re.M)
+    assert described == [*inspect.signature(function).parameters]
     assert "InputError: " in errors or name == "prepare", "it has no input"

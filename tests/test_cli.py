@@ -82,9 +82,7 @@ def refusal(command, capsys):
         ("structure six_baer", ": six_baer", "'six_bar'?"),
     ],
 )
-def test_wrong_options_and_files_are_refused_in_one_line(
-    command, source, values, unchanged, capsys
-):
+def test_wrong_options_and_files_are_refused_in_a_line(command, source, values, unchanged, capsys):
     line = refusal(command, capsys)
     assert line.startswith(f"tetra-drake{source}: ")
     assert all(value in line for value in values.split()), line

@@ -205,9 +205,8 @@ def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeyp
         tetra_drake.evolve(None, tmp_path / "run", resume=True, **QUICK)
 
 
-def test_what_hardly_acts_or_sinks_is_named_at_the_start_and_what_has_no_diagram_at_the_end(
-    tiny, tmp_path, reports, monkeypatch
-):
+def test_what_hardly_acts_sinks_or_has_no_diagram_is_named(tiny, tmp_path, reports, monkeypatch):
+    """The first two at the start, the last at the end."""
     monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
     progress, out = MagicMock(spec=Progress), tmp_path / "run"
     changes = {"simulation.duration": "3000 s", "cpg.gain": "0.1 N", "ground.stiffness": "20 N/m"}
@@ -239,18 +238,13 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
         assert evolve("--out", out, "--resume", *options) == 0
         assert read_record(out) == whole
     assert capsys.readouterr().err == ""
-    for option, value, key in (
-        ("--trials", 2, "evolution.trials"),
-        ("--scenario", "thesis", "simulation.duration"),
-        ("--seed", 1, "seed"),
-    ):
-        assert evolve("--out", out, "--resume", option, value) == 2
+    keys = {"--trials=2": "evolution.trials", "--scenario=thesis": "simulation.duration"}
+    for option, key in (keys | {"--seed=1": "seed"}).items():
+        assert evolve("--out", out, "--resume", option) == 2
         assert capsys.readouterr().err.startswith(f"tetra-drake: {out}: {key}: ")
 
 
-def test_an_interrupted_run_says_how_to_continue(
-    evolve, tmp_path, capsys, monkeypatch, interrupting
-):
+def test_an_interrupted_run_says_how_to_go_on(evolve, tmp_path, capsys, monkeypatch, interrupting):
     out = tmp_path / "my run"
     broken = OnExecutor(evaluate=Bowl(), make=interrupting, workers=1)
     interrupting.left = 17

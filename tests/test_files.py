@@ -81,10 +81,8 @@ def test_a_device_is_not_replaced_by_a_file(tmp_path, refused):
 
 def test_what_a_killed_writer_left_is_removed_by_the_next_but_not_that_of_a_living_one(tmp_path):
     program = (
-        "import os, signal, sys\n"
-        "from tetra_drake.files import whole_file\n"
-        "with whole_file(sys.argv[1]) as temporary:\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "import os, signal, sys\nfrom tetra_drake.files import whole_file\n"
+        "with whole_file(sys.argv[1]):\n    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     file = tmp_path / "a [1].svg"
     killed = subprocess.run([sys.executable, "-c", program, file])

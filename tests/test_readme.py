@@ -86,11 +86,9 @@ def test_the_commands_run(work: Path) -> None:
 @pytest.fixture
 def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     """All scenarios end after a second."""
-    loaded = td.load_scenario
-    short = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
-    monkeypatch.setattr(
-        td, "load_scenario", lambda name: loaded(name).with_changes(short), raising=False
-    )
+    load = td.load_scenario
+    times = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
+    monkeypatch.setattr(td, "load_scenario", lambda n: load(n).with_changes(times), raising=False)
 
 
 def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,9 +101,7 @@ def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("library", "number"), [("optuna", 1), ("nevergrad", 2), ("scipy", 3), ("ribs", 4)]
 )
-def test_other_libraries_find_gaits(
-    library: str, number: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_libraries_find_gaits(library: str, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip(library)
     short = td.load_scenario("coulomb").with_changes({"simulation.duration": "4 s"})
     monkeypatch.setattr(td, "load_scenario", lambda name: short, raising=False)
@@ -129,9 +125,7 @@ def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: 
     assert tonic[:4] == pytest.approx([0.9, 0.9, 0.1, 0.1], rel=1e-12)
 
 
-def test_a_structure_is_wound_up_to_its_rest_with_shorter_cables(
-    work: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_winches_wind_a_structure_to_its_rest(work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Without ground, because friction holds feet where they are: 1 mm beside the rest.
     floats = {"robot.gravity": "0 m/s^2", "terrain": "!Nothing"}
     floating = td.load_scenario("six_bar").with_changes(floats)

@@ -37,9 +37,8 @@ def test_below_the_coefficient_it_stays():
     assert abs(motion.velocity[-1]) < 1e-6 * incline.creep_speed(scenario)
     assert motion.friction_ratio[-1] == pytest.approx(math.tan(incline.GENTLE), rel=1e-6)
     # Rigid, so that the nodes move alike but for its tilt: each bears a third, whatever its load.
-    np.testing.assert_allclose(
-        motion.friction_forces[-1, :, 0], incline.parts_of_weight(scenario)[0] / 3.0, rtol=2e-5
-    )
+    third = incline.parts_of_weight(scenario)[0] / 3.0
+    np.testing.assert_allclose(motion.friction_forces[-1, :, 0], third, rtol=2e-5)
 
 
 def test_without_stiffness_it_creeps():

@@ -16,7 +16,6 @@ from helpers import analytic
 from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.evolution.evaluators import OnExecutor, evaluate_all
-from tetra_drake.robot.gait import ParameterSpace
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
 
@@ -33,12 +32,6 @@ def cluster(one_cluster):
     with distributed.Client(one_cluster) as client:
         client.wait_for_workers(2)
     return one_cluster
-
-
-@pytest.fixture
-def tasks(scenario):
-    generator, space = np.random.default_rng(2), ParameterSpace.of(scenario)
-    return analytic.tasks_of(space.random(generator) for _ in range(15))
 
 
 @pytest.mark.slow

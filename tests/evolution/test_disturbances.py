@@ -114,12 +114,12 @@ def beside_a_step(scenario):
     return scenario.with_changes({"terrain": step, "disturbances.start": 0.3})
 
 
+def out_of_steps(scenario):
+    return scenario.with_changes({"simulation.max_evaluations": 50})
+
+
 @pytest.mark.parametrize(
-    ("change", "kind"),
-    [
-        (beside_a_step, "no start"),
-        (lambda tiny: tiny.with_changes({"simulation.max_evaluations": 50}), "step budget"),
-    ],
+    ("change", "kind"), [(beside_a_step, "no start"), (out_of_steps, "step budget")]
 )
 def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, kind):
     scenario = change(tiny)

@@ -6,20 +6,12 @@ import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
-import numpy as np
 import pytest
 from helpers import analytic
 
 from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
 from tetra_drake.evolution.run import load_run
-from tetra_drake.robot.gait import ParameterSpace
-
-
-@pytest.fixture
-def tasks(scenario):
-    generator, space = np.random.default_rng(5), ParameterSpace.of(scenario)
-    return analytic.tasks_of(space.random(generator) for _ in range(10))
 
 
 def on_processes(evaluate, workers):
@@ -28,9 +20,7 @@ def on_processes(evaluate, workers):
 
 
 @pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
-def test_every_task_is_evaluated_also_when_workers_are_recycled_or_die(
-    tasks, tmp_path, monkeypatch, make, once
-):
+def test_every_task_is_evaluated_though_workers_end(tasks, tmp_path, monkeypatch, make, once):
     monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 4)
     with make(analytic.Dying(tmp_path, once=once), 2) as evaluator:
         evaluations = analytic.evaluated(evaluator, tasks)

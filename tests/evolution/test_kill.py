@@ -64,9 +64,8 @@ def uninterrupted(tmp_path_factory):
         pytest.param("processes", signal.SIGTERM, 1, 0.8, marks=pytest.mark.slow),
     ],
 )
-def test_a_killed_run_ends_alike_and_leaves_no_process(
-    tmp_path, uninterrupted, executor, sign, kills, longest
-):
+def test_killed_runs_resume_and_end_alike(tmp_path, uninterrupted, executor, sign, kills, longest):
+    """And leave no process."""
     moments = np.random.default_rng().uniform(0.0, longest, kills)
     options = {"sign": sign, "delay": 0.04}
     hits = sum(run_and_kill(tmp_path, executor, after=after, **options) != 0 for after in moments)

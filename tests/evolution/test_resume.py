@@ -8,13 +8,8 @@ from helpers.analytic import Bowl, read_record, record_run, small_scenario
 from tetra_drake.optimizers import quality_diversity
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
 
-OPTIMIZERS = [
-    SteadyState(population=8),
-    CmaEs(sample=0),
-    CmaEs(sample=8, starts=1, population=4),
-    RandomSearch(),
-    QualityDiversity(),
-]
+LEARNING = [CmaEs(sample=0), CmaEs(sample=8, starts=1, population=4)]
+OPTIMIZERS = [*LEARNING, SteadyState(population=8), RandomSearch(), QualityDiversity()]
 
 
 class Counted:

@@ -98,9 +98,7 @@ def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(
     assert run.initial()["index"].tolist() == [0, 1, 2, 3, 0]
 
 
-def test_the_record_says_what_the_run_said_at_its_end_and_the_best_gait_is_saved(
-    tmp_path, scenario
-):
+def test_the_record_says_what_the_run_said_at_its_end_and_best_gaits_are_saved(tmp_path, scenario):
     ended = record_run(tmp_path / "run", small_scenario(), evaluate=Bowl(delay=0.001))
     recorded = load_run(tmp_path / "run").statuses
     for ours, theirs in zip(recorded, ended, strict=True):

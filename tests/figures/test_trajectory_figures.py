@@ -25,13 +25,8 @@ from tetra_drake.scenario.robot_tetrahedra import STRUTS
 from tetra_drake.scenario.terrain_kinds import Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
-DOWNSTAIRS = {
-    "robot.contacts": "all",
-    "friction": Coulomb(),
-    "terrain": Steps(height=-INCH, depth=6.0 * INCH, count=9),
-}
-
-
+STAIRS = Steps(height=-INCH, depth=6.0 * INCH, count=9)
+DOWNSTAIRS = {"robot.contacts": "all", "friction": Coulomb(), "terrain": STAIRS}
 ROW = make_row()
 
 
@@ -117,8 +112,8 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
     assert panel.get_aspect() == 1.0
     path, start, end = panel.lines
     np.testing.assert_allclose(path.get_xydata() * INCH, np.column_stack([x, y]), atol=1e-12)
-    assert start.get_xydata().tolist() == path.get_xydata()[:1].tolist()
-    assert end.get_xydata().tolist() == path.get_xydata()[-1:].tolist()
+    ends = np.concatenate([start.get_xydata(), end.get_xydata()])
+    np.testing.assert_array_equal(ends, path.get_xydata()[[0, -1]])
     [arrows] = panel.collections
     headings = np.arctan2(arrows.V, arrows.U)
     np.testing.assert_allclose(headings, angle[[0, 300, 600, 900]], atol=1e-9)

@@ -94,14 +94,10 @@ def small_scenario(
     *, oscillators: int = 4, population: int = 12, iterations: int = 15, trials: int = 2
 ) -> Scenario:
     """The thesis with little to do."""
-    return load_scenario("thesis").with_changes(
-        {
-            "robot.tetrahedra": oscillators + 1,
-            "optimizer.population": population,
-            "evolution.evaluations": population + CHILDREN * iterations,
-            "evolution.trials": trials,
-        }
-    )
+    evaluations = population + CHILDREN * iterations
+    changes = {"robot.tetrahedra": oscillators + 1, "optimizer.population": population}
+    changes |= {"evolution.evaluations": evaluations, "evolution.trials": trials}
+    return load_scenario("thesis").with_changes(changes)
 
 
 def drawn_scenario(**options) -> Scenario:
@@ -150,16 +146,12 @@ def record_run(
 def read_record(directory: Path) -> dict[str, object]:
     """All files of a run, wall times taken out, by their names."""
     record: dict[str, object] = {}
-    for path in sorted(directory.rglob("*")):
-        if path.is_dir():
-            continue
+    for path in sorted(path for path in directory.rglob("*") if path.is_file()):
         name = str(path.relative_to(directory))
         record[name] = path.read_bytes()
         if path.name == "evaluations.jsonl":
-            entries = [json.loads(line) for line in path.read_text().splitlines()]
-            for entry in entries:
-                del entry["wall_time_s"], entry["crc"]
-            record[name] = [json.dumps(entry) for entry in entries]
+            varying, lines = {"wall_time_s": 0.0, "crc": ""}, path.read_text().splitlines()
+            record[name] = [json.dumps(json.loads(line) | varying) for line in lines]
     return record
 
 

@@ -13,13 +13,8 @@ from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.strut_contact_kinds import NoStrutContact
 from tetra_drake.scenario.terrain_kinds import Nothing
 
-BAR = {
-    "pairs": [["a", "b"]],
-    "diameter": 0.008,
-    "density": 1200.0,
-    "node_diameter": 0.0,
-    "contact_radius": 0.0,
-}
+BAR: dict[str, Any] = {"pairs": [["a", "b"]], "diameter": 0.008, "density": 1200.0}
+BAR |= {"node_diameter": 0.0, "contact_radius": 0.0}
 LINE = {"pairs": [["top", "a"]], "stiffness": 200.0, "damping": 0.0, "free_length": 0.4}
 
 HUNG: dict[str, Any] = {

@@ -12,9 +12,6 @@ CONVERGED: dict[str, Drake | Compiled] = {
 
 def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
     """A short simulation, driven from the start; `cpg__reach=1` changes cpg.reach."""
-    times = {
-        "simulation.duration": f"{duration} s",
-        "simulation.steady_from": f"{0.5 * duration} s",
-    }
+    times = {"simulation.duration": f"{duration} s", "simulation.steady_from": f"{duration / 2} s"}
     given = {key.replace("__", "."): value for key, value in changes.items()}
     return scenario.with_changes({**times, "cpg.start_up": 0.0, **given})

@@ -22,12 +22,10 @@ def make_row(bodies: int = 5, changes: dict[str, Any] | None = None) -> Robot:
     return Robot.of(scenario.with_changes(changes or {}))
 
 
-def make_walk(
-    *, bodies: int = 5, duration: float = 9.0, changes: dict[str, Any] | None = None
-) -> xarray.Dataset:
+def make_walk(*, bodies: int = 5, duration: float = 9.0) -> xarray.Dataset:
     """Tetrahedra that move on at SPEED; T1, T3 ... are lifted in the first half of each PERIOD
     and T2, T4 ... in the second. The tip of the lead never touches the ground."""
-    robot = make_row(bodies, changes)
+    robot = make_row(bodies)
     structure = robot.structure
     times = np.linspace(0.0, duration, round(duration / 0.01) + 1)
     phase = 2.0 * np.pi * times / PERIOD

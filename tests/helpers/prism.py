@@ -37,7 +37,6 @@ def slide_prism(robot: Robot, *, duration: float = 8.0) -> xarray.Dataset:
     signals = np.sin(2.0 * np.pi / PERIOD * times[:, np.newaxis] - np.arange(3))
     modes = np.zeros((len(times), 6, MODE_COLUMNS))
     drives = np.zeros((len(times), 0))
-    weights = np.array([0.2, 0.0, 0.2, 0.0, 0.2, 0.0])
     ground_forces = np.zeros((len(times), 6, 3))
-    ground_forces[..., 2] = weights
+    ground_forces[..., 2] = [0.2, 0.0, 0.2, 0.0, 0.2, 0.0]
     return make_dataset(robot, Motion(times, states, signals, modes, drives, ground_forces))

@@ -25,9 +25,8 @@ ALL = [*BUDGETED, SteadyState()]
 @pytest.fixture(autouse=True)
 def a_small_map_of_the_bowl(monkeypatch):
     """Few emitters, small batches, and a map of what is far below 0."""
-    monkeypatch.setattr(quality_diversity, "EMITTERS", 2)
-    monkeypatch.setattr(quality_diversity, "BATCH", 10)
-    monkeypatch.setattr(quality_diversity, "FLOOR", FLOOR)
+    for name, value in (("EMITTERS", 2), ("BATCH", 10), ("FLOOR", FLOOR)):
+        monkeypatch.setattr(quality_diversity, name, value)
 
 
 def make(kind, *, seed=3, budget=600, **changes):
@@ -193,11 +192,10 @@ def test_where_a_search_has_stalled_another_begins_elsewhere(monkeypatch):
 
     kind = CmaEs(population=10, sample=0, starts=1)
     _, iterations = run(kind, lambda vector: Evaluation(1.0), budget=400)
-    sizes = [[], [], []]
-    for report in (iteration.report for iteration in iterations[:-1]):
-        sizes[report["start"]].append(report["population"])
+    reports = [iteration.report for iteration in iterations[:-1]]
     # The first batch sets the level. After 80 more without a rise, the next search begins.
-    for first, *later in sizes[:2]:
+    for start in (0, 1):
+        first, *later = (each["population"] for each in reports if each["start"] == start)
         assert first == 10 and sum(later) >= 80 > sum(later[:-1])
     assert iterations[-1].report["start"] == 2
     _, iterations = run(kind, budget=300)  # the bowl: it rises

@@ -114,16 +114,14 @@ def test_one_iteration_as_the_listing_goes_through_it():
         [1, 2, 2],  # places: the tournament of child 1
         [0, 1, 1],  # of child 2
     )
-    first = population[select_parent(fitnesses, tournament=3, generator=script)]
-    second = population[select_parent(fitnesses, tournament=3, generator=script)]
-    np.testing.assert_array_equal([first, second], population[[2, 1]])
-    first, second = cross_over(first, second, probability=0.2, generator=script)
-    np.testing.assert_array_equal(first, [1.5, 0.1, 0.21, 1.00])
-    np.testing.assert_array_equal(second, [3.0, 2.5, 0.50, 0.42])
+    parents = [select_parent(fitnesses, tournament=3, generator=script) for _ in range(2)]
+    assert parents == [2, 1]
+    children = cross_over(*population[parents], probability=0.2, generator=script)
+    np.testing.assert_array_equal(children, [[1.5, 0.1, 0.21, 1.00], [3.0, 2.5, 0.50, 0.42]])
     steps, floors = np.array([0.2, 0.2, 0.05, 0.1]), np.array([0.0, 0.0, 0.2, 0.4])
     row = draw_mutation(steps, probability=0.7, generator=script)
     np.testing.assert_allclose(row, [0.1, -0.2, -0.04, 0.0])
-    mutants = [mutate(child, mutation=row, floors=floors) for child in (first, second)]
+    mutants = [mutate(child, mutation=row, floors=floors) for child in children]
     # Child 1: weight 2 would be negative and tau below 0.2, so both stay.
     np.testing.assert_allclose(mutants, [[1.6, 0.1, 0.21, 1.00], [3.1, 2.3, 0.46, 0.42]])
 

@@ -89,9 +89,7 @@ def test_times_may_be_uneven_by_a_twentieth(robot, late, is_even, load, refused)
 
 
 @pytest.mark.parametrize(("share", "is_enough"), [(0.955, True), (0.945, False), (0.0, False)])
-def test_samples_may_be_a_twentieth_closer_than_the_signals(
-    robot, scenario, share, is_enough, load, refused
-):
+def test_samples_are_hardly_denser_than_signals(robot, scenario, share, is_enough, load, refused):
     period = share * scenario.cpg.listing_step
     text = command_text(robot, Command("dense", period, np.zeros((5, 8))))
     rows = text.splitlines()

@@ -71,9 +71,7 @@ def test_missing_and_damaged_files_are_refused_by_name(folder, name, damage):
     ],
     ids=["robot", "missing", "nan", "backward"],
 )
-def test_another_trajectory_than_the_scenarios_is_refused(
-    folder, result, key, change, refused, monkeypatch
-):
+def test_an_unfitting_trajectory_is_refused(folder, result, key, change, refused, monkeypatch):
     changed = change(result.trajectory)
     monkeypatch.setattr(xarray, "load_dataset", lambda path, engine: changed)
     with refused(folder / "trajectory.nc", key, ""):

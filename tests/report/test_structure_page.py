@@ -10,7 +10,6 @@ from tetra_drake.report.structure_page import robot_of_file, structure_text
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain_kinds import Nothing
 from tetra_drake.scenario.units import units_for
 
 BEAM = """
@@ -41,9 +40,7 @@ def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path, result
     assert "would bear it" not in structure_text(study_equilibrium(robot_of_file("prism")))
     assert told in result_text(dataclasses.replace(result, robot=study.robot))
     assert "would bear it" not in result_text(result)
-    floating = (
-        load_scenario(file).with_sections(terrain=Nothing()).with_numbers({"robot.gravity": 0.0})
-    )
+    floating = load_scenario(file).with_changes({"terrain": "!Nothing", "robot.gravity": 0.0})
     assert not Robot.of(floating).sinking_remark()
 
 

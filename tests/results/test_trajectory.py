@@ -69,9 +69,7 @@ def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Datas
     assert (inner.cable_bodies.item(), inner.cable_group.item()) == ("T1-T2", "inner")
 
 
-def test_forces_belong_to_the_recorded_states(
-    trajectory: xarray.Dataset, structure: Structure
-) -> None:
+def test_forces_are_those_of_the_states(trajectory: xarray.Dataset, structure: Structure) -> None:
     assert (trajectory.signal.sel(time=slice(0.0, 1.2)) == 0.0).all()
     assert (abs(trajectory.signal.sel(time=slice(1.3, 2.0))) > 0.0).any()
     # Normal force only where a node is below the ground, friction only in contact (modes are
@@ -117,9 +115,7 @@ def test_several_names_of_several_cables_each_are_selected() -> None:
     assert bodies.size == tension.cable.size / 2 and all("T2-T3" in name for name in bodies.values)
 
 
-def test_what_is_saved_is_what_is_read_and_a_file_alone_says_what_was_simulated(
-    tmp_path: Path,
-) -> None:
+def test_what_is_saved_is_read_and_a_file_alone_says_what_was_simulated(tmp_path: Path) -> None:
     scenario = load_scenario("quick").with_changes(BRIEF | {"engine": "!Compiled"})
     result = simulate(scenario, seeded_gait(scenario), record=True)
     save_dataset(result.trajectory, tmp_path / "t.nc")

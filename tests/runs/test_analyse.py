@@ -30,10 +30,8 @@ def folder(tmp_path_factory):
 
 
 def distances(run, scenario):
-    return [
-        simulate(scenario=scenario, gait=run.gait(trial, index)).metrics.distance_in
-        for trial, index in ((0, 2), (2, 0))
-    ]
+    gaits = run.gait(0, 2), run.gait(2, 0)
+    return [simulate(scenario=scenario, gait=gait).metrics.distance_in for gait in gaits]
 
 
 def test_the_best_gait_of_each_trial_is_analysed(folder):
@@ -48,14 +46,12 @@ def test_the_best_gait_of_each_trial_is_analysed(folder):
 
 def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
     run, again = load_run(folder), analyse.load_analysis(folder).resimulations
-    scenario = run.scenario
-    settings = analyse.settings_of(scenario)
+    settings = analyse.settings_of(run.scenario)
     engines = {name: changed.engine_name for name, changed in settings.items()}
-    assert engines == {analyse.TIGHT: "drake", analyse.MUJOCO: "mujoco"} | dict.fromkeys(
-        analyse.LAWS, "compiled"
-    )
+    laws = dict.fromkeys(analyse.LAWS, "compiled")
+    assert engines == laws | {analyse.TIGHT: "drake", analyse.MUJOCO: "mujoco"}
     by_setting = again.groupby("setting")["distance_in"].apply(list)
-    assert by_setting["reset integrator"] == distances(run, scenario)
+    assert by_setting["reset integrator"] == distances(run, run.scenario)
     assert by_setting[analyse.TIGHT] == distances(run, settings[analyse.TIGHT])
     assert again["distance_in"].nunique() > 2
     assert set(analyse.settings_of(load_scenario("incline"))) == {analyse.TIGHT, analyse.MUJOCO}

@@ -60,9 +60,7 @@ def test_a_gait_that_goes_elsewhere_is_seen_and_last_digits_are_not(tiny, tmp_pa
         assert found.startswith("evaluation 0 goes ") if seen else found == ""
 
 
-def test_a_run_is_up_to_date_where_its_search_repeats_it_told_the_recorded_fitnesses(
-    tiny, monkeypatch
-):
+def test_a_run_is_up_to_date_if_its_search_repeats_it_told_the_recorded_fitness(tiny, monkeypatch):
     """So that its own do not lead it elsewhere, where they round in another way."""
     monkeypatch.setattr(GaitEvaluation, "_fitness", lambda self, result: 1.0)
     assert outdated.why_outdated("tiny", TINY, tiny) == ""

@@ -39,9 +39,8 @@ def test_a_policy_depends_on_the_shape_alone(best):
     robots = Simulation(rolling.rover(), count=1)
     policy = rolling.RollingPolicy.of(robots, np.array(best["coefficients"]))
     readings = robots.state.rows(0)
-    moved = readings._replace(
-        p_WN=readings.p_WN + np.array([3.0, -2.0, 0.5]), time=readings.time + 5.0 * rolling.PERIOD
-    )
+    shift, later = np.array([3.0, -2.0, 0.5]), readings.time + 5.0 * rolling.PERIOD
+    moved = readings._replace(p_WN=readings.p_WN + shift, time=later)
     lengths = policy(readings)
     assert np.ptp(lengths) > 0.01
     np.testing.assert_allclose(policy(moved), lengths, atol=1e-9)
