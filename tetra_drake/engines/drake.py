@@ -112,19 +112,13 @@ class _DiagramWalk:
 
     def result(self) -> SimulationResult:
         """The result, at the end."""
-        steps, derivative_evaluations, jacobian_evaluations = self._work.total()
+        accuracy = self._simulator.get_integrator().get_target_accuracy()
         return make_result(
             self._simulation.robot,
             self._simulation.gait,
             self._sampler.motion(),
             totals=self._observer.totals(),
-            work=IntegratorWork(
-                scheme=self._engine.scheme,
-                accuracy=self._simulator.get_integrator().get_target_accuracy(),
-                steps=steps,
-                derivative_evaluations=derivative_evaluations,
-                jacobian_evaluations=jacobian_evaluations,
-            ),
+            work=self._work.total(self._engine.scheme, accuracy),
             wall_time=self._wall_time,
             record=self._simulation.record,
         )
@@ -192,23 +186,24 @@ class _Work:
 
     def __init__(self, integrator: IntegratorBase) -> None:
         self._integrator = integrator
-        self._before = (0, 0, 0)
+        self._before = IntegratorWork(scheme="", accuracy=0.0, steps=0, derivative_evaluations=0)
 
-    def total(self) -> tuple[int, int, int]:
-        """Numbers of steps, derivative evaluations, and derivative evaluations for Jacobians, in
-        the whole simulation."""
-        statistics = dict(self._integrator.GetStatisticsSummary())
+    def total(self, scheme: str = "", accuracy: float = 0.0) -> IntegratorWork:
+        """The work in the whole simulation, with the settings."""
+        before, statistics = self._before, dict(self._integrator.GetStatisticsSummary())
         for_jacobian = int(statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0))
-        steps, _, jacobian = self._before
-        return (
-            steps + self._integrator.get_num_steps_taken(),
-            self.derivative_evaluations(),
-            jacobian + for_jacobian,
+        return IntegratorWork(
+            scheme=scheme,
+            accuracy=accuracy,
+            steps=before.steps + self._integrator.get_num_steps_taken(),
+            derivative_evaluations=self.derivative_evaluations(),
+            jacobian_evaluations=before.jacobian_evaluations + for_jacobian,
         )
 
     def derivative_evaluations(self) -> int:
         """Number of derivative evaluations of the whole simulation."""
-        return self._before[1] + self._integrator.get_num_derivative_evaluations()
+        earlier = self._before.derivative_evaluations
+        return earlier + self._integrator.get_num_derivative_evaluations()
 
     def keep(self) -> None:
         """Adds the integrator's work so far to the counter. Call it before the integrator is

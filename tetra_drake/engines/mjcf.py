@@ -49,6 +49,8 @@ _LEAST_FRICTION = 1e-5
 """Least coefficient of friction in MuJoCo. MJX has no contacts without friction (condim 1) beside
 elliptic cones."""
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
+_SOFT = {"condim": "3", "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1]}
+"""Settings of all contacts."""
 
 
 def check_mjcf(scenario: Scenario) -> None:
@@ -84,14 +86,18 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None, own_laws: bool = False
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
         _add_floor(world, robot)
-    _add_fixed_nodes(world, robot.structure)
+    structure = robot.structure
+    for node in range(structure.first_node[-1], len(structure.node_names)):  # fixed nodes
+        add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
     _add_bodies(model, world, robot)
     if rest is not None:
-        _add_key_frame(model, robot.structure, rest)
+        poses = rest[: 7 * len(structure.bodies)].reshape(-1, 7)
+        qpos = np.hstack([poses[:, 4:], poses[:, :4]])
+        add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
     if robot.model.strut_contact.acts and not own_laws:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
-    _add_pushes(model, world, robot.structure)
+    _add_pushes(model, world, structure)
     return xml_text(model)
 
 
@@ -132,12 +138,6 @@ def _add_floor(world: Element, robot: Robot) -> None:
     add_element(
         world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE
     )
-
-
-def _add_fixed_nodes(world: Element, structure: Structure) -> None:
-    """Adds a site of the world for each fixed node."""
-    for node in range(structure.first_node[-1], len(structure.node_names)):
-        add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
@@ -185,28 +185,21 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             add_element(body, "geom", **geom, rgba=STRUT_COLOUR, **_ALONE)
 
 
-def _add_key_frame(model: Element, structure: Structure, state: Array) -> None:
-    """Adds the key frame "rest" with the poses of a state."""
-    poses = state[: 7 * len(structure.bodies)].reshape(-1, 7)
-    qpos = np.hstack([poses[:, 4:], poses[:, :4]])
-    add_element(add_element(model, "keyframe"), "key", name="rest", qpos=qpos)
-
-
 def _contact(robot: Robot, mass: float) -> dict:
     """Contact settings for the floor and a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
-    borne = robot.weight / _feet(robot)
+    # Nodes that bear the weight are as in the blueprint, or in equilibrium.
+    borne = robot.weight / (robot.structure.feet or max(1, robot.equilibrium.feet))
     rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo's numbers are per mass, divided by 1 - impedance, and for friction multiplied by
     # impratio. Negative numbers mean stiffness and damping.
     per_mass = -(1.0 - _IMPEDANCE) / mass
     return {
-        "condim": "3",
+        **_SOFT,
         "friction": [cone.coefficient, cone.coefficient, 0, 0, 0],
         "solref": [ground.stiffness * per_mass, rest_damping * per_mass],
         "solreffriction": [ground.stiffness * per_mass, cone.damping * per_mass / _IMPRATIO],
-        "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
     }
 
 
@@ -217,25 +210,16 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
     normal = NormalForce(*robot.model.strut_contact.normal)
     model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
     bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
-    pairs = add_element(model, "contact")
+    pairs, friction = add_element(model, "contact"), [_LEAST_FRICTION, _LEAST_FRICTION, 0, 0, 0]
     for i, j in itertools.combinations(range(len(bodies)), 2):
         if bodies[i] == bodies[j]:
             continue
         per_mass = (1.0 / robot.structure.mass[bodies[[i, j]]]).sum()
         depth = 4.0 / (3.0 * math.pi) * _IMPACT_SPEED / math.sqrt(normal.stiffness * per_mass)
         scale = -(1.0 - _IMPEDANCE) * per_mass
-        contact = {
-            "condim": "3",
-            "friction": [_LEAST_FRICTION, _LEAST_FRICTION, 0, 0, 0],
-            "solref": [normal.stiffness * scale, normal.damping * depth * scale],
-            "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
-        }
-        add_element(pairs, "pair", geom1=f"strut {i}", geom2=f"strut {j}", **contact)
-
-
-def _feet(robot: Robot) -> int:
-    """Number of nodes that bear the weight: from the blueprint, or in equilibrium."""
-    return robot.structure.feet or max(1, robot.equilibrium.feet)
+        solref = [normal.stiffness * scale, normal.damping * depth * scale]
+        ends = {"geom1": f"strut {i}", "geom2": f"strut {j}"}
+        add_element(pairs, "pair", **ends, friction=friction, solref=solref, **_SOFT)
 
 
 def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:

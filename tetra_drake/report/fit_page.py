@@ -45,12 +45,8 @@ noise, there may be an interval."""
 
 def _page(fit: Fit) -> str:
     notes = "\n".join(f"- {note}" for note in fit.notes)
-    keys = [str(key) for key in fit.correlations]
-    cells = fit.correlations.to_numpy().tolist()
-    correlations = Table(
-        ["correlation", *keys],
-        [[key, *(fixed(each) for each in row)] for key, row in zip(keys, cells, strict=True)],
-    )
+    rows = [[str(key), *map(fixed, row)] for key, *row in fit.correlations.itertuples()]
+    correlations = Table(["correlation", *map(str, fit.correlations)], rows)
     return "\n\n".join(
         [
             f"# Fit of {fit.scenario.name}",

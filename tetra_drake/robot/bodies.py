@@ -26,25 +26,6 @@ def strut_pose(p_BA: np.ndarray, p_BC: np.ndarray) -> RigidTransform:
     return RigidTransform(RotationMatrix.MakeFromOneVector(p_BC - p_BA, 2), (p_BA + p_BC) / 2)
 
 
-def strut_inertia(
-    p_BA: np.ndarray, p_BC: np.ndarray, *, radius: float, density: float
-) -> SpatialInertia:
-    """Spatial inertia M_SBo_B of a strut from A to C, a solid cylinder."""
-    X_BS = strut_pose(p_BA, p_BC)
-    M_SSo_S = SpatialInertia.SolidCylinderWithDensity(
-        density=density,
-        radius=radius,
-        length=float(np.linalg.norm(p_BC - p_BA)),
-        unit_vector=[0.0, 0.0, 1.0],
-    )
-    return M_SSo_S.ReExpress(X_BS.rotation()).Shift(-X_BS.translation())
-
-
-def node_inertia(p_BN: np.ndarray, *, radius: float, density: float) -> SpatialInertia:
-    """Spatial inertia M_NBo_B of the sphere at a node."""
-    return SpatialInertia.SolidSphereWithDensity(density, radius).Shift(-p_BN)
-
-
 def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Masses (bodies,), centres of mass in the frames F of the blueprint (bodies, 3), and unit
     inertias (bodies, 6) as in Structure."""
@@ -54,7 +35,7 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
         parts = _parts(blueprint, first, end)
         key = tuple(part.tobytes() for part in parts)
         if key not in made:
-            made[key] = _body_inertia(*parts)
+            made[key] = _body_inertia(parts)
         inertias.append(made[key])
     empty = np.array([inertia.get_mass() for inertia in inertias])
     mass = empty + blueprint.payload  # a point mass at the centre of mass
@@ -63,7 +44,7 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def _parts(blueprint: Blueprint, first: int, end: int) -> tuple[np.ndarray, ...]:
-    """The arguments of _body_inertia() for the body with the nodes `first` to `end` - 1."""
+    """What _body_inertia() needs of the body with the nodes `first` to `end` - 1."""
     nodes, node_a = slice(first, end), blueprint.struts[:, 0]
     struts = (first <= node_a) & (node_a < end)
     return (
@@ -77,23 +58,19 @@ def _parts(blueprint: Blueprint, first: int, end: int) -> tuple[np.ndarray, ...]
     )
 
 
-def _body_inertia(
-    p_FN: np.ndarray,
-    struts: np.ndarray,
-    strut_radius: np.ndarray,
-    strut_density: np.ndarray,
-    node_radius: np.ndarray,
-    node_density: np.ndarray,
-    node_mass: np.ndarray,
-) -> SpatialInertia:
-    """Spatial inertia M_BFo_F of a body: struts, and spheres and point masses at its nodes."""
-    total = SpatialInertia.Zero()
+def _body_inertia(parts: tuple[np.ndarray, ...]) -> SpatialInertia:
+    """Spatial inertia M_BFo_F of a body: struts, and spheres and point masses at its nodes. Struts
+    are solid cylinders."""
+    p_FN, struts, strut_radius, strut_density, node_radius, node_density, node_mass = parts
+    total, along = SpatialInertia.Zero(), [0.0, 0.0, 1.0]
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
         if density > 0.0:
-            total += strut_inertia(p_FN[a], p_FN[b], radius=radius, density=density)
+            X_FS, length = strut_pose(p_FN[a], p_FN[b]), float(np.linalg.norm(p_FN[b] - p_FN[a]))
+            M_SSo_S = SpatialInertia.SolidCylinderWithDensity(density, radius, length, along)
+            total += M_SSo_S.ReExpress(X_FS.rotation()).Shift(-X_FS.translation())
     for p, radius, density, mass in zip(p_FN, node_radius, node_density, node_mass, strict=True):
         if radius > 0.0 and density > 0.0:
-            total += node_inertia(p, radius=radius, density=density)
+            total += SpatialInertia.SolidSphereWithDensity(density, radius).Shift(-p)
         if mass > 0.0 and len(struts):
             total += SpatialInertia(mass, p, UnitInertia.PointMass(p))
         elif mass > 0.0:

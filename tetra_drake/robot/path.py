@@ -35,7 +35,10 @@ def follow(times: np.ndarray, poses: np.ndarray, structure: Structure) -> Centre
     forward. Other structures have no heading: they may roll over, and bars may spin about their
     axes.
     """
-    centre = centre_of_mass(poses[..., 4:], structure)
+    # The shares are exactly 1 if all bodies have the same mass.
+    shares = structure.mass / structure.mass[0]
+    weighted = shares[:, np.newaxis] * np.ascontiguousarray(poses[..., 4:].T)
+    centre = weighted.sum(axis=1).T / shares.sum()
     if not structure.points_ahead:
         return CentrePath(times, centre, np.full(len(times), math.nan))
     w, x, y, z = np.ascontiguousarray(poses.T)[:4]
@@ -44,11 +47,3 @@ def follow(times: np.ndarray, poses: np.ndarray, structure: Structure) -> Centre
     # The same as np.unwrap(), but much faster.
     heading[1:] -= math.tau * np.round((heading[1:] - heading[:-1]) / math.tau).cumsum()
     return CentrePath(times, centre, heading)
-
-
-def centre_of_mass(p_WB: np.ndarray, structure: Structure) -> np.ndarray:
-    """Centre of mass (k, 3) in m, from the bodies' origins p_WB (k, n, 3)."""
-    # The factors are exactly 1 if all bodies have the same mass.
-    shares = structure.mass / structure.mass[0]
-    weighted = shares[:, np.newaxis] * np.ascontiguousarray(p_WB.T)
-    return weighted.sum(axis=1).T / shares.sum()

@@ -156,10 +156,8 @@ class Robot:
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
         """Input u0 of each neuron (..., 2m), for turns (...); see
         physics.oscillator.steered_input()."""
-        sides = np.repeat(self.structure.sides, 2)
-        u0 = self.scenario.cpg.external_input
-        steered: np.ndarray = steered_input(u0, turns[..., np.newaxis], sides)
-        return steered
+        sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.external_input
+        return np.asarray(steered_input(u0, turns[..., np.newaxis], sides))
 
     def gain_remark(self) -> str:
         """Warning if signals with this `cpg.gain` hardly move the cables, or exceed the limits of
@@ -227,8 +225,7 @@ class Robot:
         """States of the actuators at t = 0 (drives,); see physics.actuator and
         cables_of_drives."""
         cables = self.structure.cables[self.cables_of_drives]
-        drives: np.ndarray = self.scenario.actuation.drives(self._at_start(cables))
-        return drives
+        return np.asarray(self.scenario.actuation.drives(self._at_start(cables)))
 
     def starting_cables(self) -> DrivenCables:
         """Properties of the driven cables at t = 0."""

@@ -30,7 +30,12 @@ def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
     for body, pose in enumerate(poses):
         link = add_element(model, "link", name=structure.bodies[body])
         _add_pose(link, RigidTransform(Quaternion(pose[:4] / np.linalg.norm(pose[:4])), pose[4:]))
-        _add_inertia(link, structure.mass[body], structure.unit_inertia[body])
+        inertial = add_element(link, "inertial")
+        add_element(inertial, "mass", structure.mass[body])
+        inertia = add_element(inertial, "inertia")
+        moments = structure.mass[body] * structure.unit_inertia[body]
+        for axes, moment in zip(("xx", "yy", "zz", "xy", "xz", "yz"), moments, strict=True):
+            add_element(inertia, f"i{axes}", moment)
         for shape in shapes:
             if shape.body == body:
                 visual = _add_shape(link, "visual", shape, "cylinder")
@@ -59,15 +64,6 @@ def _add_pose(parent: Element, X: RigidTransform) -> None:
     """Adds a pose."""
     angles = RollPitchYaw(X.rotation()).vector()
     add_element(parent, "pose", np.concatenate([X.translation(), angles]))
-
-
-def _add_inertia(link: Element, mass: float, unit_inertia: np.ndarray) -> None:
-    """Adds the inertia of a body about its origin, its centre of mass."""
-    inertial = add_element(link, "inertial")
-    add_element(inertial, "mass", mass)
-    inertia = add_element(inertial, "inertia")
-    for axes, value in zip(("xx", "yy", "zz", "xy", "xz", "yz"), mass * unit_inertia, strict=True):
-        add_element(inertia, f"i{axes}", value)
 
 
 def _add_shape(link: Element, purpose: str, shape: Shape, kind: str) -> Element:

@@ -125,8 +125,7 @@ class Structure(Blueprint):
     def radius(self) -> np.ndarray:
         """Largest distance of a node from the centre of mass of each body (bodies,), in m."""
         distances = np.linalg.norm(self.p_BN[: self.first_node[-1]], axis=1)
-        radius: np.ndarray = np.maximum.reduceat(distances, self.first_node[:-1])
-        return radius
+        return np.asarray(np.maximum.reduceat(distances, self.first_node[:-1]))
 
     def strut_name(self, strut: int) -> str:
         """Name of a strut: the names of its two nodes."""
@@ -237,16 +236,11 @@ def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
         for name, mass, unit in given
     ]
     if plant.geometry_source_is_registered():
-        _show_bodies(plant, structure, bodies)
+        for shape in shapes_of(structure):
+            solid = Cylinder(shape.radius, shape.length) if shape.length else Sphere(shape.radius)
+            body = bodies[shape.body]
+            plant.RegisterVisualGeometry(body, shape.X_BS, solid, shape.name, shape.colour)
     return bodies
-
-
-def _show_bodies(plant: MultibodyPlant, structure: Structure, bodies: list[RigidBody]) -> None:
-    """Adds visual shapes of struts and spheres."""
-    for shape in shapes_of(structure):
-        solid = Cylinder(shape.radius, shape.length) if shape.length else Sphere(shape.radius)
-        body = bodies[shape.body]
-        plant.RegisterVisualGeometry(body, shape.X_BS, solid, shape.name, shape.colour)
 
 
 class Shape(NamedTuple):

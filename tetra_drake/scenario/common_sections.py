@@ -95,12 +95,11 @@ class GaitBounds(Section):
 
     @model_validator(mode="after")
     def _check(self) -> GaitBounds:
-        if self.weight_min > self.weight_max:
-            problem = f"found {self.weight_min}, expected at most weight_max, {self.weight_max}"
-            refuse("weight_min", problem)
-        if self.tau_a_min > self.tau_a_max:
-            problem = f"found {self.tau_a_min} s, expected at most tau_a_max, {self.tau_a_max} s"
-            refuse("tau_a_min", problem)
+        for name, unit in {"weight": "", "tau_a": " s"}.items():
+            low, high = getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
+            if low > high:
+                problem = f"found {low}{unit}, expected at most {name}_max, {high}{unit}"
+                refuse(f"{name}_min", problem)
         return self
 
 

@@ -156,11 +156,10 @@ class Coulomb(FrictionKind):
         wrong = {key: most for key, most in possible.items() if getattr(self, key) != most}
         if wrong:
             first, units = next(iter(wrong)), {"stiffness": " N/m"}
-            change = ", ".join(
-                f"{key}: {most:g}{units.get(key, '')}" for key, most in wrong.items()
-            )
+            changes = [f"{key}: {most:g}{units.get(key, '')}" for key, most in wrong.items()]
+            friction = ", ".join(changes)
             found = f"found {getattr(self, first):g}, but mujoco can simulate only {wrong[first]:g}"
-            remedy = f"make a scenario with this one as `base` and friction: {{{change}}}"
+            remedy = f"make a scenario with this one as `base` and friction: {{{friction}}}"
             raise InputError(source, f"friction.{first}", f"{found}; {remedy}")
         return Cone(self.kinetic, self.damping)
 

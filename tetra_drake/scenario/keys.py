@@ -105,9 +105,8 @@ def _value(kind: Any, marks: Sequence[Any] = ()) -> str:
     if hasattr(kind, "__metadata__"):
         of_fields = (getattr(mark, "metadata", [mark]) for mark in kind.__metadata__)
         return _value(kind.__origin__, [*itertools.chain(*of_fields), *marks])
-    for mark in marks:
-        if isinstance(mark, UnitsByName):
-            return "by metric"
+    if any(isinstance(mark, UnitsByName) for mark in marks):
+        return "by metric"
     unit = next((mark.name for mark in marks if isinstance(mark, Unit)), "")
     origin, members = typing.get_origin(kind), typing.get_args(kind)
     if origin is Literal:

@@ -16,9 +16,6 @@ def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
     """
     given = written(kind.model_dump(exclude_defaults=True), plainest)
     settings = {name: getattr(kind, name) for name in always} | given
-    texts = []
-    for name, value in settings.items():
-        if isinstance(value, list):
-            value = " ".join(value)
-        texts.append(f"{name} {value}")
+    lists = {name: " ".join(value) for name, value in settings.items() if isinstance(value, list)}
+    texts = [f"{name} {value}" for name, value in (settings | lists).items()]
     return f" ({', '.join(texts)})" if texts else ""

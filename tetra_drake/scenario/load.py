@@ -86,9 +86,7 @@ def save_scenario(folder: Path, scenario: Scenario) -> str:
 
 def _file(name: str, folder: Path) -> Path:
     """The file of a shipped scenario; for another name, the path relative to `folder`."""
-    if name in shipped_scenarios():
-        return SCENARIOS / f"{name}.yaml"
-    return folder / name
+    return SCENARIOS / f"{name}.yaml" if name in shipped_scenarios() else folder / name
 
 
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:

@@ -87,10 +87,10 @@ class Walk(Poses):
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
-    @property
-    def per_actuator_time(self) -> float:
-        """1 / (duration of the steady stretch times number of actuators)."""
-        return self.per_steady_time / max(self.actuators, 1)
+    def mean(self, effort: str) -> float:
+        """A total of physics.tally.Effort as mean over the steady stretch and the actuators."""
+        per_actuator_time = self.per_steady_time / max(self.actuators, 1)
+        return per_actuator_time * float(getattr(self.tally.effort, effort)[0])
 
     @property
     def lifted_shares(self) -> tuple[float, ...]:
@@ -152,10 +152,7 @@ class Metrics:
     distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0], of_pose=True)
     """Displacement of x₁ from the start to the end."""
     steady_distance: float = _metric(
-        "m",
-        "without the start",
-        lambda walk: walk.followed[2, 0] - walk.followed[1, 0],
-        of_pose=True,
+        "m", "without the start", lambda walk: np.diff(walk.followed[:, 0])[1], of_pose=True
     )
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
     speed: float = _metric(
@@ -245,10 +242,7 @@ class Metrics:
     """Greatest tension of a driven cable at any time. It exceeds the `max_force` of a winch while
     the robot stretches the cable faster than the stalled winch pays out."""
     mean_actuator_force: float = _metric(
-        "N",
-        "of all driven cables",
-        lambda walk: walk.per_actuator_time * walk.tally.effort.impulse[0],
-        is_cost=True,
+        "N", "of all driven cables", lambda walk: walk.mean("impulse"), is_cost=True
     )
     """Mean tension of the driven cables in the steady stretch."""
     peak_actuator_speed: float = _metric(
@@ -257,10 +251,7 @@ class Metrics:
     """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
     for a winch, otherwise of the cable's length."""
     mean_actuator_speed: float = _metric(
-        "m/s",
-        "winding or paying out",
-        lambda walk: walk.per_actuator_time * walk.tally.effort.wound[0],
-        is_cost=True,
+        "m/s", "winding or paying out", lambda walk: walk.mean("wound"), is_cost=True
     )
     """Mean speed in the steady stretch, winding or paying out."""
     peak_actuator_power: float = _metric(
@@ -268,17 +259,13 @@ class Metrics:
     )
     """Greatest product of an actuator's tension and winding speed, at any time."""
     mean_actuator_power: float = _metric(
-        "W",
-        "effort of an actuator",
-        lambda walk: walk.per_actuator_time * walk.tally.effort.pulled[0],
-        most=True,
-        is_cost=True,
+        "W", "effort of an actuator", lambda walk: walk.mean("pulled"), most=True, is_cost=True
     )
     """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
     actuator_limited: float = _metric(
         "",
         "time at a limit of an actuator",
-        lambda walk: walk.per_actuator_time * walk.tally.effort.limited[0],
+        lambda walk: walk.mean("limited"),
         most=True,
         is_cost=True,
         is_share=True,

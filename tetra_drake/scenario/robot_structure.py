@@ -22,6 +22,7 @@ from tetra_drake.scenario.blueprint import WORLD, Blueprint
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.quantities import (
     Acceleration,
+    Damping,
     Density,
     Force,
     Length,
@@ -34,7 +35,6 @@ from tetra_drake.scenario.refusals import described, hint, refuse
 from tetra_drake.scenario.robot_tetrahedra import (
     LIGHTEST,
     LONGEST,
-    CableConstants,
     Tetrahedra,
     check_one_per_body,
     check_strut,
@@ -123,9 +123,11 @@ class Sphere(NamedTuple):
     """Radius with which it touches the ground by default."""
 
 
-class CableGroup(CableConstants):
+class CableGroup(Section):
     """Cables of one make, which never push."""
 
+    damping: Damping = Field(ge=0)
+    """Tension per rate of the length."""
     pairs: Pairs
     """The nodes that each cable joins."""
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
@@ -143,8 +145,8 @@ class CableGroup(CableConstants):
         return self
 
     def law(self, free_length: float) -> dict[str, float]:
-        """The constants of a cable."""
-        return self.constants(stiffness=self.stiffness, free_length=free_length)
+        """The constants of a cable, by the names of physics.cable.CableLaw."""
+        return dict(stiffness=self.stiffness, damping=self.damping, free_length=free_length)
 
     def greatest_tension(self, length: float) -> float:
         """Tension (N) of a cable of this length (m) with a free length of 0."""
@@ -523,8 +525,8 @@ class StructureFile(Section):
                 expected = f"expected coordinates of at most {LONGEST:g} m"
                 refuse(f"nodes.{node}", f"found {place}, {expected}")
         for strut in self.all_struts:
-            group, length = self.struts[strut.group], self._length(strut)
-            check_strut(strut.key, length=length, diameter=group.diameter, density=group.density)
+            group = self.struts[strut.group]
+            check_strut(strut.key, self._length(strut), group.diameter, group.density)
 
     def _check_inertia(self) -> None:
         """Refuses bodies of several nodes without struts or spheres that have mass, and others

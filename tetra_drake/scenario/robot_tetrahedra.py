@@ -80,7 +80,7 @@ LIGHTEST = 1e-12
 """Least mass of a strut, in kg."""
 
 
-def check_strut(key: str, *, length: float, diameter: float, density: float) -> None:
+def check_strut(key: str, length: float, diameter: float, density: float) -> None:
     """Refuses a strut with a size (SI units) that is too extreme for the computation of forces."""
     if not SHORTEST <= length <= LONGEST:
         refuse(key, f"is {length:.3g} m long, expected {SHORTEST:g} m to {LONGEST:g} m")
@@ -92,20 +92,11 @@ def check_strut(key: str, *, length: float, diameter: float, density: float) -> 
         refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
 
-class CableConstants(Section):
-    """Constants of the cable law that are common to all kinds of robots."""
+class RowCables(Section):
+    """The cables of a row (Table 3)."""
 
     damping: Damping = Field(ge=0)
     """Tension per rate of the length."""
-
-    def constants(self, **others: float) -> dict[str, float]:
-        """The constants of this section and `others`, by the names of physics.cable.CableLaw."""
-        return {name: getattr(self, name) for name in CableConstants.model_fields} | others
-
-
-class RowCables(CableConstants):
-    """The cables of a row (Table 3)."""
-
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of outer cables, which join base nodes of the same name."""
     inner_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
@@ -116,9 +107,9 @@ class RowCables(CableConstants):
     """True if a cable pulls only while it is stretched; otherwise it also pushes (Eq. 6)."""
 
     def law(self, cable: str) -> dict[str, float]:
-        """Constants of a cable of a junction, by name."""
+        """Constants of a cable of a junction, by the names of physics.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
-        return self.constants(stiffness=stiffness, free_length=self.free_length)
+        return dict(stiffness=stiffness, damping=self.damping, free_length=self.free_length)
 
 
 class Tetrahedra(Section):
@@ -195,7 +186,10 @@ class Tetrahedra(Section):
         struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
         names = [f"{rear}-{front}" for rear, front in itertools.pairwise(bodies)]
         ends = [cable_nodes(junction, cable) for junction in range(junctions) for cable in CABLES]
-        oscillators, groups = self._oscillators(names)
+        several = len(self.actuation) > 1
+        labels = [f" {' + '.join(group)}" if several else "" for group in self.actuation]
+        driven = [[CABLES.index(cable) for cable in group] for group in self.actuation]
+        first_cables = range(0, len(ends), len(CABLES))  # of the junctions
         return Blueprint(
             bodies=bodies,
             node_names=tuple(f"{body} {node}" for body in bodies for node in NODES),
@@ -219,8 +213,8 @@ class Tetrahedra(Section):
             cable_ends=np.array(ends),
             cable_laws=tuple(self.cables.law(cable) for cable in CABLES) * junctions,
             slack=self.slack,
-            oscillators=oscillators,
-            groups=groups,
+            oscillators=tuple(name + label for name in names for label in labels),
+            groups=tuple(tuple(i + k for k in group) for i in first_cables for group in driven),
             contacts=np.array(thesis if self.contacts == "thesis" else range(4 * n)),
             markers=np.array(bottom),
             followed="bottom nodes",
@@ -229,26 +223,13 @@ class Tetrahedra(Section):
             settles=False,
         )
 
-    def _oscillators(
-        self, junctions: Sequence[str]
-    ) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
-        """Names of the oscillators, and indices of the cables that each oscillator drives."""
-        names, groups = [], []
-        for i, junction in enumerate(junctions):
-            for group in self.actuation:
-                several = len(self.actuation) > 1
-                names.append(f"{junction} {' + '.join(group)}" if several else junction)
-                groups.append(tuple(len(CABLES) * i + CABLES.index(cable) for cable in group))
-        return tuple(names), tuple(groups)
-
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
         """Further changes that follow from `changes` to a base: `spacing: balanced` if strut length
         or cables changed and no spacing was given."""
-        if "spacing" in changes or not isinstance(base, Tetrahedra):
+        if not isinstance(base, Tetrahedra) or "spacing" in changes:
             return {}
-        if _deciding_numbers(self) == _deciding_numbers(base):
-            return {}
-        return {"spacing": "balanced"}
+        is_other = _deciding_numbers(self) != _deciding_numbers(base)
+        return {"spacing": "balanced"} if is_other else {}
 
     @field_validator("spacing", mode="before")
     @classmethod
@@ -264,12 +245,7 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        check_strut(
-            "strut_length",
-            length=self.strut_length,
-            diameter=self.strut_diameter,
-            density=self.density,
-        )
+        check_strut("strut_length", self.strut_length, self.strut_diameter, self.density)
         check_one_per_body("offsets", self.offsets, self.tetrahedra)
         check_one_per_body("payload", self.payload, self.tetrahedra)
         cables = [cable for group in self.actuation for cable in group]
@@ -313,5 +289,4 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
 def _deciding_numbers(robot: Tetrahedra) -> tuple[float, ...]:
     """Numbers that determine the balanced spacing."""
     cables = robot.cables
-    stiffness = cables.outer_stiffness, cables.inner_stiffness
-    return (*stiffness, cables.free_length, robot.strut_length)
+    return cables.outer_stiffness, cables.inner_stiffness, cables.free_length, robot.strut_length

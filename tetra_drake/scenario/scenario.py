@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
@@ -192,12 +193,8 @@ class Scenario(Section):
         tree = merged(self.model_dump(), changes)
         changed = self.from_tree(tree, source)
         robot = changes.get("robot")
-        if not isinstance(robot, dict):
-            return changed
-        implied = changed.robot.implied_changes(self.robot, robot)
-        if not implied:
-            return changed
-        return self.from_tree(merged(tree, {"robot": implied}), source)
+        implied = isinstance(robot, dict) and changed.robot.implied_changes(self.robot, robot)
+        return self.from_tree(merged(tree, {"robot": implied}), source) if implied else changed
 
     def on_engine(self, name: str | None) -> Self:
         """The scenario on the engine of this name, such as "compiled": with its own settings if it
@@ -227,8 +224,8 @@ class Scenario(Section):
         """Refuses combinations of settings from different sections."""
         step, duration = self.cpg.listing_step, self.simulation.duration
         if step > duration:
-            expected = f"expected at most the duration, {duration} s"
-            refuse("cpg.listing_step", f"found {step} s, {expected}")
+            problem = f"found {step} s, expected at most the duration, {duration} s"
+            refuse("cpg.listing_step", problem)
         if "load" in self.cpg.feedback and self.robot.gravity == 0.0:
             refuse("robot.gravity", "found 0 m/s^2, expected a weight, for feedback of the load")
         self._check_metrics()
@@ -245,24 +242,21 @@ class Scenario(Section):
             for name in metrics:
                 for section in (self.robot, self.actuation):
                     if METRICS[name].needs in section.lacking:
-                        kind = f"!{section.tag}"
-                        problem = f"{kind} does not have this metric; give `{key}` without it"
-                        refuse(f"{key}.{name}", problem)
+                        problem = f"does not have this metric; give `{key}` without it"
+                        refuse(f"{key}.{name}", f"!{section.tag} {problem}")
 
     def _check_memory(self) -> None:
         """Refuses simulations that do not fit in memory."""
-        duration, sample_period = self.simulation.duration, self.simulation.sample_period
-        is_drake = isinstance(self.engine, Drake)
+        simulation, is_drake = self.simulation, isinstance(self.engine, Drake)
         most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
-        least_step = duration * self.oscillators / most_signals
-        least_sample = duration * self.robot.body_count / MOST_SAMPLES
-        periods = [
-            ("cpg.listing_step", self.cpg.listing_step, least_step),
-            ("simulation.sample_period", sample_period, least_sample),
-        ]
-        if isinstance(self.engine, Mujoco):
-            periods.append(("engine.step", self.engine.step, least_step))
-        for key, period, least in periods:
+        least_step = simulation.duration * self.oscillators / most_signals
+        least_sample = simulation.duration * self.robot.body_count / MOST_SAMPLES
+        periods = {
+            "cpg.listing_step": (self.cpg.listing_step, least_step),
+            "simulation.sample_period": (simulation.sample_period, least_sample),
+            "engine.step": (getattr(self.engine, "step", math.inf), least_step),
+        }
+        for key, (period, least) in periods.items():
             if period < least:
                 problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
                 refuse(key, f"{problem}, for this duration and robot")
@@ -325,8 +319,7 @@ def _differences_in_order(
         if key != other:
             pairs = zip(key.split("."), other.split("."), strict=False)
             shared = itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
-            mapping = ".".join(part for part, _ in shared)
-            return [(mapping, "another order of names")]
+            return [(".".join(part for part, _ in shared), "another order of names")]
     return []
 
 

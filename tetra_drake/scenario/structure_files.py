@@ -57,13 +57,6 @@ def structure_file(name: str, folder: Path) -> Path:
     return STRUCTURES / f"{name}.yaml" if name in shipped_structures() else folder / name
 
 
-def names_structure(tree: Tree) -> bool:
-    """True if the robot of a scenario's tree names a structure file."""
-    robot = tree.get("robot")
-    is_structure = isinstance(robot, dict) and robot.get(TAG, _KIND) == _KIND
-    return is_structure and "file" in tree["robot"]
-
-
 def with_structure(tree: Tree, source: object) -> Tree:
     """Replaces the key `robot.file` of a scenario's tree by the content of the structure file.
 
@@ -71,9 +64,9 @@ def with_structure(tree: Tree, source: object) -> Tree:
     replaced as a whole. A tree without `robot.file` stays as it is. Raises InputError that names
     file, or `source`, and key.
     """
-    if not names_structure(tree):
+    robot = tree.get("robot")
+    if not isinstance(robot, dict) or robot.get(TAG, _KIND) != _KIND or "file" not in robot:
         return tree
-    robot = tree["robot"]
     changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
     name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
