@@ -45,8 +45,8 @@ class Substructure(Section):
 
 
 class RigidParameters(Section):
-    """Parameters of a rigid part. Like all parts, it has NTRT's defaults. Fields of type Any have no
-    effect: a scenario has its own friction, ground and actuators."""
+    """Parameters of a rigid part. Like all parts, it has NTRT's defaults. Fields of type Any have
+    no effect: a scenario has its own friction, ground and actuators."""
 
     density: NotNegative = 1.0
     friction: Any = None
