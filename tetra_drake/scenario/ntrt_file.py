@@ -45,8 +45,8 @@ class Substructure(Section):
 
 
 class RigidParameters(Section):
-    """Parameters of a rigid part. As for all parts, defaults are those of NTRT, and fields of type
-    Any have no effect: a scenario has its own friction, ground and actuators."""
+    """Parameters of a rigid part. As for all parts, defaults are NTRT's, and fields of type Any
+    have no effect: a scenario has its own friction, ground and actuators."""
 
     density: NotNegative = 1.0
     friction: Any = None
