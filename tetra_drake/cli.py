@@ -150,25 +150,26 @@ def _simulate(
     """
     from tetra_drake.engines.interface import check_can_be_watched, engine_of
     from tetra_drake.engines.simulate import simulate
-    from tetra_drake.prototype.command_file import load_command
+    from tetra_drake.prototype.command_file import load_command, scenario_beside
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
+    from tetra_drake.scenario.load import load_scenario
+    from tetra_drake.visualization.live import open_view
 
     played = None
     if command is None:
         chosen, chosen_gait = _chosen_gait(scenario, gait, seed, engine)
     else:
-        chosen, chosen_gait = _scenario_of_command(scenario, command, engine), None
-        played = load_command(command, chosen)
+        beside = scenario_beside(command)
+        chosen = load_scenario(scenario or beside or "thesis").on_engine(engine)
+        if scenario and beside:
+            _warn(f"{command}: simulated on scenario {chosen.name}, not on {beside} beside it")
+        chosen_gait, played = None, load_command(command, chosen)
     if meshcat:
         check_can_be_watched(chosen)
     check_result_folder(out)
     engine_of(chosen).prepare(chosen)
-    view = None
-    if meshcat:
-        from tetra_drake.visualization.live import open_view
-
-        view = open_view(chosen, say=_say)
+    view = open_view(chosen, say=_say) if meshcat else None
     result = simulate(chosen, chosen_gait, command=played, record=True, viewer=view)
     print(result_text(result))
     save_result_folder(out, result)
@@ -179,18 +180,6 @@ def _simulate(
     if view is not None:
         with contextlib.suppress(EOFError, KeyboardInterrupt):
             input("press Enter to close the view in the browser ")
-
-
-def _scenario_of_command(scenario: str | None, command: Path, engine: str | None) -> Scenario:
-    """The given scenario; else the scenario in the command's folder; else the scenario thesis."""
-    from tetra_drake.prototype.command_file import scenario_beside
-    from tetra_drake.scenario.load import load_scenario
-
-    beside = scenario_beside(command)
-    chosen = load_scenario(scenario or beside or "thesis")
-    if scenario and beside:
-        _warn(f"{command}: simulated on scenario {chosen.name}, not on {beside} beside it")
-    return chosen.on_engine(engine)
 
 
 def _export(
@@ -514,16 +503,11 @@ def _fit(
     from tetra_drake.scenario.load import load_scenario
 
     given = load_fit_file(source)
+    measurements, parameters = given.measurements, given.parameters
     chosen = load_scenario(scenario or scenario_beside(source) or "thesis")
     try:
         found = fit(
-            chosen,
-            given.measurements,
-            given.parameters,
-            search=search,
-            out=out,
-            say=_say,
-            source=source,
+            chosen, measurements, parameters, search=search, out=out, say=_say, source=source
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None

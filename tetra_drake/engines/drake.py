@@ -275,7 +275,11 @@ class _StepAimer:
             self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
         step = min(longest, self._longest, self._step_towards(time_to_change))
         if self._jacobian_is_old and step >= _RENEW_FROM:
-            self._renew_jacobian()
+            self._work.keep()
+            # Initialize() needs a limit that allows the initial step, which is the longest.
+            self._integrator.set_maximum_step_size(self._settings.max_step)
+            self._integrator.Initialize()
+            self._jacobian_is_old = False
         self._integrator.set_maximum_step_size(step)
 
     def _step_towards(self, time_to_change: float) -> float:
@@ -285,13 +289,6 @@ class _StepAimer:
             return _APPROACH * time_to_change
         margin = min(_AIM_BEYOND, 0.25 * look_ahead)
         return max(look_ahead, _AIM_FACTOR * time_to_change + margin)
-
-    def _renew_jacobian(self) -> None:
-        self._work.keep()
-        # Initialize() needs a limit that allows the initial step, which is the longest.
-        self._integrator.set_maximum_step_size(self._settings.max_step)
-        self._integrator.Initialize()
-        self._jacobian_is_old = False
 
 
 ENGINE = DrakeEngine()

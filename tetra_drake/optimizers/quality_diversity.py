@@ -91,7 +91,12 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
         measures = np.array(rows, dtype=float)  # None becomes NaN
         status, value = np.zeros(count, np.int32), np.zeros(count)
         if self._archive.empty:
-            self._check_measures(measures[[bool(e.metrics) for e in evaluations]])
+            completed = measures[[bool(e.metrics) for e in evaluations]]
+            for name, values in zip(self.settings.measures, completed.T, strict=True):
+                if values.size and not np.isfinite(values).any():
+                    found = f"is infinite or undefined for all of {values.size} gaits"
+                    problem = f"{found} ({METRICS[name].note}); the map would stay empty"
+                    raise InputError("scenario", f"optimizer.measures.{name}", problem)
         enters = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
         self._told = {}
         if enters.any():
@@ -107,15 +112,6 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
             self._told = {"solution": self._roots, "objective": objective, "measures": measures}
             self._added = {"status": status, "value": value}
         return super().tell(evaluations)
-
-    def _check_measures(self, measures: Matrix) -> None:
-        """Raises InputError for a measure that no gait has. `measures` (gaits, 2) are of the gaits
-        whose simulation was completed."""
-        for name, values in zip(self.settings.measures, measures.T, strict=True):
-            if values.size and not np.isfinite(values).any():
-                found = f"is infinite or undefined for all of {values.size} gaits"
-                problem = f"{found} ({METRICS[name].note}); the map would stay empty"
-                raise InputError("scenario", f"optimizer.measures.{name}", problem)
 
     def _learn(self, fitnesses: Vector) -> None:
         if self._archive.empty or not self._told:

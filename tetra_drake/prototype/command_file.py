@@ -69,8 +69,18 @@ def load_command(path: str | Path, scenario: GivenScenario) -> Command:
     wanted = [TIME, *command_columns(robot)]
     cells = table_cells(text, path, wanted=wanted)
     table = np.column_stack([column_numbers(cells[name], path) for name in wanted])
-    period = _period(table[:, 0], scenario.cpg.listing_step, path)
-    return Command(path.name, period, scenario.actuation.command_unit * table[:, 1:])
+    times, least = table[:, 0], scenario.cpg.listing_step
+    if len(times) < 2 or abs(times[0]) > 1e-6:
+        raise InputError(path, TIME, "expected at least two samples, the first at 0")
+    period = float(np.median(np.diff(times)))
+    if period < (1.0 - _UNEVEN) * least:
+        problem = f"found samples {period:g} s apart, expected at least {least:g} s"
+        raise InputError(path, TIME, problem)
+    for row in np.flatnonzero(np.abs(np.diff(times) - period) > _UNEVEN * period):
+        problem = f"found {times[row + 1]:g} after {times[row]:g}, expected {period:g} s more"
+        raise InputError(path, f"line {row + 3}, {TIME}", problem)
+    samples = scenario.actuation.command_unit * table[:, 1:]
+    return Command(path.name, float(times[-1]) / (len(times) - 1), samples)
 
 
 def table_cells(
@@ -82,15 +92,18 @@ def table_cells(
         heading, *rows = csv.reader(io.StringIO(text.rstrip()), strict=True)
     except (csv.Error, ValueError) as error:  # an empty file, too
         raise InputError(path, "", "is no table with commas between cells") from error
-    if wanted is not None:
-        _check_columns(heading, wanted, path)
+    if wanted is not None and set(heading).isdisjoint(wanted):
+        # The file may be any, so nothing of it is shown.
+        raise InputError(path, "", f"has no column of a command; {hint('', wanted)}")
+    for name in [*heading, *(wanted or ())]:
+        if wanted is not None and name not in wanted:
+            raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")
+        if (count := heading.count(name)) != 1:
+            raise InputError(path, name, "is missing" if count == 0 else "is given twice")
     for line, row in enumerate(rows, start=2):
         if len(row) != len(heading):
             problem = f"found {len(row)} cells, expected {len(heading)}"
             raise InputError(path, f"line {line}", problem)
-    for name in heading:
-        if heading.count(name) > 1:
-            raise InputError(path, name, "is given twice")
     return pandas.DataFrame(rows, columns=heading, dtype=str)
 
 
@@ -103,28 +116,3 @@ def column_numbers(cells: pandas.Series, path: str | Path, *, gaps: bool = False
         problem = f"found '{cells[row]}', expected a number"
         raise InputError(path, f"line {row + 2}, {cells.name}", problem)
     return numbers
-
-
-def _check_columns(heading: Sequence[str], wanted: Sequence[str], path: str | Path) -> None:
-    """Raises InputError unless a table has the wanted columns and no others."""
-    if set(heading).isdisjoint(wanted):  # the file may be any, so nothing of it is shown
-        raise InputError(path, "", f"has no column of a command; {hint('', wanted)}")
-    for name in [*heading, *wanted]:
-        if name not in wanted:
-            raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")
-        if (count := heading.count(name)) != 1:
-            raise InputError(path, name, "is missing" if count == 0 else "is given twice")
-
-
-def _period(times: np.ndarray, least: float, source: str | Path) -> float:
-    """Time (s) between samples. Raises InputError if times are uneven or do not begin at 0."""
-    if len(times) < 2 or abs(times[0]) > 1e-6:
-        raise InputError(source, TIME, "expected at least two samples, the first at 0")
-    period = float(np.median(np.diff(times)))
-    if period < (1.0 - _UNEVEN) * least:
-        problem = f"found samples {period:g} s apart, expected at least {least:g} s"
-        raise InputError(source, TIME, problem)
-    for row in np.flatnonzero(np.abs(np.diff(times) - period) > _UNEVEN * period):
-        problem = f"found {times[row + 1]:g} after {times[row]:g}, expected {period:g} s more"
-        raise InputError(source, f"line {row + 3}, {TIME}", problem)
-    return float(times[-1]) / (len(times) - 1)

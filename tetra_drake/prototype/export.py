@@ -20,7 +20,6 @@ from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
-from tetra_drake.scenario.scenario import Scenario
 
 COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
 README = "README.md"
@@ -53,7 +52,11 @@ def export(
     """
     scenario = given_scenario(scenario)
     gait = given_gait(gait, scenario)
-    check_rate(rate, scenario)
+    most, duration = 1.0 / scenario.cpg.listing_step, scenario.simulation.duration
+    in_range, periods = 0.0 < rate <= most * (1.0 + 1e-9), duration * rate
+    if not in_range or abs(periods - round(periods)) > 1e-6 * periods:
+        expected = f"at most {most:g} Hz, and a whole number of samples in {duration:g} s"
+        raise InputError("export", "rate", f"found {rate:g} Hz, expected {expected}")
     out = given_path(out, "export", "out")
     check_folder(out)
     if out.exists():
@@ -74,23 +77,18 @@ def export(
         write_whole(folder / LIMITS, loads.table.to_csv(float_format="%.6g"))
         save_scenario(folder, scenario)
 
-        played = _played(scenario, folder / COMMAND)
-        verdict = load_verdict(loads, result)
-        verdict += f"\n{played}; the gait itself goes {_distance(result)}."
+        try:
+            played = simulate(scenario, command=load_command(folder / COMMAND, scenario))
+            outcome = f"robot goes {_distance(played)}"
+        except SimulationFailure as failure:
+            outcome = str(failure)
+        verdict = f"{load_verdict(loads, result)}\nPlayed from {COMMAND}, the {outcome}; "
+        verdict += f"the gait itself goes {_distance(result)}."
         template = resources.files("tetra_drake") / "prototype/README.template.md"
         about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
         write_whole(folder / README, template.read_text("utf-8").format(**about))
         folder.rename(out)
     return verdict
-
-
-def check_rate(rate: float, scenario: Scenario) -> None:
-    """Raises InputError if the scenario's gaits cannot be exported at a rate (Hz)."""
-    most, duration = 1.0 / scenario.cpg.listing_step, scenario.simulation.duration
-    in_range, periods = 0.0 < rate <= most * (1.0 + 1e-9), duration * rate
-    if not in_range or abs(periods - round(periods)) > 1e-6 * periods:
-        expected = f"at most {most:g} Hz, and a whole number of samples in {duration:g} s"
-        raise InputError("export", "rate", f"found {rate:g} Hz, expected {expected}")
 
 
 def load_verdict(loads: Loads, result: SimulationResult) -> str:
@@ -109,15 +107,6 @@ def load_verdict(loads: Loads, result: SimulationResult) -> str:
         f"{table}\nThe actuators cannot play all of it: a limit binds first at {time:.3f} s "
         f"({name}), and {share} % of the steady stretch, mean of all actuators."
     )
-
-
-def _played(scenario: Scenario, file: Path) -> str:
-    """Sentence about the distance in a simulation of a command file."""
-    try:
-        result = simulate(scenario=scenario, command=load_command(file, scenario))
-    except SimulationFailure as failure:
-        return f"Played from {file.name}, the {failure}"
-    return f"Played from {file.name}, the robot goes {_distance(result)}"
 
 
 def _distance(result: SimulationResult) -> str:

@@ -119,8 +119,7 @@ def _map_files(names: Sequence[str], row: pandas.Series, shown: ShownGaits) -> t
 
 def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Path) -> str:
     """The report as HTML. The figures are in `folder`; `captions` are by name of figure."""
-    run, manifest = shown.run, shown.run.manifest
-    scenario = run.scenario
+    run, scenario = shown.run, shown.run.scenario
     best_gait = trial_folder(Path(), shown.trial) / BEST_GAIT
     named = {"initially": shown.initial.recorded, "best": shown.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(notable_gaits(run))
@@ -138,13 +137,9 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
     gait = run.gait(shown.trial, shown.best.recorded["index"])
     return render(
         "report/report.html.jinja",
-        run=run,
-        manifest=manifest,
+        shown=shown,
         title=f"{scenario.name}: {headline(scenario, shown.best.recorded)}",
-        evaluations=f"{sum(status.evaluations for status in run.statuses):,}",
         ground=ground_text(scenario),
-        best=shown.best,
-        units=scenario.units,
         changed=changed,
         versions=versions(),
         differences=_settings(scenario),
@@ -162,7 +157,6 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
         map_metrics=_metrics(on_map, scenario) if on_map else None,
         parameters=_parameters(gait),
         weights=_weight_matrices(gait),
-        oscillators=scenario.robot.blueprint().oscillators,
         pictures=_pictures(captions, folder),
         files={
             "scenario": SCENARIO,
@@ -232,11 +226,8 @@ def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple
     """The figures of each part of the report: image URL, file and caption."""
     parts: dict[str, list[tuple[str, str, str]]] = {"gait": [], "evolution": [], "forces": []}
     for name, caption in captions.items():
-        picture = _embedded(folder / f"{name}.svg"), f"{FIGURES}/{name}.svg", caption
+        # Embedded directly, not as the URL of an image, the ids of two SVGs would clash.
+        content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
+        picture = f"data:image/svg+xml;base64,{content}", f"{FIGURES}/{name}.svg", caption
         parts[_PARTS.get(name, "forces")].append(picture)
     return parts
-
-
-def _embedded(picture: Path) -> str:
-    """An SVG file as the URL of an image. Embedded directly, the ids of two SVGs would clash."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(picture.read_bytes()).decode()}"

@@ -171,10 +171,8 @@ def make_result(
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
     ends = motion.at(np.array([0.0, simulation.settling_time, simulation.duration]))
-    trajectory = None
-    if record:
-        samples = sample_times(simulation.duration, simulation.sample_period)
-        trajectory = make_dataset(robot, motion.at(samples))
+    samples = sample_times(simulation.duration, simulation.sample_period)
+    trajectory = make_dataset(robot, motion.at(samples)) if record else None
     poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses, structure)
     metrics = compute_metrics(

@@ -102,6 +102,10 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     nodes, cable_forces, ground_forces = forces_of_motion(robot.model, *given)
     if motion.ground_forces is not None:
         ground_forces = motion.ground_forces
+    free_lengths = np.tile(structure.cables["free_length"], (len(motion.times), 1))
+    actuator, driven = robot.model.actuator, robot.cables_of_drives
+    if has_drive(actuator):  # winches change the free lengths
+        free_lengths[:, driven] = wound(actuator, motion.drives, free_lengths[:, driven])
     modes = np.sign(motion.modes[:, :, :STICK_POINT])
     variables = {
         "p_WN": (nodes[..., P_WN : P_WN + 3], "m", "node position"),
@@ -110,7 +114,7 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "q_WB": (poses[..., :4], "1", "orientation of the body"),
         "tension": (cable_forces[..., cable.TENSION], "N", "cable tension"),
         "length": (cable_forces[..., cable.LENGTH], "m", "cable length"),
-        "free_length": (_free_lengths(robot, motion), "m", "free length of the cable"),
+        "free_length": (free_lengths, "m", "free length of the cable"),
         "signal": (motion.signals, "N", "actuation signal"),
         "normal_force": (ground_forces[..., 2], "N", "force along the normal of the ground"),
         "friction_force": (ground_forces[..., :2], "N", "friction force"),
@@ -153,15 +157,6 @@ def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
     for name in dataset.coords.keys() - dataset.xindexes.keys():
         dataset = dataset.set_xindex(str(name), LabelIndex)
     return dataset
-
-
-def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
-    """Free lengths of the cables (k, cables) in m; winches change them."""
-    lengths = np.tile(robot.structure.cables["free_length"], (len(motion.times), 1))
-    actuator, driven = robot.model.actuator, robot.cables_of_drives
-    if has_drive(actuator):
-        lengths[:, driven] = wound(actuator, motion.drives, lengths[:, driven])
-    return lengths
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:

@@ -77,5 +77,4 @@ def condensed(
         coupling[:, column] = (ends[0][0] - ends[1][0]) / step
         own[:, column] = (ends[0][1] - ends[1][1]) / step
     own += np.diag(structure.strut_stiffness[elastic])
-    reduced: np.ndarray = stiffness - coupling @ np.linalg.solve(own, coupling.T)
-    return reduced
+    return np.asarray(stiffness - coupling @ np.linalg.solve(own, coupling.T))

@@ -122,17 +122,14 @@ def find_equilibrium(
         left = np.abs(descent.force.reshape(-1, 6)).max(axis=1)
         body = int(left.argmax())  # argmax takes the first NaN, if there is one
         found = f"finds no equilibrium in {count} steps; {left[body]:.3g} N are left"
-        raise InputError(source, "robot", f"{found} on '{bodies[body]}': {_reason(left[body])}")
+        reason = "it still moves; give positions nearer to an equilibrium, or more tension"
+        if not np.isfinite(left[body]):
+            reason = "its position is not finite, or two ends of a cable meet"
+        raise InputError(source, "robot", f"{found} on '{bodies[body]}': {reason}")
     force_at_rest(robot, descent.state)
     lengths = np.round(robot.forces.cable_forces[:, LENGTH], LENGTH_DIGITS)
     feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
     return Equilibrium(descent.state, lengths, feet)
-
-
-def _reason(left: float) -> str:
-    if not np.isfinite(left):
-        return "its position is not finite, or two ends of a cable meet"
-    return "it still moves; give positions nearer to an equilibrium, or more tension"
 
 
 def _unheld_force(model: Model) -> np.ndarray:

@@ -3,7 +3,6 @@
 import json
 import math
 import os
-from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, Self
@@ -287,12 +286,22 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     Raises:
         InputError: names file and key, if the file is wrong or does not fit the scenario.
     """
-    file = _read_file(given_path(path, "load_gait", "path"), key)
+    raw = read_json(given_path(path, "load_gait", "path"), "gait file")
+    raw = raw.get(key) if key and isinstance(raw, dict) else raw
+    file = GaitFile.from_tree(raw, path, key=key)
     scenario = given_scenario(scenario)
     own, weights = Weights.of(scenario), file.weights
     names = own.names
     if isinstance(weights, dict):
-        _check_names(weights, names, path, f"{key}.weights".strip("."))
+        missing = [name for name in names if name not in weights]
+        unknown = [name for name in weights if name not in names]
+        problems = [f"lacks {len(missing)} names, such as '{missing[0]}'"] if missing else []
+        if unknown:
+            problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
+        if problems:
+            found = f"found {len(weights)}, expected the {len(names)} of the scenario"
+            problem = f"{found}; {' and '.join(problems)}"
+            raise InputError(path, f"{key}.weights".strip("."), problem)
         weights = [weights[name] for name in names]
     gait = Gait(
         name=file.name or Path(path).stem,
@@ -331,14 +340,6 @@ def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
     raise InputError("gait", "", f"found {gait!r:.60}, expected a gait, its file or a run")
 
 
-def _read_file(path: str | Path, key: str) -> GaitFile:
-    """Reads a gait file, or the gait under `key` of a JSON file."""
-    raw = read_json(path, "gait file")
-    if key and isinstance(raw, dict):
-        raw = raw.get(key)
-    return GaitFile.from_tree(raw, path, key=key)
-
-
 def check_gait(
     gait: Gait, scenario: Scenario, weights: Weights, *, source: object, key: str = ""
 ) -> None:
@@ -355,17 +356,3 @@ def check_gait(
     if gait.turn and not weights.blueprint.sides.any():
         problem = f"found {gait.turn}, expected 0: no oscillator is left or right"
         raise InputError(source, f"{prefix}turn", problem)
-
-
-def _check_names(given: Collection[str], wanted: tuple[str, ...], source: object, key: str) -> None:
-    """Raises InputError if names are missing or unknown."""
-    missing = [name for name in wanted if name not in given]
-    unknown = [name for name in given if name not in wanted]
-    problems = []
-    if missing:
-        problems.append(f"lacks {len(missing)} names, such as '{missing[0]}'")
-    if unknown:
-        problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
-    if problems:
-        problem = f"found {len(given)}, expected the {len(wanted)} of the scenario"
-        raise InputError(source, key, f"{problem}; {' and '.join(problems)}")

@@ -53,19 +53,9 @@ def make_surface(
     """The ground with these laws and this terrain, without contact nodes. `grid` has the terrain's
     heights; by default the terrain begins at the origin."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
-    return Ground.nowhere()._replace(
-        normal=np.array(NormalForce(ground.stiffness, ground.damping)),
-        friction=friction.law(),
-        flat=terrain_kind.is_flat,
-        grid=np.array(_surface_grid(grid)),
-        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
-    )
-
-
-def _surface_grid(grid: Grid) -> terrain.SurfaceGrid:
     rows, columns = grid.heights.shape
     inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
-    return terrain.SurfaceGrid(
+    surface_grid = terrain.SurfaceGrid(
         corner_x=grid.corner[0],
         corner_y=grid.corner[1],
         per_cell_x=1.0 / grid.cell[0],
@@ -76,6 +66,13 @@ def _surface_grid(grid: Grid) -> terrain.SurfaceGrid:
         first=0.0,
         top=grid.heights.max(),
         reach=0.0,
+    )
+    return Ground.nowhere()._replace(
+        normal=np.array(NormalForce(ground.stiffness, ground.damping)),
+        friction=friction.law(),
+        flat=terrain_kind.is_flat,
+        grid=np.array(surface_grid),
+        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
     )
 
 

@@ -61,8 +61,7 @@ def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
     up to a share `tolerance` of the greatest count as 0."""
     _, singular_values, rows = np.linalg.svd(matrix)
     greatest = singular_values.max(initial=0.0)
-    basis: np.ndarray = rows[np.count_nonzero(singular_values > tolerance * greatest) :].T
-    return basis
+    return np.asarray(rows[np.count_nonzero(singular_values > tolerance * greatest) :].T)
 
 
 def cable_wrenches(
