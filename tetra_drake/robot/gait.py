@@ -55,6 +55,14 @@ class Gait:
     weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
     """Names such as "3->1 extensor": from oscillator 3 onto oscillator 1. Empty if unknown."""
 
+    def __post_init__(self) -> None:
+        """Raises InputError for a number that no gait has."""
+        wrong = [weight for weight in self.weights if not 0.0 <= weight < math.inf]
+        wrong += [tau for tau in (self.tau_a, self.tau_b) if not 0.0 < tau < math.inf]
+        if wrong:
+            expected = "weights of 0 or more, and time constants above 0 s"
+            raise InputError(f"gait {self.name}", "", f"found {wrong[0]}, expected {expected}")
+
     def __str__(self) -> str:
         """Summary in a few lines. The weights are shown as a matrix if it fits."""
         lines = [f"{self.name}: tau_A {self.tau_a:.4g} s, tau_B {self.tau_b:.4g} s"]
@@ -173,13 +181,6 @@ class ParameterSpace:
         """The gait with the parameters of a vector. Raises InputError for a vector of another size,
         a number that is not finite, a weight below 0, or a time constant that is not above 0."""
         vector = self._numbers(vector)
-        wrong = ~np.isfinite(vector) | (vector < 0.0) & np.isfinite(self.floors)
-        wrong[TAU_A:] |= vector[TAU_A:] == 0.0
-        if wrong.any():
-            first = int(wrong.argmax())
-            expected = "a finite number, for a weight 0 or more, for a time constant above 0"
-            problem = f"found {vector[first]}, expected {expected}"
-            raise InputError("ParameterSpace", self.names[first], problem)
         first_gain = len(self.names) - 2 - len(self.pathways)
         gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
         return Gait(
