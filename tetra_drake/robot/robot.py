@@ -151,7 +151,7 @@ class Robot:
             raise InputError("steering", "", "no oscillator is on one side of the robot")
         step = self.scenario.cpg.listing_step
         times = step * np.arange(round(self.scenario.simulation.duration / step) + 1)
-        return np.array([checked_turn(float(steering(time)), time=time) for time in times.tolist()])
+        return np.array([checked_turn(steering(time), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
         """Input u0 of each neuron (..., 2m), for turns (...); see
@@ -421,9 +421,9 @@ def constant_steering(turn: float) -> SteeringSignal:
 def checked_turn(turn: float, *, time: float) -> float:
     """The turn, if it is between -1 and 1. Raises InputError otherwise; `time` (s) is for the
     message."""
-    if not abs(turn) <= 1.0:
-        raise InputError("steering", f"at {time:g} s", f"found {turn}, expected -1 to 1")
-    return turn
+    if not isinstance(turn, numbers.Real) or not abs(turn) <= 1.0:
+        raise InputError("steering", f"at {time:g} s", f"found {turn!r:.60}, expected -1 to 1")
+    return float(turn)
 
 
 def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:

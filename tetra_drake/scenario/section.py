@@ -270,7 +270,7 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
         words, name = _LIMITS[error["type"]]
         unit = unit_of(keys_of(section)[str(error["loc"][0])])
         if "length" in name:
-            unit = f"items, not {len(value)}"
+            unit = f"items, not {len(value or ())}"
         expected = f"{words} {context[name]:.4g} {unit}".rstrip()
     return key, f"found {described(value)}, expected {expected}"
 
