@@ -70,6 +70,7 @@ def refusal(command, capsys):
     [
         ("", "", "COMMAND"),
         ("simulate --seed 1 good.json", " simulate", "FILE|RUN --seed"),
+        ("cpg good.json --gait good.json --out a", " cpg", "--gait FILE|RUN"),
         ("simulate --sceanrio thesis", " simulate", "--sceanrio '--scenario'?"),
         ("figures a --width 3.4", " figures", "--width '3.4' '3.4 in'"),
         ("compare a b --width 1e6m", " compare", "'1e6m' 40"),
@@ -149,7 +150,7 @@ def test_simulate_gives_the_same_numbers_of_seed_and_gait_and_replay_the_same_pa
     gait = seeded_gait(load_scenario(), 3)
     save_gait(gait, "gait.json", load_scenario("short.yaml"))
     results, out = [], work / "made" / "when missing"
-    for option in ("--seed=3", "gait.json"):
+    for option in ("--seed=3", "--gait=gait.json"):
         assert main(["simulate", "--scenario=short.yaml", option, f"--out={out}"]) == 0
         names = ["replay.html", "result.json", "scenario.yaml", "trajectory.nc"]
         assert sorted(os.listdir(out)) == names

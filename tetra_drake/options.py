@@ -5,7 +5,8 @@
     def play(gait: File, *, seed: Seed = 0) -> None:
 
 A keyword-only parameter is an option with its name; another parameter is a positional argument. A
-parameter without default is required. The help of an option is the text of its type, then the text
+parameter without default is required. A positional argument with a default may also be given by its
+name, as in --gait FILE. The help of an option is the text of its type, then the text
 under `Args:` in the function's docstring.
 """
 
@@ -64,12 +65,19 @@ class Command(argparse.ArgumentParser):
                 if group not in groups:
                     groups[group] = command.add_mutually_exclusive_group()
                 groups[group].add_argument(name, **more)
+                if parameter.kind is not parameter.KEYWORD_ONLY and "default" in more:
+                    named = {"dest": f"--{name}", "type": more["type"], "help": argparse.SUPPRESS}
+                    groups[group].add_argument(f"--{name}", **named)
 
     def call_of(self, argv: Sequence[str] | None) -> tuple[Callable[..., None], dict[str, Any]]:
         """The function of a command, and the values of its options."""
         options, unknown = self.parse_known_args(argv)
         values = vars(options)
         function, parser = values.pop("function"), values.pop("parser")
+        for name in [name for name in values if name.startswith("--")]:
+            value = values.pop(name)  # of a positional argument that is given by its name
+            if value is not None:
+                values[name.removeprefix("--")] = value
         if unknown:
             from tetra_drake.scenario.refusals import hint
 
