@@ -236,15 +236,20 @@ def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
 
 
 @compiled
-def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> None:
+def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> float:
     """Writes the generalized force of all cables (6 bodies,): [t_W; f_W] at each body's origin.
 
-    Also writes nodes, `cable_forces` and the rates of the drives.
+    Also writes nodes, `cable_forces` and the rates of the drives. Returns a number that is finite
+    if all forces are.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_cable_forces(robot, signals, True, forces)
     kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+    total = 0.0
+    for i in range(generalized.size):
+        total += generalized[i]
+    return total
 
 
 @compiled

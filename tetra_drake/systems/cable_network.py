@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -89,7 +90,6 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, motion)
         self.DeclareVectorOutputPort("rates", count, self._calc_rates, motion)
         size = self._forces.cable_forces.size
-        self._zeros = np.zeros(size)
         self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
         self.DeclareVectorOutputPort("ends", 6 * count, self._calc_ends, motion)
 
@@ -108,9 +108,8 @@ class CableNetwork(LeafSystem):
         """The table `cable_forces`. Writes the generalized force to `force`. Raises
         SimulationFailure if a number of a cable is not finite although the state is."""
         state, table = self._state.Eval(context), self._forces.cable_forces
-        self._compute_forces(self._parts, state, signals, force)
-        # The product is NaN if a number is not finite. It is the fastest way to see that.
-        if self._zeros.dot(table.ravel()) == 0.0 or not np.isfinite(state).all():
+        total = self._compute_forces(self._parts, state, signals, force)
+        if math.isfinite(total) or not np.isfinite(state).all():
             return table
         place = int(np.argmin(np.isfinite(table).all(axis=1)))
         reason = f"the ends of cable '{self._names[place]}' meet, or its forces are too large"
