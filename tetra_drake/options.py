@@ -74,10 +74,9 @@ class Command(argparse.ArgumentParser):
         options, unknown = self.parse_known_args(argv)
         values = vars(options)
         function, parser = values.pop("function"), values.pop("parser")
-        for name in [name for name in values if name.startswith("--")]:
-            value = values.pop(name)  # of a positional argument that is given by its name
-            if value is not None:
-                values[name.removeprefix("--")] = value
+        # Positional arguments that are given by their names.
+        named = {name: values.pop(name) for name in [*values] if name.startswith("--")}
+        values |= {name.removeprefix("--"): value for name, value in named.items() if value}
         if unknown:
             from tetra_drake.scenario.refusals import hint
 
