@@ -311,14 +311,14 @@ def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: s
     """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, naming
     `source`, if they have another shape, or are not real numbers."""
     least = shape[1:] if shape[0] == 1 else shape
-    found = f"{actions!r:.60}"
+    found = ""
     with contextlib.suppress(TypeError, ValueError):
-        given: np.ma.MaskedArray = np.ma.asarray(actions)
-        if given.dtype.kind in "iuf" and not np.ma.is_masked(given):
+        given = np.asarray(actions)
+        if given.dtype.kind in "iuf" and not np.ma.is_masked(actions):
             if given.shape in (shape, least):
-                return given.data.astype(float).reshape(shape)
+                return given.astype(float).reshape(shape)
             found = f"the shape {given.shape}"
-    problem = f"found {found}, expected real numbers of shape {least}"
+    problem = f"found {found or repr(actions):.60}, expected real numbers of shape {least}"
     raise InputError(source, "actions", problem)
 
 
