@@ -26,7 +26,7 @@ Functions, and the main attributes of their results:
     MotionCapture, Rest measurements for fit(): motion over time; shape, tensions, frequencies
     robustness          how far gaits walk on disturbed robots
     compare             how well runs search, with intervals
-    study_equilibrium   shape, tensions, self-stress, natural frequencies at rest
+    study_equilibrium   shape, tensions, self-stress, frequencies and modes at rest
     export              writes a gait as commands for the actuators of a prototype
     prepare             compiles everything once, so that nothing later waits
     load_command        commands for actuators from a file, for simulate(scenario, command=...)

@@ -34,7 +34,12 @@ def test_two_bars_side_by_side_bounce_as_masses_on_springs():
     mass, ground = math.pi * 0.002**2 * 0.2 * 1e4, robot.scenario.ground.stiffness
     slow = math.sqrt(2.0 * ground / mass) / (2.0 * math.pi)
     expected = [slow, slow, math.sqrt(3.0) * slow, math.sqrt(3.0) * slow]
-    assert study_equilibrium(robot).frequencies == pytest.approx(expected, rel=2e-3)
+    study = study_equilibrium(robot)
+    assert study.frequencies == pytest.approx(expected, rel=2e-3)
+    first, second = study.modes[:, [0, 2], 2], study.modes[:, [1, 3], 2]  # ends of each bar
+    assert [robot.structure.node_names[i] for i in (0, 1)] == ["a0", "a1"]
+    assert first[:2] == pytest.approx(second[:2], abs=1e-3)
+    assert first[2:] == pytest.approx(-second[2:], abs=1e-3)
 
 
 def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):

@@ -13,6 +13,7 @@ import numpy as np
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.physics.kinematics import FORCE
+from tetra_drake.physics.rigid_motions import rigid_motions
 from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
@@ -42,6 +43,8 @@ class EquilibriumStudy:
     """A row per cable, by its name: group, length, free_length, tension."""
     frequencies: np.ndarray
     """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely."""
+    modes: np.ndarray
+    """Mode shapes (frequencies, nodes, 3): displacements of the nodes, 1 for the farthest one."""
 
 
 def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
@@ -78,6 +81,7 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         "free_length": structure.cables["free_length"],
         "tension": unactuated.forces.cable_forces[:, TENSION],
     }
+    frequencies, modes = _modes(structure, unactuated, equilibrium.state)
     return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
@@ -88,7 +92,8 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         ),
         nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-        frequencies=_frequencies(structure, unactuated, equilibrium.state),
+        frequencies=frequencies,
+        modes=modes,
     )
 
 
@@ -109,12 +114,24 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
     return node_positions(structure, equilibrium_of(weightless, structure, start).state)
 
 
-def _frequencies(structure: Structure, unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Natural frequencies (Hz) above LEAST_FREQUENCY."""
+def _modes(
+    structure: Structure, unactuated: Unactuated, state: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Natural frequencies (Hz) above LEAST_FREQUENCY, and their shapes (frequencies, nodes, 3)."""
     from scipy import linalg
 
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), structure, unactuated, state)
-    squares = linalg.eigvalsh(stiffness, mass_matrix(unactuated))  # of M x'' = -K x
-    least = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
-    return np.sqrt(squares[squares > least]) / (2.0 * math.pi)
+    squares, motions = linalg.eigh(stiffness, mass_matrix(unactuated))  # of M x'' = -K x
+    is_mode = squares > (2.0 * math.pi * LEAST_FREQUENCY) ** 2
+    bodies = len(structure.bodies)
+    by_body = motions[:, is_mode].reshape(bodies, 6, -1)
+    by_body[:, :3] /= unactuated.radius  # see displaced()
+    p_WN = node_positions(structure, state)
+    modes = np.zeros((is_mode.sum(), *p_WN.shape))
+    for body in range(bodies):
+        own = slice(structure.first_node[body], structure.first_node[body + 1])
+        p_BoN_W = p_WN[own] - state[7 * body + 4 : 7 * body + 7]
+        modes[:, own] = (rigid_motions(p_BoN_W) @ by_body[body]).transpose(2, 0, 1)
+    modes /= np.linalg.norm(modes, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
+    return np.sqrt(squares[is_mode]) / (2.0 * math.pi), modes
