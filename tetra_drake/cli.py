@@ -76,9 +76,21 @@ def make_parser() -> Command:
         help="units of lengths and forces in texts, pages and figures (default: the units in which "
         "the robot's lengths are round, or mm if it is given in mm)",
     )
-    of_gaits: list[Callable[..., None]] = [_simulate, _evolve, _export, _replay, _video, _figures]
-    others: list[Callable[..., None]] = [_robustness, _compare, _fit, _cpg, _structure, _prepare]
-    parser.add_commands([*of_gaits, *others], common=common)
+    commands: list[Callable[..., None]] = [
+        _simulate,
+        _evolve,
+        _export,
+        _replay,
+        _video,
+        _figures,
+        _robustness,
+        _compare,
+        _fit,
+        _cpg,
+        _structure,
+        _prepare,
+    ]
+    parser.add_commands(commands, common=common)
     return parser
 
 
@@ -154,7 +166,6 @@ def _simulate(
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
     from tetra_drake.scenario.load import load_scenario
-    from tetra_drake.visualization.live import open_view
 
     played = None
     if command is None:
@@ -169,7 +180,11 @@ def _simulate(
         check_can_be_watched(chosen)
     check_result_folder(out)
     engine_of(chosen).prepare(chosen)
-    view = open_view(chosen, say=_say) if meshcat else None
+    view = None
+    if meshcat:
+        from tetra_drake.visualization.live import open_view
+
+        view = open_view(chosen, say=_say)
     result = simulate(chosen, chosen_gait, command=played, record=True, viewer=view)
     print(result_text(result))
     save_result_folder(out, result)

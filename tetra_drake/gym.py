@@ -74,7 +74,12 @@ class _Episodes:
     """Episodes of robots side by side: observations, actions and rewards of all environments."""
 
     def __init__(
-        self, simulation: Simulation, most_steps: int | None, grouped: bool, render_mode: str | None
+        self,
+        simulation: Simulation,
+        *,
+        grouped: bool,
+        render_mode: str | None,
+        most_steps: int | None = None,
     ) -> None:
         """Robots that have no episodes yet. An episode has at most `most_steps`."""
         check_type(_SOURCE, "grouped", grouped, bool)
@@ -218,7 +223,7 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
         options: Info = {"grouped": grouped, "render_mode": render_mode}
         EzPickle.__init__(self, scenario, control_period=control_period, record=record, **options)
         simulation = Simulation(scenario, control_period=control_period, record=record, workers=1)
-        self._episodes = _Episodes(simulation, None, **options)
+        self._episodes = _Episodes(simulation, **options)
         self.metadata, self.render_mode = self._episodes.metadata, render_mode
         self.observation_space = self._episodes.observation_space
         self.action_space = self._episodes.action_space
@@ -281,7 +286,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
             problem = f"found {autoreset_mode!r:.60}, expected one of {modes}"
             raise InputError(_SOURCE, "autoreset_mode", problem) from None
         simulation = Simulation(scenario, count=num_envs, **made)
-        self._episodes = _Episodes(simulation, max_episode_steps, **options)
+        self._episodes = _Episodes(simulation, **options, most_steps=max_episode_steps)
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
         self._ended = np.zeros(num_envs, dtype=bool)
         self.num_envs, self.render_mode = num_envs, render_mode

@@ -82,8 +82,9 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
         return
     keys = missing[_KEY].to_numpy().tolist()
     gaits = {i: run.gait(trial, index) for i, (trial, index) in enumerate(keys)}
-    settings: Any = {"draws": kind.draws, "seed": manifest.seed, "workers": workers}
-    judgement = robustness(run.scenario, gaits, alone=False, **settings)
+    judgement = robustness(
+        run.scenario, gaits, draws=kind.draws, seed=manifest.seed, alone=False, workers=workers
+    )
     table = by_gait(judgement)
     lines = [
         {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}

@@ -4,9 +4,10 @@ positions, natural frequencies."""
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 LEAST_FREQUENCY = 0.05
 """Least natural frequency in Hz. A slower mode is a motion that no force resists, such as the spin
 of a bar about its axis."""
+_LEAST_SQUARE = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,25 @@ class EquilibriumStudy:
     """A row per cable, by its name: group, length, free_length, tension."""
     frequencies: np.ndarray
     """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely."""
-    modes: np.ndarray
-    """Mode shapes (frequencies, nodes, 3): displacements of the nodes, 1 for the farthest one."""
+
+    @functools.cached_property
+    def modes(self) -> np.ndarray:
+        """Mode shapes (frequencies, nodes, 3): displacements of the nodes, 1 for the farthest
+        one."""
+        from scipy import linalg
+
+        vibration, structure = _Vibration.of(self.robot), self.robot.structure
+        squares, motions = linalg.eigh(vibration.stiffness, vibration.mass)
+        motions = motions[:, squares > _LEAST_SQUARE]
+        by_body = motions.reshape(len(structure.bodies), 6, -1)
+        by_body[:, :3] /= vibration.radius
+        p_WB = self.robot.equilibrium.state[: 7 * len(by_body)].reshape(-1, 7)[:, 4:]
+        p_WN = self.nodes[["x", "y", "z"]].to_numpy()
+        modes = np.zeros((motions.shape[1], *p_WN.shape))
+        for body, motion in enumerate(by_body):
+            own = slice(structure.first_node[body], structure.first_node[body + 1])
+            modes[:, own] = (rigid_motions(p_WN[own] - p_WB[body]) @ motion).transpose(2, 0, 1)
+        return modes / np.linalg.norm(modes, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
 
 
 def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
@@ -81,7 +100,6 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         "free_length": structure.cables["free_length"],
         "tension": unactuated.forces.cable_forces[:, TENSION],
     }
-    frequencies, modes = _modes(structure, unactuated, equilibrium.state)
     return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
@@ -92,8 +110,7 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         ),
         nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-        frequencies=frequencies,
-        modes=modes,
+        frequencies=_frequencies(robot),
     )
 
 
@@ -114,24 +131,26 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
     return node_positions(structure, equilibrium_of(weightless, structure, start).state)
 
 
-def _modes(
-    structure: Structure, unactuated: Unactuated, state: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Natural frequencies (Hz) above LEAST_FREQUENCY, and their shapes (frequencies, nodes, 3)."""
+class _Vibration(NamedTuple):
+    """Equation of motion M x'' = -K x about the equilibrium, without damping."""
+
+    stiffness: np.ndarray
+    mass: np.ndarray
+    radius: float
+    """Length (m) that turns rotations into the displacements x; see displaced()."""
+
+    @classmethod
+    def of(cls, robot: Robot) -> _Vibration:
+        unactuated, state = Unactuated(robot.model), robot.equilibrium.state
+        force_at_rest(unactuated, state)
+        stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
+        return cls(stiffness, mass_matrix(unactuated), unactuated.radius)
+
+
+def _frequencies(robot: Robot) -> np.ndarray:
+    """Natural frequencies (Hz) above LEAST_FREQUENCY."""
     from scipy import linalg
 
-    force_at_rest(unactuated, state)
-    stiffness = condensed(stiffness_at_rest(unactuated), structure, unactuated, state)
-    squares, motions = linalg.eigh(stiffness, mass_matrix(unactuated))  # of M x'' = -K x
-    is_mode = squares > (2.0 * math.pi * LEAST_FREQUENCY) ** 2
-    bodies = len(structure.bodies)
-    by_body = motions[:, is_mode].reshape(bodies, 6, -1)
-    by_body[:, :3] /= unactuated.radius  # see displaced()
-    p_WN = node_positions(structure, state)
-    modes = np.zeros((is_mode.sum(), *p_WN.shape))
-    for body in range(bodies):
-        own = slice(structure.first_node[body], structure.first_node[body + 1])
-        p_BoN_W = p_WN[own] - state[7 * body + 4 : 7 * body + 7]
-        modes[:, own] = (rigid_motions(p_BoN_W) @ by_body[body]).transpose(2, 0, 1)
-    modes /= np.linalg.norm(modes, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
-    return np.sqrt(squares[is_mode]) / (2.0 * math.pi), modes
+    vibration = _Vibration.of(robot)
+    squares = linalg.eigvalsh(vibration.stiffness, vibration.mass)
+    return np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi)

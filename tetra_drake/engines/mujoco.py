@@ -368,13 +368,17 @@ class _MujocoWalk:
         """The result, at the end."""
         robot, totals = self._simulation.robot, self._observer.totals()
         scheme = integrator_of(robot, pulled=self._simulator.pulled)
-        counts = {"steps": self.steps, "derivative_evaluations": self.steps}
         return make_result(
             robot,
             self._simulation.gait,
             self._simulator.motion(self.times, self._kept, self.signals, self._drives_kept),
             totals=totals,
-            work=IntegratorWork(scheme=scheme, accuracy=self.step, **counts),
+            work=IntegratorWork(
+                scheme=scheme,
+                accuracy=self.step,
+                steps=self.steps,
+                derivative_evaluations=self.steps,
+            ),
             wall_time=self._wall_time,
             record=self._simulation.record,
         )

@@ -94,9 +94,15 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
         for group, values in enumerate(sample.discrete):
             context.SetDiscreteState(group, values)
         modes = ground.get_discrete_state_vector().CopyToVector().reshape(-1, MODE_COLUMNS)
-        seen = state.Eval(context), signals.Eval(context)
-        rows.append((sample.time, *seen, modes, drives_at(context)))
-    return Motion(*map(np.array, zip(*rows, strict=True)))
+        row = {
+            "times": sample.time,
+            "states": state.Eval(context),
+            "signals": signals.Eval(context),
+            "modes": modes,
+            "drives": drives_at(context),
+        }
+        rows.append(row)
+    return Motion(**{name: np.array([row[name] for row in rows]) for name in rows[0]})
 
 
 def frame_of(robot: Robot, diagram: Diagram, context: Context) -> xarray.Dataset:

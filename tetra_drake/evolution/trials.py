@@ -210,11 +210,13 @@ def check_fitness(trials: Sequence[Trial], directory: Path, evaluator: Evaluator
     """Evaluates the first recorded gait with a fitness again. Raises InputError if its fitness
     differs, so that a record never mixes two objectives."""
     recalled = [trial.recalled for trial in trials if trial.recalled is not None]
-    for task, recorded in recalled[:1]:
-        ((_, again),) = evaluate_all(evaluator, [task])
-        if again.fitness != recorded.fitness:
-            outcome = again.failure or f"fitness {again.fitness!r}"
-            found = f"{task} has fitness {recorded.fitness!r}, and evaluated again {outcome}"
-            same = "the objective, the versions of the packages and the kind of processor"
-            problem = f"{found}; resume the run with {same} it was begun with"
-            raise InputError(directory, "objective", problem)
+    if not recalled:
+        return
+    task, recorded = recalled[0]
+    ((_, again),) = evaluate_all(evaluator, [task])
+    if again.fitness != recorded.fitness:
+        outcome = again.failure or f"fitness {again.fitness!r}"
+        found = f"{task} has fitness {recorded.fitness!r}, and evaluated again {outcome}"
+        same = "the objective, the versions of the packages and the kind of processor"
+        problem = f"{found}; resume the run with {same} it was begun with"
+        raise InputError(directory, "objective", problem)

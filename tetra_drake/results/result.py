@@ -171,8 +171,10 @@ def make_result(
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
     ends = motion.at(np.array([0.0, simulation.settling_time, simulation.duration]))
-    samples = sample_times(simulation.duration, simulation.sample_period)
-    trajectory = make_dataset(robot, motion.at(samples)) if record else None
+    trajectory = None
+    if record:
+        samples = sample_times(simulation.duration, simulation.sample_period)
+        trajectory = make_dataset(robot, motion.at(samples))
     poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses, structure)
     metrics = compute_metrics(

@@ -205,12 +205,11 @@ class Blueprint:
         """Index of the mirror image of each cable; -1 if there is none."""
         placed, least = self._ends, self._least_distance
         images: list[int] = []
-        for ends in placed * [1.0, -1.0, 1.0]:
+        for ends, group in zip(placed * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
             forward = np.abs(placed - ends).max(axis=(1, 2))
             backward = np.abs(placed - ends[::-1]).max(axis=(1, 2))
             found = np.flatnonzero(np.minimum(forward, backward) <= least).tolist()
             # Of parallel cables, the image is one of the same group.
-            group = self.cable_groups[len(images)]
             alike = [cable for cable in found if self.cable_groups[cable] == group]
-            images.append((*alike, *found, -1)[0])
+            images.append(next(iter(alike or found), -1))
         return images

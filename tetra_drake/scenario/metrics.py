@@ -152,7 +152,10 @@ class Metrics:
     distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0], of_pose=True)
     """Displacement of x₁ from the start to the end."""
     steady_distance: float = _metric(
-        "m", "without the start", lambda walk: np.diff(walk.followed[:, 0])[1], of_pose=True
+        "m",
+        "without the start",
+        lambda walk: walk.followed[2, 0] - walk.followed[1, 0],
+        of_pose=True,
     )
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
     speed: float = _metric(

@@ -124,7 +124,7 @@ class _Translation:
                 self._note("left out, as they join a body to itself", f"{first} {second}")
             elif body == WORLD and not is_cable:
                 self._note("held in space, as their density is 0", pair.group)
-            elif not is_cable and not builder.parameters.density and {*pair.nodes} in dense:
+            elif not is_cable and not builder.parameters.density and frozenset(pair.nodes) in dense:
                 self._note("left out, as parts with mass have their place", pair.group)
             else:
                 yield pair, builder, at

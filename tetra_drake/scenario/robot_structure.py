@@ -333,7 +333,7 @@ class StructureFile(Section):
         named |= {*self.body_of_node, *self.anchors}
         return tuple(node for node in self.nodes if node not in named)
 
-    @property
+    @cached_property
     def _fixed(self) -> set[str]:
         """Nodes with an anchor along all axes."""
         return {node for node, axes in self.anchors.items() if len(axes) == len("xyz")}
@@ -434,10 +434,11 @@ class StructureFile(Section):
         for kind in ("struts", "cables") if isinstance(tree, dict) else ():
             given = tree.get(kind)
             groups = given.items() if isinstance(given, dict) else ()
-            whole = {str(name): "pairs" in group for name, group in groups if type(group) is dict}
-            for name in (name for name, has_pairs in whole.items() if not has_pairs):
-                names = filter(whole.get, whole)
-                refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, names)}")
+            mappings = [(str(name), group) for name, group in groups if isinstance(group, dict)]
+            whole = [name for name, group in mappings if "pairs" in group]
+            for name, group in mappings:
+                if "pairs" not in group:
+                    refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, whole)}")
         return tree
 
     @pydantic.model_validator(mode="after")
@@ -496,8 +497,9 @@ class StructureFile(Section):
                 refuse(key, f"found the {what} node '{node}', expected one that can move")
         if not self.bodies:
             refuse("nodes", "none can move, expected struts, masses or spheres")
-        for node in (node for node, *others in self.bodies if not others and node not in ends):
-            refuse(f"nodes.{node}", "is on no strut and no cable, expected a cable to it")
+        for body in self.bodies:
+            if len(body) == 1 and body[0] not in ends:
+                refuse(f"nodes.{body[0]}", "is on no strut and no cable, expected a cable to it")
 
     def _can_move(self, body: tuple[str, ...]) -> bool:
         """True if a body with these nodes can move in spite of its anchors. The spin of a straight
@@ -516,8 +518,8 @@ class StructureFile(Section):
             is_cable, nodes = member.key.startswith("cables."), frozenset(member.nodes)
             earlier = keys.setdefault((member.group, nodes) if is_cable else nodes, member.key)
             if earlier != member.key:
-                expected = "each pair once" + is_cable * " in a group of cables"
-                refuse(member.key, f"found the nodes of {earlier}, expected {expected}")
+                where = " in a group of cables" if is_cable else ""
+                refuse(member.key, f"found the nodes of {earlier}, expected each pair once{where}")
 
     def _check_sizes(self) -> None:
         for node, place in self.nodes.items():
@@ -525,8 +527,8 @@ class StructureFile(Section):
                 expected = f"expected coordinates of at most {LONGEST:g} m"
                 refuse(f"nodes.{node}", f"found {place}, {expected}")
         for strut in self.all_struts:
-            group = self.struts[strut.group]
-            check_strut(strut.key, self._length(strut), group.diameter, group.density)
+            group, length = self.struts[strut.group], self._length(strut)
+            check_strut(strut.key, length=length, diameter=group.diameter, density=group.density)
 
     def _check_inertia(self) -> None:
         """Refuses bodies of several nodes without struts or spheres that have mass, and others
@@ -542,7 +544,7 @@ class StructureFile(Section):
             mass[body] += own if len(self.bodies[body]) == 1 else 0.0
         if mass.min() < LIGHTEST:
             node = self.bodies[int(mass.argmin())][0]
-            without = "without point masses " * (node not in self.masses)
+            without = "" if node in self.masses else "without point masses "
             problem = f"is on a body whose mass {without}is {mass.min():.3g} kg"
             refuse(f"nodes.{node}", f"{problem}, expected at least {LIGHTEST:g} kg")
 

@@ -80,7 +80,7 @@ LIGHTEST = 1e-12
 """Least mass of a strut, in kg."""
 
 
-def check_strut(key: str, length: float, diameter: float, density: float) -> None:
+def check_strut(key: str, *, length: float, diameter: float, density: float) -> None:
     """Refuses a strut with a size (SI units) that is too extreme for the computation of forces."""
     if not SHORTEST <= length <= LONGEST:
         refuse(key, f"is {length:.3g} m long, expected {SHORTEST:g} m to {LONGEST:g} m")
@@ -245,7 +245,8 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        check_strut("strut_length", self.strut_length, self.strut_diameter, self.density)
+        sizes = {"length": self.strut_length, "diameter": self.strut_diameter}
+        check_strut("strut_length", **sizes, density=self.density)
         check_one_per_body("offsets", self.offsets, self.tetrahedra)
         check_one_per_body("payload", self.payload, self.tetrahedra)
         cables = [cable for group in self.actuation for cable in group]

@@ -119,11 +119,12 @@ class BodyForces(LeafSystem):
     def __init__(self, plant: MultibodyPlant) -> None:
         super().__init__()
         self._force = self.DeclareVectorInputPort("generalized_force", 6 * (plant.num_bodies() - 1))
-        none, sources = (
-            AbstractValue.Make([ExternallyAppliedSpatialForce()]),
+        self.DeclareAbstractOutputPort(
+            "spatial_forces",
+            lambda: AbstractValue.Make([ExternallyAppliedSpatialForce()]),
+            self._calc_forces,
             {self._force.ticket()},
         )
-        self.DeclareAbstractOutputPort("spatial_forces", none.Clone, self._calc_forces, sources)
 
     def _calc_forces(self, context: Context, output: AbstractValue) -> None:
         forces = self._force.Eval(context).reshape(-1, 6)

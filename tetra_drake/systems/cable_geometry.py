@@ -44,8 +44,12 @@ class CableGeometry(LeafSystem):
         super().__init__()
         self._lengths, self._frames = lengths, frames
         self._ends = self.DeclareVectorInputPort("ends", 6 * len(frames))
-        none, sources = AbstractValue.Make(FramePoseVector()), {self._ends.ticket()}
-        self.DeclareAbstractOutputPort("geometry_pose", none.Clone, self._calc_poses, sources)
+        self.DeclareAbstractOutputPort(
+            "geometry_pose",
+            lambda: AbstractValue.Make(FramePoseVector()),
+            self._calc_poses,
+            {self._ends.ticket()},
+        )
 
     def _calc_poses(self, context: Context, output: AbstractValue) -> None:
         poses, ends = output.get_mutable_value(), self._ends.Eval(context).reshape(-1, 2, 3)

@@ -211,8 +211,14 @@ class LaneEngine:
     def motion(self, place: int) -> Motion:
         """Samples of the latest simulation in a place, up to now."""
         log = self._log
-        columns = log.times, log.states, log.signals, log.modes, log.drives
-        return Motion(*(column[place, : log.kept[place]].copy() for column in columns))
+        kept = slice(log.kept[place])
+        return Motion(
+            times=log.times[place, kept].copy(),
+            states=log.states[place, kept].copy(),
+            signals=log.signals[place, kept].copy(),
+            modes=log.modes[place, kept].copy(),
+            drives=log.drives[place, kept].copy(),
+        )
 
 
 def _failure(status: int, *, time: float, prepared: Prepared) -> SimulationFailure:
