@@ -8,20 +8,26 @@ import pytest
 from tetra_drake.physics.friction import (
     STICK,
     CoulombConstants,
+    FrictionLaw,
     ResetConstants,
     Slide,
     TangentSlide,
+    begins_to_stick,
     coulomb_damping,
     coulomb_force,
+    kept_deflection,
     next_coulomb_mode,
-    next_tangent_mode,
+    next_reset_mode,
+    reset_force,
     tangent_force,
 )
 
 # The reset integrator, along one tangent.
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
-RESET = ResetConstants(P0, SIGMA_1, A_C, SIGMA_0)
+OLSSON = 50.0  # N/m, of a bristle with stiffness
+OTHERS = {"stiffness": 0.0, "kept": 0.0, "restarts": 0.0, "joint": 0.0, "per_load": 0.0}
+RESET = ResetConstants(P0, SIGMA_1, A_C, SIGMA_0, **OTHERS)
 
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
@@ -34,10 +40,19 @@ def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
 @pytest.mark.parametrize("x", [0.5 * P0, -0.9 * P0])
-def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
-    expected = -(SIGMA_0 * 0.02 * (1.0 + A_C) * x + SIGMA_1 * velocity)
-    force = tangent_force(TangentSlide(velocity, x, STICK), RESET)
+@pytest.mark.parametrize("stiffness", [0.0, OLSSON])
+def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x, stiffness):
+    expected = -((stiffness + SIGMA_0 * 0.02) * (1.0 + A_C) * x + SIGMA_1 * velocity)
+    law = RESET._replace(stiffness=stiffness)
+    force = tangent_force(TangentSlide(velocity, x, STICK), law)
     assert force == pytest.approx(expected, rel=1e-14)
+
+
+def test_friction_is_proportional_to_the_load_where_a_load_is_given():
+    pushed = slide(v=(0.02, -0.01), x=(0.5 * P0, 0.0))
+    force = np.array(reset_force(pushed, RESET))
+    at_twice_the_load = reset_force(pushed, RESET._replace(per_load=2.0 / NORMAL))
+    assert np.array(at_twice_the_load) == pytest.approx(2.0 * force, rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +68,26 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     ],
 )
 def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
-    assert next_tangent_mode(TangentSlide(velocity, deflection, mode), RESET) == after
+    moving = slide(v=(0.0, velocity), x=(0.0, deflection), mode=(STICK, mode))
+    assert next_reset_mode(moving, RESET) == (STICK, after)
+
+
+def test_a_joint_law_breaks_free_along_both_tangents_and_holds_each_deflection():
+    moving = slide(v=(0.01, -0.01), x=(P0, -0.25 * P0))
+    assert next_reset_mode(moving, RESET) == (1.0, STICK)
+    assert next_reset_mode(moving, RESET._replace(joint=1.0)) == (1.0, -0.25)
+    inward = slide(v=(0.01, 0.01), x=(P0, -0.25 * P0))
+    assert next_reset_mode(inward, RESET._replace(joint=1.0)) == (1.0, STICK)
+
+
+def test_the_deflection_starts_again_at_the_range_or_is_kept_at_a_reversal():
+    at_range, reversed_slip = slide(v=(0.01, 0.0), x=(P0, 0.0)), slide(v=(-0.01, 0.0), mode=(1, 0))
+    restarts = FrictionLaw.of(RESET._replace(restarts=1.0))
+    assert next_reset_mode(at_range, RESET._replace(restarts=1.0)) == (STICK, STICK)
+    assert begins_to_stick(at_range, (STICK, STICK), restarts) == (True, False)
+    for law, kept in ((RESET, 0.0), (RESET._replace(kept=1.0), P0)):
+        assert begins_to_stick(reversed_slip, (STICK, STICK), FrictionLaw.of(law)) == (True, False)
+        assert kept_deflection((1.0, STICK), FrictionLaw.of(law)) == (kept, 0.0)
 
 
 # Coulomb friction.

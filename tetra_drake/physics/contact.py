@@ -205,7 +205,7 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
     """Updates `modes` for the nodes of a state. Returns True in lanes where a mode changed.
 
     A node that lands sticks where it lands. A node that sticks again does so at its present
-    position; this is the reset of the reset integrator.
+    position; this is the reset of the reset integrator, unless the deflection is kept.
     """
     changed = False
     for i in range(ground.contacts.size):
@@ -218,9 +218,10 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         lands = touches & not_(touched)
         if any_lane(lands):
             set_heading(state, ground, frames, i, lands, modes)
-        begins_1, begins_2 = friction.begins_to_stick(before, after, ground.friction)
+        begins_1, begins_2 = friction.begins_to_stick(slide, after, ground.friction)
         sticks_here = lands | begins_1, lands | begins_2
-        move_stick_point(state, nodes, ground, frames, i, sticks_here, slide, modes)
+        bend = friction.kept_deflection(before, ground.friction)
+        move_stick_point(state, nodes, ground, frames, i, sticks_here, bend, slide, modes)
         modes[i, CONTACT] = select(touches, 1.0, 0.0)
         modes[i, MODE], modes[i, MODE + 1] = after
         changed = changed | (touched ^ touches)
@@ -236,31 +237,33 @@ def move_stick_point(
     frames: Table,
     i: int,
     along: tuple[Truth, Truth],
+    bend: friction.Pair,
     slide: friction.Slide,
     modes: Table,
 ) -> None:
-    """Moves the stick point of a contact node to the node. `along` says, for t1 and t2, whether the
-    stick point moves along this tangent.
+    """Moves the stick point of a contact node so that its deflection is `bend`. `along` says, for
+    t1 and t2, whether the stick point moves along this tangent.
 
     With round feet, the orientation is stored, and along the other tangents the stick point moves
     so that the deflection stays.
     """
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     if ground.is_round:
-        x_1 = select(along[0], 0.0, slide.t1.deflection)
-        x_2 = select(along[1], 0.0, slide.t2.deflection)
-        bend = terrain.to_world(x_1, x_2, 0.0, frames, i, ground.flat)
-        put_vector(difference(p_WN, bend), i, STICK_POINT, modes)
+        x_1 = select(along[0], bend[0], slide.t1.deflection)
+        x_2 = select(along[1], bend[1], slide.t2.deflection)
+        deflection = terrain.to_world(x_1, x_2, 0.0, frames, i, ground.flat)
+        put_vector(difference(p_WN, deflection), i, STICK_POINT, modes)
         kinematics.put_orientation(state, ground.carriers[i], i, ORIENTATION, modes)
         return
-    p_x, p_y, p_z = p_WN
+    bent = terrain.to_world(bend[0], bend[1], 0.0, frames, i, ground.flat)
+    p_x, p_y, p_z = difference(p_WN, bent)
     stick_x, stick_y, stick_z = vector_at(modes, i, STICK_POINT)
     if ground.flat:
         modes[i, STICK_POINT] = select(along[0], p_x, stick_x)
         modes[i, STICK_POINT + 1] = select(along[1], p_y, stick_y)
         return
-    x_1 = select(along[0], slide.t1.deflection, 0.0)
-    x_2 = select(along[1], slide.t2.deflection, 0.0)
+    x_1 = select(along[0], slide.t1.deflection - bend[0], 0.0)
+    x_2 = select(along[1], slide.t2.deflection - bend[1], 0.0)
     x, y, z = terrain.to_world(x_1, x_2, 0.0, frames, i, False)
     both = along[0] & along[1]
     modes[i, STICK_POINT] = select(both, p_x, stick_x + x)

@@ -3,11 +3,15 @@
 The velocity is v, the deflection from the stick point x. The reset integrator (Eq. 3-5) acts along
 each tangent independently:
 
-    in stick  F = -(sigma_0 |v| (1 + a_c) x + sigma_1 v)
-    in slip   F = -sigma_0 |v| x, with x constant at p0 or -p0
+    in stick  F = -(s (1 + a_c) x + sigma_1 v), with s = k + sigma_0 |v|
+    in slip   F = -s x, with x constant at p0 or -p0
 
 A node breaks free at |x| >= p0 if it moves outward. It sticks again, with x = 0, when v changes
-sign.
+sign. The thesis's bristle has no stiffness k.
+
+Settings change this law. At p0, x can become 0, and the node sticks again at once. When v changes
+sign, x can stay what it is. A node that breaks free along one tangent can break free along both,
+and x stays what it is along the other. F can be proportional to the normal force.
 
 Coulomb friction acts in the plane, regularised by a bristle. The normal force F_N limits it:
 
@@ -105,30 +109,48 @@ class ResetConstants(NamedTuple):
     stiction_damping: Real
     stiction_switch: Real
     proportional_stiction: Real
+    stiffness: Real
+    """Stiffness k of the bristle."""
+    kept: Real
+    """Share of the deflection that remains when a node sticks again: 0 or 1."""
+    restarts: Real
+    """1 if the deflection becomes 0 at the stiction range and the node sticks, otherwise 0."""
+    joint: Real
+    """1 if a node breaks free along both tangents, otherwise 0."""
+    per_load: Real
+    """Factor on the friction per normal force (1/N); 0 if friction is independent of the load."""
 
 
 @inlined
 def reset_force(slide: Slide, law: ResetConstants) -> Pair:
     """Friction (N) of the reset integrator (Eq. 3-5)."""
-    return tangent_force(slide.t1, law), tangent_force(slide.t2, law)
+    factor = load_factor(slide, law)
+    return factor * tangent_force(slide.t1, law), factor * tangent_force(slide.t2, law)
+
+
+@inlined
+def load_factor(slide: Slide, law: ResetConstants) -> Real:
+    """Factor of the load on the friction of the reset integrator."""
+    return select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
 
 
 @inlined
 def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
     """Friction (N) of the reset integrator along one tangent. In slip, the deflection is the
-    stiction range, in the direction of slip."""
-    sigma_0 = law.proportional_stiction * abs(slide.velocity)
-    bristle = sigma_0 * (1.0 + law.stiction_switch) * slide.deflection
+    stiction range times the mode."""
+    per_length = law.stiffness + law.proportional_stiction * abs(slide.velocity)
+    bristle = per_length * (1.0 + law.stiction_switch) * slide.deflection
     stick = -(bristle + law.stiction_damping * slide.velocity)
-    slip = -sigma_0 * law.stiction_range * slide.mode
+    slip = -per_length * law.stiction_range * slide.mode
     return select(slide.mode == STICK, stick, slip)
 
 
 @inlined
 def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, Real, Real]:
     """Stiff part of -(time d/dv + time² d/dx) of the friction: components 11, 12 and 22. For the
-    reset integrator this is the damping in stick."""
-    damping = time * law.stiction_damping
+    reset integrator these are damping and stiffness in stick."""
+    stiffness = time * law.stiffness * (1.0 + law.stiction_switch)
+    damping = time * (law.stiction_damping + stiffness) * load_factor(slide, law)
     along_1 = select(slide.t1.mode == STICK, damping, 0.0)
     along_2 = select(slide.t2.mode == STICK, damping, 0.0)
     return along_1, 0.0 * damping, along_2
@@ -137,18 +159,35 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
 @inlined
 def next_reset_mode(slide: Slide, law: ResetConstants) -> Pair:
     """Next mode along each tangent; see next_tangent_mode()."""
-    return next_tangent_mode(slide.t1, law), next_tangent_mode(slide.t2, law)
+    slips = law.restarts == 0.0
+    breaks_1, breaks_2 = at_range(slide.t1, law) & slips, at_range(slide.t2, law) & slips
+    is_joint = law.joint != 0.0
+    return (
+        next_tangent_mode(slide.t1, breaks_1, breaks_2 & is_joint, law),
+        next_tangent_mode(slide.t2, breaks_2, breaks_1 & is_joint, law),
+    )
 
 
 @inlined
-def next_tangent_mode(slide: TangentSlide, law: ResetConstants) -> Real:
-    """Next mode along one tangent. A node breaks free at the stiction range if it moves outward. It
-    sticks again when its velocity changes sign."""
+def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
+    """True if a node that sticks is at the stiction range and moves outward."""
     forward = (slide.deflection >= law.stiction_range) & (slide.velocity > 0.0)
     backward = (slide.deflection <= -law.stiction_range) & (slide.velocity < 0.0)
-    from_stick = select(forward, 1.0, select(backward, -1.0, STICK))
-    from_slip = select(slide.mode * slide.velocity > 0.0, slide.mode, STICK)
-    return select(slide.mode == STICK, from_stick, from_slip)
+    return (slide.mode == STICK) & (forward | backward)
+
+
+@inlined
+def next_tangent_mode(
+    slide: TangentSlide, breaks: Truth, pulled: Truth, law: ResetConstants
+) -> Real:
+    """Next mode along one tangent. A node that `breaks` free slips in the direction of its
+    velocity. A node that is `pulled` free by the other tangent keeps its deflection, if it moves
+    outward. A node sticks again when its velocity changes sign."""
+    direction = select(slide.velocity > 0.0, 1.0, -1.0)
+    share = select(pulled, slide.deflection / law.stiction_range, STICK)
+    from_stick = select(breaks, direction, share)
+    mode = select(slide.mode == STICK, from_stick, slide.mode)
+    return select(mode * slide.velocity > 0.0, mode, STICK)
 
 
 @inlined
@@ -159,10 +198,12 @@ def reset_margin(slide: Slide, law: ResetConstants) -> float:
 
 @inlined
 def tangent_margin(slide: TangentSlide, law: ResetConstants) -> float:
-    """Mode margin along one tangent of the reset integrator: in m if the node sticks, in m/s if it
-    slips."""
+    """Mode margin along one tangent of the reset integrator. A node that sticks may be at the
+    stiction range as long as it moves inward."""
     if slide.mode == STICK:
-        return law.stiction_range - abs(slide.deflection)
+        reserve = law.stiction_range - abs(slide.deflection)
+        inward = -slide.velocity * slide.deflection
+        return max(reserve, inward) if inward > 0.0 else reserve
     return slide.mode * slide.velocity
 
 
@@ -373,11 +414,29 @@ def stuck_along(mode: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
 
 
 @inlined
-def begins_to_stick(before: Pair, after: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
-    """For each tangent, True if a mode begins to stick along it."""
-    stuck_1, stuck_2 = stuck_along(before, friction)
+def begins_to_stick(slide: Slide, after: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
+    """For each tangent, True if a node begins to stick along it, in the mode `after`."""
+    stuck_1, stuck_2 = stuck_along((slide.t1.mode, slide.t2.mode), friction)
     sticks_1, sticks_2 = stuck_along(after, friction)
-    return sticks_1 & not_(stuck_1), sticks_2 & not_(stuck_2)
+    begins_1, begins_2 = sticks_1 & not_(stuck_1), sticks_2 & not_(stuck_2)
+    if friction.kind == COULOMB:
+        return begins_1, begins_2
+    law = named(ResetConstants, friction.constants)
+    restarts = law.restarts != 0.0
+    return (
+        begins_1 | (at_range(slide.t1, law) & restarts),
+        begins_2 | (at_range(slide.t2, law) & restarts),
+    )
+
+
+@inlined
+def kept_deflection(before: Pair, friction: FrictionLaw) -> Pair:
+    """Deflection (m) along each tangent with which a node of the mode `before` sticks again."""
+    if friction.kind == COULOMB:
+        return 0.0 * before[0], 0.0 * before[1]
+    law = named(ResetConstants, friction.constants)
+    kept = law.kept * law.stiction_range
+    return kept * before[0], kept * before[1]
 
 
 @inlined

@@ -6,13 +6,19 @@ The kernels need numba; they are imported when a law is needed.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.kind_text import settings_text
-from tetra_drake.scenario.quantities import Damping, DampingPerLength, Length, Stiffness
+from tetra_drake.scenario.quantities import (
+    Damping,
+    DampingPerLength,
+    Force,
+    Length,
+    Stiffness,
+)
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Kinds, Section, Varied
 from tetra_drake.scenario.units import INCH, POUND_FORCE
@@ -68,7 +74,8 @@ class FrictionKind(Section):
 class ResetIntegrator(FrictionKind):
     """Friction of the thesis (Table 2, Eq. 3-5), independent of the load.
 
-    A bristle holds a node until it is bent by `stiction_range`. See physics.friction.
+    A bristle holds a node until it is bent by `stiction_range`. See physics.friction. The keys from
+    `stiffness` on are other readings of the thesis's text.
     """
 
     modes = "0 sticks, +1 or -1 slips in that direction along the tangent"
@@ -81,11 +88,34 @@ class ResetIntegrator(FrictionKind):
     """Share a_c that is added to the bristle's force while a node sticks."""
     proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """Friction divided by deflection and by velocity, sigma_0."""
+    stiffness: Annotated[Stiffness, Varied()] = Field(default=0.0, ge=0)
+    """Stiffness of the bristle: friction divided by deflection, as sigma_0 in Olsson's model."""
+    reset: Literal["reversal", "range", "never"] = "reversal"
+    """Where the deflection becomes 0: at `reversal` of the velocity; or at the stiction `range`,
+    and the node sticks again at once; or `never`."""
+    breaks_free: Literal["each", "both"] = "each"
+    """Tangents along which a node breaks free: `each` by itself, or `both` as soon as the
+    deflection along one reaches the stiction range."""
+    load: Force | None = Field(default=None, gt=0)
+    """Normal force at which friction is as given; friction is proportional to the normal force. If
+    not given, friction is independent of it."""
 
     def law(self) -> FrictionLaw:
         from tetra_drake.physics.friction import FrictionLaw, ResetConstants
 
-        return FrictionLaw.of(ResetConstants(**dict(self)))
+        return FrictionLaw.of(
+            ResetConstants(
+                stiction_range=self.stiction_range,
+                stiction_damping=self.stiction_damping,
+                stiction_switch=self.stiction_switch,
+                proportional_stiction=self.proportional_stiction,
+                stiffness=self.stiffness,
+                kept=1.0 if self.reset == "never" else 0.0,
+                restarts=1.0 if self.reset == "range" else 0.0,
+                joint=1.0 if self.breaks_free == "both" else 0.0,
+                per_load=0.0 if self.load is None else 1.0 / self.load,
+            )
+        )
 
     @property
     def text(self) -> str:
