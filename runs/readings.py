@@ -1,0 +1,268 @@
+"""Readings of the thesis's text where it is open, ten trials each, compared with its results.
+
+    python runs/readings.py [NAME ...]
+
+Evolves the readings of these names, or all, on the compiled engine with the same seed, and writes
+their numbers to thesis/readings.json. After an interruption the script goes on where it stopped;
+finished readings are skipped. `python runs/thesis_page.py` shows the numbers.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+
+from tetra_drake.analysis.statistics import interval, interval_of_resamples, resampled
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.progress import Display
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.experiment import evolve
+from tetra_drake.files import read_text, write_whole
+from tetra_drake.formatting import Table, fixed, listed, ranged
+from tetra_drake.optimizers.steady_state import has_levelled_off
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizer_kinds import SteadyState
+
+HERE = Path(__file__).parent
+RECORD = HERE / "thesis" / "readings.json"
+SCRATCH = Path("out/readings")
+
+_ONE_LBF = {"cpg.gain": "1 lbf"}
+_AT_RANGE = {"friction.reset": "range"}
+_NEVER = {"friction.reset": "never"}
+_SECOND_SAMPLE = {"simulation.steady_from": "0 s"}
+_OTHER_TAU = {"optimizer.tau_mutation": "listing"}
+_STIFF = {"friction.stiffness": "0.3 lbf/in", "friction.proportional_stiction": 0.0}
+_AT_ONCE = {"cpg.start_up": "0 s"}
+_COARSE = {"engine": "!Compiled {tolerance: 1e-2 m/s, max_step: 100 ms}"}
+_AT_RANGE_COARSE = _AT_RANGE | _COARSE
+"""Where nodes never slip, coarse steps change a distance by 0.002 in (median of random gaits)."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A reading of the thesis's text: its changes of the scenario `thesis`."""
+
+    about: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    run: str = ""
+    """Name of the recorded run, or of the reading whose trials count; "" for a run of its own."""
+    stop: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of SteadyState that end the trials of `run` earlier."""
+
+
+READINGS = {
+    "thesis": Reading("as we read it", run="thesis"),
+    "range": Reading("the deflection becomes 0 where the node breaks free", _AT_RANGE),
+    "never": Reading("the deflection is never reset", _NEVER),
+    "no-product": Reading("σ₀ x without the velocity in Eq. 5", _STIFF),
+    "load": Reading("friction times the normal force in lbf", {"friction.load": "1 lbf"}),
+    "both": Reading("a node breaks free along x and y at once", {"friction.breaks_free": "both"}),
+    "gain-1": Reading("signals of gain 1, as in the listing", _ONE_LBF),
+    "gain-1.5": Reading("signals of gain 1.5", {"cpg.gain": "1.5 lbf"}),
+    "at-once": Reading("signals from the start", _AT_ONCE),
+    "second-sample": Reading("dx₁ from the second sample, as in the listing", _SECOND_SAMPLE),
+    "tau": Reading("mutation never reaches τ_A, as in the listing", _OTHER_TAU, "thesis-listing"),
+    "crossover": Reading("crossover 80 %", {"optimizer.crossover_probability": 0.8}),
+    "coarse": Reading("coarse variable steps", _COARSE),
+    "fixed": Reading("fixed steps of 3 ms", {"engine": "!Compiled {tolerance: 1000 m/s}"}),
+    "stop-never": Reading("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
+    "early": Reading(
+        "the stop counts from iteration 100", run="stop-never", stop={"stop_after": 100}
+    ),
+    "steep": Reading("the stop needs a rise of 0.3", run="stop-never", stop={"stop_rise": 0.3}),
+    "listing": Reading(
+        "gain 1, τ_A and dx₁ as in the listing", _ONE_LBF | _SECOND_SAMPLE | _OTHER_TAU
+    ),
+    "never-gain-1": Reading("never reset, gain 1", _NEVER | _ONE_LBF),
+    "range-listing": Reading(
+        "0 where it breaks free, τ_A and dx₁ as in the listing",
+        _AT_RANGE_COARSE | _SECOND_SAMPLE | _OTHER_TAU,
+    ),
+    "range-gain-1": Reading("0 where it breaks free, gain 1", _AT_RANGE_COARSE | _ONE_LBF),
+    "range-at-once": Reading(
+        "0 where it breaks free, signals at once", _AT_RANGE_COARSE | _AT_ONCE
+    ),
+}
+
+
+def trials_of(name: str) -> Run:
+    """The run of a reading, evolved as far as it is not yet."""
+    reading = READINGS[name]
+    if reading.run in READINGS and reading.run != name:
+        return trials_of(reading.run)
+    if reading.run:
+        return load_run(HERE / reading.run)
+    base = load_scenario("thesis").on_engine("compiled")
+    scenario, out = base.with_changes({"name": f"reading-{name}"} | dict(reading.changes)), SCRATCH
+    resume = (out / name / MANIFEST).exists()
+    return evolve(
+        scenario,
+        out / name,
+        resume=resume,
+        reevaluate=False,
+        report=False,
+        progress=Display(sys.stdout),
+    )
+
+
+def last_iteration(means: Sequence[float], settings: SteadyState) -> int:
+    """Iteration after which a trial with these mean fitnesses stops."""
+    for iteration in range(len(means)):
+        if has_levelled_off(means[: iteration + 1], settings):
+            return iteration
+    return len(means) - 1
+
+
+def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
+    """What the thesis says of a trial, for ours. Lengths are in inches."""
+    lines = run.iterations.query("trial == @trial").set_index("iteration")
+    means = lines["mean_fitness"].to_list()
+    last = last_iteration(means, settings)
+    made = run.evaluations.query("trial == @trial and iteration <= @last").set_index("index")
+    initial, best = made[made["iteration"] == 0], made.loc[lines.at[last, "best_evaluation"]]
+    return {
+        "initial_best_in": initial.at[initial["fitness"].idxmax(), "distance_in"],
+        "initial_farthest_in": initial["distance_in"].max(),
+        "backward": (initial["distance"] < 0.0).mean(),
+        "best_in": best["distance_in"],
+        "farthest_in": made["distance_in"].max(),
+        "tau_a_s": best["tau_a_s"],
+        "initial_mean": means[0],
+        "mean": means[last],
+        "last_rise": means[last] - means[max(0, last - settings.stop_window)],
+        "iterations": last,
+    }
+
+
+def numbers(name: str) -> list[dict[str, float]]:
+    """Numbers of the trials of a reading."""
+    run = trials_of(name)
+    settings = SteadyState(**dict(run.scenario.optimizer) | dict(READINGS[name].stop))
+    trials = range(run.scenario.evolution.trials)
+    rows = [numbers_of(run, trial, settings) for trial in trials]
+    return [{key: float(f"{value:.5g}") for key, value in row.items()} for row in rows]
+
+
+# How near a reading is to the thesis.
+
+THESIS = {
+    "initial": 6.6,
+    "backward": 0.48,
+    "evolved": 14.34,
+    "rise": 1.32,
+    "best_rise": 1.51,
+}
+"""The thesis's results: best initial and best evolved distance (in) of ten trials, share of initial
+gaits that go backward ("nearly half"), and best evolved over best initial distance, in the mean of
+the trials and in the trial with the best gait."""
+
+
+def results(trials: pandas.DataFrame) -> dict[str, float]:
+    """The same results as in THESIS, for trials of ours."""
+    rise = trials["best_in"] / trials["initial_best_in"]
+    return {
+        "initial": trials["initial_best_in"].max(),
+        "backward": trials["backward"].mean(),
+        "evolved": trials["best_in"].max(),
+        "rise": rise.mean(),
+        "best_rise": rise.iloc[trials["best_in"].to_numpy().argmax()],
+    }
+
+
+def factor(trials: pandas.DataFrame) -> float:
+    """Factor by which our results differ from THESIS: the exponential of the root mean square of
+    the logarithms of their ratios."""
+    ratios = [max(value, 1e-3) / THESIS[key] for key, value in results(trials).items()]
+    return math.exp(math.sqrt(np.mean(np.square(np.log(ratios)))))
+
+
+def factor_with_interval(trials: pandas.DataFrame) -> tuple[float, float, float]:
+    """The factor, and its 95 % interval by bootstrap over the trials."""
+    drawn = resampled(np.arange(len(trials)), np.random.default_rng(0))[:500]
+    factors = np.array([factor(trials.iloc[rows]) for rows in drawn])
+    return factor(trials), *interval_of_resamples(factors)
+
+
+def load_record() -> dict[str, list[dict[str, float]]]:
+    """The recorded trials by reading. Raises InputError if the record cannot be read."""
+    if not RECORD.exists():
+        return {}
+    try:
+        record: dict[str, list[dict[str, float]]] = json.loads(read_text(RECORD, "record"))
+    except json.JSONDecodeError as error:
+        raise InputError(RECORD, "", f"is damaged: {error}; delete it") from None
+    return record
+
+
+def ranking(record: Mapping[str, list[dict[str, float]]]) -> Table:
+    """Table of the recorded readings, the nearest to the thesis first, below the thesis's row."""
+    tables = {name: pandas.DataFrame(trials) for name, trials in record.items()}
+    factors = {name: factor_with_interval(table) for name, table in tables.items()}
+    headings = ["reading", "off by a factor", "best initial (in)", "its mean", "backward (%)"]
+    headings += ["best evolved (in)", "its mean", "farthest (in)", "rise (%)", "of the best (%)"]
+    headings += ["mean fitness (in)", "τ_A (s)", "iterations", "best still rises"]
+    percent = {key: fixed(100.0 * (THESIS[key] - 1.0), 0) for key in ("rise", "best_rise")}
+    thesis = ["**the thesis**", "1", "6.6", "-", "nearly half", "14.34", "-", "-"]
+    thesis += [percent["rise"], percent["best_rise"], "rises", "0.2", "at most 2000", "yes"]
+    rows = [thesis]
+    for name in sorted(factors, key=lambda name: factors[name][0]):
+        rows.append(row_of(READINGS[name].about, factors[name], tables[name]))
+    return Table(headings, rows)
+
+
+def row_of(about: str, off: tuple[float, float, float], trials: pandas.DataFrame) -> list[str]:
+    """Row of a reading in the table: numbers with 95 % intervals over its trials."""
+    ours = results(trials)
+    still_rises = trials.at[trials["best_in"].idxmax(), "last_rise"] >= SteadyState().stop_rise
+    return [
+        about,
+        ranged(*off),
+        fixed(ours["initial"]),
+        mean_of(trials["initial_best_in"]),
+        mean_of(100.0 * trials["backward"]),
+        fixed(ours["evolved"]),
+        mean_of(trials["best_in"]),
+        fixed(trials["farthest_in"].max()),
+        mean_of(100.0 * (trials["best_in"] / trials["initial_best_in"] - 1.0)),
+        fixed(100.0 * (ours["best_rise"] - 1.0), 0),
+        f"{fixed(trials['initial_mean'].mean())} → {fixed(trials['mean'].mean())}",
+        f"{fixed(trials['tau_a_s'].median(), 3)} (to {fixed(trials['tau_a_s'].max(), 3)})",
+        f"{trials['iterations'].median():.0f} (to {trials['iterations'].max():.0f})",
+        "yes" if still_rises else "no",
+    ]
+
+
+def mean_of(values: pandas.Series) -> str:
+    """Mean over the trials with its 95 % interval."""
+    return ranged(values.mean(), *interval(values))
+
+
+def main(names: Sequence[str]) -> None:
+    """Records the readings of these names, or all. Raises InputError."""
+    if unknown := {*names} - {*READINGS}:
+        problem = f"found {listed(sorted(unknown))}, expected {listed([*READINGS])}"
+        raise InputError("NAME", "", problem)
+    for name in names or READINGS:
+        record = load_record()
+        if name not in record:
+            made = record | {name: numbers(name)}
+            text = json.dumps({key: made[key] for key in READINGS if key in made}, indent=1)
+            write_whole(RECORD, text + "\n")
+    print(ranking(load_record()).text())
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        sys.exit(f"readings.py: {error}")
