@@ -9,11 +9,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pandas
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run
 from tetra_drake.figures.fitness import initial_fitness
 from tetra_drake.figures.forces import ground_forces, signals_and_tensions
@@ -34,9 +33,14 @@ from tetra_drake.scenario.units import INCH
 
 Results: TypeAlias = dict[str, list[SimulationResult]]
 """Simulated gaits of the trials, by GAITS."""
-GAITS = ("best initial", "worst initial", "best evolved")
 BEST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 WORST: Any = {"color": OKABE_ITO["orange"], "linestyle": "-"}
+GAITS: Any = {
+    "best initial": BEST,
+    "worst initial": WORST,
+    "best evolved": {"color": OKABE_ITO["green"], "linestyle": "-"},
+}
+"""Looks of the gaits of each trial, by name."""
 MEAN: Any = {"color": "black", "linestyle": ":"}
 BARS = 100
 """Number of iterations between two bars of the standard deviation."""
@@ -57,8 +61,7 @@ def walks(run: Run) -> Results:
     for name, places in zip(GAITS, chosen, strict=True):
         rows = run.evaluations.loc[places]
         gaits = [run.gait(row["trial"], row["index"]) for _, row in rows.iterrows()]
-        outcomes = simulate_many(run.scenario, gaits, record=True)
-        results[name] = [each for each in outcomes if isinstance(each, SimulationResult)]
+        results[name] = [simulate(run.scenario, gait, record=True) for gait in gaits]
     return results
 
 
@@ -97,43 +100,24 @@ def measured_points(structure: Structure) -> Figure:
     return figure
 
 
-def draw_walks(panel: Axes, results: Sequence[SimulationResult], look: Any) -> None:
-    """Draws the forward distances of gaits over time."""
-    for result in results:
-        walked = distance_walked(result.trajectory, result.robot.structure) / INCH
-        panel.plot(result.trajectory.time, walked, **look, linewidth=0.9)
-    panel.set_xlabel("time (s)")
-
-
 @common_style()
-def initial_walks(results: Results) -> Figure:
-    """Forward distance of the best and the worst initial gait of each trial (Figure 16)."""
-    figure, axes = make_figure(width_in=7.0, height_in=3.8)
-    draw_walks(axes[0, 0], results["best initial"], BEST)
-    draw_walks(axes[0, 0], results["worst initial"], WORST)
-    axes[0, 0].axhline(INITIAL, **REFERENCE)
-    axes[0, 0].set_ylabel("forward distance $x_1$ (in)")
-    looks = {
-        "farthest of a trial": BEST,
-        "least far of a trial": WORST,
-        "thesis, best of all": REFERENCE,
-    }
-    legend_below(figure, looks)
-    return figure
-
-
-@common_style()
-def walks_before_and_after(results: Results) -> Figure:
-    """Forward distance of the trials' best initial gaits and of their best evolved gaits (Figure
-    18)."""
-    figure, axes = make_figure(width_in=7.0, height_in=3.6, columns=2, sharey=True)
-    thesis = {"best initial": INITIAL, "best evolved": EVOLVED}
-    for panel, (name, distance) in zip(axes[0], thesis.items(), strict=True):
-        draw_walks(panel, results[name], BEST)
+def forward_distances(
+    results: Results, panels: Sequence[Sequence[str]], *, thesis: Sequence[float]
+) -> Figure:
+    """Forward distance of all trials over time (Figures 16 and 18): a panel for each list of names
+    of GAITS, with the thesis's best distance (in)."""
+    figure, axes = make_figure(width_in=7.0, height_in=3.7, columns=len(panels), sharey=True)
+    looks = {}
+    for panel, names, distance in zip(axes[0], panels, thesis, strict=True):
+        for name in names:
+            looks[name] = GAITS[name]
+            for result in results[name]:
+                walked = distance_walked(result.trajectory, result.robot.structure) / INCH
+                panel.plot(result.trajectory.time, walked, **GAITS[name], linewidth=0.9)
         panel.axhline(distance, **REFERENCE)
-        panel.set_title(name)
+        panel.set_xlabel("time (s)")
     axes[0, 0].set_ylabel("forward distance $x_1$ (in)")
-    legend_below(figure, {"best of a trial": BEST, "thesis, best of all": REFERENCE})
+    legend_below(figure, looks | {"thesis, best of all trials": REFERENCE})
     return figure
 
 
@@ -174,13 +158,15 @@ def save_figures(run: Run, out: Path) -> None:
     figures = {
         13: measured_points(best.robot.structure),
         14: relative_distances(best, title=False),
-        15: time_lapse(best, title=False),
-        16: initial_walks(results),
+        15: time_lapse(best, title=False, instants=4),
+        16: forward_distances(results, [["best initial", "worst initial"]], thesis=[INITIAL]),
         17: initial_fitness(run, trial, title=False),
-        18: walks_before_and_after(results),
+        18: forward_distances(
+            results, [["best initial"], ["best evolved"]], thesis=[INITIAL, EVOLVED]
+        ),
         19: signals_and_tensions(best, title=False),
         20: ground_forces(best, title=False),
-        21: one_step(best, title=False),
+        21: one_step(best, title=False, instants=4),
         22: fitness_of_all_trials(run),
         23: fitness_of_best_and_worst(run),
     }

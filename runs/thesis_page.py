@@ -162,7 +162,7 @@ def ground_numbers() -> dict[str, str]:
         "needed_tau": fixed(needed, 3),
         "weight": fixed(robot.weight / POUND_FORCE, 3),
         "mass": fixed(1e3 * robot.structure.mass[0], 1),
-        "spacing": fixed(scenario.robot.spacing / INCH),
+        "spacing": fixed(np.diff(robot.structure.p_WB[:2, 0])[0] / INCH),
         "contacts": str(len(robot.structure.contacts)),
     }
 
