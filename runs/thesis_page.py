@@ -16,6 +16,7 @@ import jinja2
 import numpy as np
 import pandas
 from analyse import load_analysis
+from record import load_times
 from settle import difference_of_means, numbers
 from tables import best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
@@ -99,7 +100,9 @@ def trials_numbers(run: Run) -> dict[str, Any]:
     trial, last = int(best["fitness"].idxmax()), fitness.ffill().iloc[-1]
     rise = 100.0 * (ended / fittest["distance_in"] - 1.0)
     duration, robot = run.scenario.simulation.duration, Robot.of(run.scenario)
-    seconds = 2.0 * run.evaluations["wall_time_s"].median()
+    iterations = fitness.count() - 1
+    wall_time = load_times(HERE)[run.directory.name]["evolution"]["wall_s"]
+    seconds = wall_time / iterations.sum()
     times = np.arange(STEADY, duration, run.scenario.simulation.sample_period)
     signals = [signals_at(robot, gait, times)[:, 0] for gait in run.gaits()]
     hertz = pandas.Series([dominant_frequency(times, signal) for signal in signals])
@@ -115,7 +118,7 @@ def trials_numbers(run: Run) -> dict[str, Any]:
         "rise": over_trials(rise, 0),
         "rise_of_means": fixed(100.0 * (ended.mean() / begun.mean() - 1.0), 0),
         "rise_of_best": fixed(rise[trial], 0),
-        "iterations": over_trials(fitness.count() - 1, 0),
+        "iterations": over_trials(iterations, 0),
         "levelled": sum("levelled" in str(status.stop) for status in run.statuses),
         "mean_begun": over_trials(fitness.iloc[0]),
         "mean_ended": over_trials(last),
@@ -123,7 +126,7 @@ def trials_numbers(run: Run) -> dict[str, Any]:
         "last_rise": fixed(last[trial] - fitness[trial].dropna().iloc[-101]),
         "seconds": rounded(seconds, 2),
         "faster": f"{round(2.0 * duration / seconds, -2):,.0f}",
-        "trial_seconds": over_trials(pandas.Series([s.wall_time for s in run.statuses]), 0),
+        "trial_seconds": over_trials(seconds * iterations, 0),
         "tau": over_trials(best["tau_a_s"], 3),
         "hertz": over_trials(hertz),
         "hertz_of_best": fixed(hertz[trial]),
