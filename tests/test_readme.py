@@ -178,7 +178,7 @@ FOLDERS = (
     *(f"tetra_drake/{name}" for name in ("engines", "evolution", "scenario")),
 )
 """Runs of one's own may lie beside the recorded ones."""
-PAGES = ["README.md", *(f"{folder}/README.md" for folder in FOLDERS)]
+PAGES = ["README.md", "runs/thesis/THESIS.md", *(f"{folder}/README.md" for folder in FOLDERS)]
 
 
 def anchors(page: Path) -> set[str]:

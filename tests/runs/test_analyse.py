@@ -84,13 +84,6 @@ def test_gaits_walk_on_unseen_ground_and_may_miss_requirements_there(folder, mon
     assert not any(row["met"] for row in analyse.on_unseen_ground(apart, gaits, workers=1))
 
 
-def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
-    run = write_run(tmp_path / "run", [[[(None, 0)]]])
-    with refused(run, "", "fitness"):
-        analyse.analyse(run, workers=1)
-    assert not (run / analyse.ANALYSIS).exists()
-
-
 def test_a_missing_or_damaged_analysis_is_refused(folder, tmp_path, refused):
     path = tmp_path / analyse.ANALYSIS
     with refused(path, "", "analyse.py"):

@@ -1,0 +1,214 @@
+"""The thesis, number by number: the page thesis/THESIS.md, and the thesis's figures drawn again.
+
+    python runs/thesis_page.py
+
+Numbers are from the recorded runs and from short simulations. The text of the page is the template
+thesis.md.jinja.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import pandas
+from analyse import load_analysis
+from record import load_times
+from settle import difference_of_means, numbers
+from tables import best_gait
+from thesis_figures import EVOLVED, mean_fitness, save_figures
+from thinning import last_population
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.files import read_text, write_whole
+from tetra_drake.formatting import fixed, ranged, rounded
+from tetra_drake.results.measures import dominant_frequency
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import signals_at
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.section import flattened, written
+from tetra_drake.scenario.units import INCH, POUND_FORCE, plainest
+
+HERE = Path(__file__).parent
+PAGE, FIGURES = HERE / "thesis/THESIS.md", HERE / "thesis/redrawn"
+TEMPLATE = HERE / "thesis.md.jinja"
+
+sys.path.append(str(HERE.parent / "diagrams"))
+
+import settling_node  # noqa: E402
+import single_oscillator  # noqa: E402
+import sliding_tetrahedron  # noqa: E402
+
+STEADY = 5.0
+"""Time (s) from which on frequencies are measured."""
+DRAWS = 2000
+"""Number of sets of random weights beside which the evolved weights are judged."""
+
+
+def setting(label: str, given: Any, key: str) -> str:
+    """Row of a table of settings: the thesis's value, our key, our value, and if they agree."""
+    scenario = load_scenario("thesis")
+    ours = flattened(written(scenario.model_dump(), plainest))[key]
+    same = scenario.with_changes({key: given}).values()[key] == scenario.values()[key]
+    return f"| {label} | {given} | `{key}` | {ours} | {'yes' if same else '**no**'} |"
+
+
+def over_trials(values: pandas.Series, digits: int = 2) -> str:
+    """Mean and range of numbers of the trials."""
+    low, high = fixed(values.min(), digits), fixed(values.max(), digits)
+    return f"{fixed(values.mean(), digits)} ({low} to {high})"
+
+
+def two_best(run: Run, trial: int) -> pandas.Series:
+    """Absolute differences of fitness and parameters of the two best gaits of a trial's last
+    population, as in Table 8. Gaits with the same parameters count once."""
+    members = last_population(run, trial).filter(regex="^(fitness$|weight_|tau_)")
+    best = members.drop_duplicates(members.columns[1:]).nlargest(2, "fitness")
+    return best.diff().iloc[1].abs()
+
+
+def weights_pattern(run: Run) -> dict[str, str]:
+    """Test for a pattern in the weights of the trials' best gaits.
+
+    A weight's spread over the trials is compared with the spread of random weights in the bounds of
+    Table 5. Shuffled weights of each gait tell how much the weights' means differ by chance.
+    """
+    gait_bounds, generator = run.scenario.gait_bounds, np.random.default_rng(0)
+    weights = run.best().filter(like="weight_")
+    low, high = gait_bounds.weight_min, gait_bounds.weight_max
+    random = generator.uniform(low, high, (DRAWS, *weights.shape)).std(axis=1, ddof=1)
+    means, table = weights.mean(), weights.to_numpy()
+    shuffled = [generator.permuted(table, axis=1).mean(axis=0).std() for _ in range(DRAWS)]
+    as_far = int((np.array(shuffled) >= means.std(ddof=0)).sum())
+    return {
+        "spread": over_trials(weights.std()),
+        "random_spread": fixed(random.mean()),
+        "means": f"{fixed(means.std(ddof=0))}, by chance {fixed(np.mean(shuffled))}",
+        "p": f"{'<' if as_far == 0 else '='} {max(as_far, 1) / DRAWS:g}",
+    }
+
+
+def trials_numbers(run: Run) -> dict[str, Any]:
+    """Numbers of the thesis's chapter 3 from a run, as text."""
+    initial, best, fitness = run.initial(), run.best().set_index("trial"), mean_fitness(run)
+    fittest = initial.loc[initial.groupby("trial")["fitness"].idxmax()].set_index("trial")
+    begun, ended = initial.groupby("trial")["distance_in"].max(), best["distance_in"]
+    trial, last = int(best["fitness"].idxmax()), fitness.ffill().iloc[-1]
+    rise = 100.0 * (ended / fittest["distance_in"] - 1.0)
+    duration, robot = run.scenario.simulation.duration, Robot.of(run.scenario)
+    iterations = fitness.count() - 1
+    wall_time = load_times(HERE)[run.directory.name]["evolution"]["wall_s"]
+    seconds = wall_time / iterations.sum()
+    times = np.arange(STEADY, duration, run.scenario.simulation.sample_period)
+    signals = [signals_at(robot, gait, times)[:, 0] for gait in run.gaits()]
+    hertz = pandas.Series([dominant_frequency(times, signal) for signal in signals])
+    pairs = pandas.DataFrame({t: two_best(run, t) for t in best.index}).T
+    return {
+        "trial": trial,
+        "begun": over_trials(begun),
+        "least_initial": fixed(initial["distance_in"].min()),
+        "backward": f"{100.0 * (initial['distance'] < 0.0).mean():.0f} %",
+        "ended": over_trials(ended),
+        "farthest": fixed(ended[trial]),
+        "farther": int((ended > EVOLVED).sum()),
+        "rise": over_trials(rise, 0),
+        "rise_of_means": fixed(100.0 * (ended.mean() / begun.mean() - 1.0), 0),
+        "rise_of_best": fixed(rise[trial], 0),
+        "iterations": over_trials(iterations, 0),
+        "levelled": sum("levelled" in str(status.stop) for status in run.statuses),
+        "mean_begun": over_trials(fitness.iloc[0]),
+        "mean_ended": over_trials(last),
+        "rising": int((last > fitness.iloc[0]).sum()),
+        "last_rise": fixed(last[trial] - fitness[trial].dropna().iloc[-101]),
+        "seconds": rounded(seconds, 2),
+        "faster": f"{round(2.0 * duration / seconds, -2):,.0f}",
+        "trial_seconds": over_trials(seconds * iterations, 0),
+        "tau": over_trials(best["tau_a_s"], 3),
+        "hertz": over_trials(hertz),
+        "hertz_of_best": fixed(hertz[trial]),
+        "swing": fixed(np.ptp(signals[trial]) / POUND_FORCE),
+        "least_tension": fixed(best["tension"].min() / POUND_FORCE),
+        "signal_rate": over_trials(best["signal_rate"] / POUND_FORCE, 1),
+        "twist": f"{best[['twist', 'lateral_drift']].to_numpy().max() / INCH:.0e}",
+        "same_tau": int((pairs["tau_a_s"] == 0.0).sum()),
+        "fitness_apart": over_trials(pairs["fitness"], 3),
+        "weights_apart": fixed(pairs.loc[trial].filter(like="weight_").max()),
+        "pair": pairs.loc[trial].to_dict(),
+        **weights_pattern(run),
+    }
+
+
+def ground_numbers() -> dict[str, str]:
+    """Numbers of section 2.1 and of a single oscillator, from short simulations."""
+    scenario, thesis = load_scenario("thesis"), settling_node.THESIS_RESTITUTION
+    settling, bouncing = settling_node.settle(scenario), settling_node.bounce(scenario)
+    speed, rebound = settling_node.contact_speeds(bouncing)
+    alpha = settling_node.velocity_correction(scenario)
+    slips = sliding_tetrahedron.slips(
+        sliding_tetrahedron.slide(scenario), sliding_tetrahedron.LEADING
+    )
+    hertz, robot = single_oscillator.linear_frequency(scenario), Robot.of(scenario)
+    needed = single_oscillator.TAU_A * hertz / single_oscillator.THESIS_FREQUENCY
+    return {
+        "impact": fixed(settling_node.contact_speeds(settling)[0] / INCH, 3),
+        "deep": fixed(-settling.p_WN[-1, settling_node.TRAILING, 2] / INCH, 4),
+        "restitution": fixed(rebound / speed, 3),
+        "linear": fixed(1.0 - alpha * speed, 3),
+        "alpha": fixed(alpha * INCH),
+        "aimed_alpha": fixed((1.0 - thesis) / (speed / INCH), 3),
+        "slips": f"{1e3 * slips[0][0]:.1f} to {1e3 * slips[0][1]:.0f} ms",
+        "hertz": fixed(hertz),
+        "needed_tau": fixed(needed, 3),
+        "weight": fixed(robot.weight / POUND_FORCE, 3),
+        "mass": fixed(1e3 * robot.structure.mass[0], 1),
+        "spacing": fixed(np.diff(robot.structure.p_WB[:2, 0])[0] / INCH),
+        "contacts": str(len(robot.structure.contacts)),
+    }
+
+
+def reached(name: str) -> str:
+    """Distance of the best gait of a run."""
+    return best_gait(name, load_analysis(HERE / name)).text("compiled", 1)
+
+
+def apart(first: str, second: str) -> str:
+    """Difference of the mean distances (in) of two runs, second minus first, and its interval."""
+    distances = [numbers(load_analysis(HERE / name)) for name in (first, second)]
+    name = "distance where it was evolved, in"
+    return ranged(*difference_of_means(distances[0][name], distances[1][name]))
+
+
+def page(run: Run) -> str:
+    """Text of the page."""
+    template = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True).from_string(
+        read_text(TEMPLATE, "template")
+    )
+    return template.render(
+        ours=trials_numbers(run),
+        listing=trials_numbers(load_run(HERE / "thesis-listing")),
+        ground=ground_numbers(),
+        setting=setting,
+        reached=reached,
+        apart=apart,
+        number=fixed,
+        readings="",
+        claims="",
+    )
+
+
+def main() -> None:
+    """Writes the page and the figures."""
+    run = load_run(HERE / "thesis")
+    write_whole(PAGE, page(run) + "\n")
+    save_figures(run, FIGURES)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except InputError as error:
+        sys.exit(f"thesis_page.py: {error}")
