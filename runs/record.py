@@ -194,9 +194,9 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
 
 
 def make_folder(made: Path, shown: Path) -> None:
-    """Thins a run into the folder `shown`. Its old files are deleted, except page and pictures."""
-    for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
-        shutil.rmtree(old) if old.is_dir() else old.unlink()
+    """Thins a run into the folder `shown`, in place of its old trials and exported files."""
+    for old in (*shown.glob("trial_*"), shown / EXPORTED):
+        shutil.rmtree(old, ignore_errors=True)
     thin(made, shown)
 
 
