@@ -35,7 +35,7 @@ from tetra_drake.formatting import Table, fixed, listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.machine import versions
 from tetra_drake.physics.curves import travelling_index
-from tetra_drake.results.measures import last_step, off_ground
+from tetra_drake.results.measures import dominant_frequency, off_ground
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
@@ -84,17 +84,17 @@ def delay(cause: np.ndarray, effect: np.ndarray, most: int) -> tuple[float, floa
 def rhythm(trajectory: xarray.Dataset) -> dict[str, Any]:
     """Period (s) of a gait. Of the feet's forward speeds: travelling index, lags (cycles) behind
     the foot before, deviation / mean, percents of time below zero, and correlation with the speed
-    one period later. Empty if the signals do not oscillate."""
-    cycle = last_step(trajectory)
-    if cycle is None:
-        return {}
-    period, times = cycle[1] - cycle[0], trajectory.time.values
+    one period later. Empty if the signals do not oscillate at least twice."""
+    times, signals = trajectory.time.values, trajectory.signal.values
     speeds = trajectory.v_WN.sel(node=FEET, axis="x").values
-    later = round(period / (times[1] - times[0]))
+    frequency = dominant_frequency(times, signals[:, np.ptp(signals, axis=0).argmax()])
+    if not frequency * np.ptp(times) >= 2.0:
+        return {}
+    later = round(1.0 / (frequency * (times[1] - times[0])))
     return {
-        "period": period,
+        "period": 1.0 / frequency,
         "index": travelling_index(speeds),
-        "lags": phase_lags(times, speeds, 1.0 / period),
+        "lags": phase_lags(times, speeds, frequency),
         "uneven": speeds.std(axis=0) / speeds.mean(axis=0),
         "backward": 100.0 * (speeds < 0.0).mean(axis=0),
         "again": [correlation(speed, speed, later) for speed in speeds.T],
