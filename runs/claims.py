@@ -1,0 +1,289 @@
+"""The thesis's claims about motion, tested on the best gaits of the run `thesis`.
+
+    python runs/claims.py
+
+Writes thesis/motion.json, the numbers of each gait, and prints the table of the claims. Gaits under
+directional friction are evolved in out/claims. After an interruption the script continues there.
+
+A claim is tested on cases, such as gaits or tetrahedra. It holds if at least 90 % of its cases meet
+the criterion in the table, and does not hold if at most 10 % do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import xarray
+from scipy.spatial.transform import Rotation
+from settle import difference_of_means
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.experiment import evolve
+from tetra_drake.files import check_file, read_json, read_text, write_whole
+from tetra_drake.formatting import Table, fixed, listed, ranged
+from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.machine import versions
+from tetra_drake.physics.curves import travelling_index
+from tetra_drake.results.measures import dominant_frequency, off_ground
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.metrics import Metrics
+from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
+from tetra_drake.scenario.units import INCH, POUND_FORCE
+
+HERE = Path(__file__).parent
+MOTION, TEXTS = HERE / "thesis/motion.json", HERE / "claims.jinja"
+SCRATCH = Path("out/claims")
+FACTORS = (1, 2, 4)
+"""Factors on friction against slip backward."""
+TRIALS = {"evolution.trials": 10, "evolution.evaluations": 1000}
+"""Trials for each factor."""
+FEET = [f"T{number} bottom_left" for number in range(1, 6)]
+"""A foot of each tetrahedron, from the rear. The other one moves as it does."""
+MOST, LEAST = 0.9, 0.1
+"""Least share of cases of a claim that holds, and greatest share of one that does not."""
+
+
+# Measures of a gait
+
+
+def phase_lags(times: np.ndarray, waves: np.ndarray, frequency: float) -> np.ndarray:
+    """Lags (positions - 1,) of waves (samples, positions) behind the wave before, in cycles from
+    -0.5 to 0.5. The times are evenly spaced."""
+    window = np.hanning(len(times)) * np.exp(-1j * math.tau * frequency * times)
+    components = window @ (waves - waves.mean(axis=0))
+    return -np.angle(components[1:] / components[:-1]) / math.tau
+
+
+def correlation(cause: np.ndarray, effect: np.ndarray, lag: int) -> float:
+    """Correlation of two signals, the second taken `lag` samples later."""
+    if lag < 0:
+        return correlation(effect, cause, -lag)
+    return float(np.corrcoef(cause[: len(cause) - lag], effect[lag:])[0, 1])
+
+
+def delay(cause: np.ndarray, effect: np.ndarray, most: int) -> tuple[float, float]:
+    """Delay of a signal behind another in samples, at most `most`, and their correlation there. A
+    parabola through the greatest correlation and its neighbours gives parts of a sample."""
+    values = [correlation(cause, effect, lag) for lag in range(-most, most + 1)]
+    top = int(np.argmax(values[1:-1])) + 1
+    before, at, after = values[top - 1 : top + 2]
+    return top - most + 0.5 * (before - after) / (before - 2.0 * at + after), at
+
+
+def rhythm(trajectory: xarray.Dataset) -> dict[str, Any]:
+    """Period (s) of a gait. Of the feet's forward speeds: travelling index, lags (cycles) behind
+    the foot before, deviation / mean, percents of time below zero, and correlation with the speed
+    one period later. Empty if the signals do not oscillate at least twice."""
+    times, signals = trajectory.time.values, trajectory.signal.values
+    speeds = trajectory.v_WN.sel(node=FEET, axis="x").values
+    frequency = dominant_frequency(times, signals[:, np.ptp(signals, axis=0).argmax()])
+    if not frequency * np.ptp(times) >= 2.0:
+        return {}
+    later = round(1.0 / (frequency * (times[1] - times[0])))
+    return {
+        "period": 1.0 / frequency,
+        "index": travelling_index(speeds),
+        "lags": phase_lags(times, speeds, frequency),
+        "uneven": speeds.std(axis=0) / speeds.mean(axis=0),
+        "backward": 100.0 * (speeds < 0.0).mean(axis=0),
+        "again": [correlation(speed, speed, later) for speed in speeds.T],
+    }
+
+
+def travel(trajectory: xarray.Dataset) -> dict[str, np.ndarray]:
+    """Percents of the feet's travel along x, and of the time, in flight, in slip and in stick. In
+    flight, no normal force acts on a tetrahedron."""
+    steps = np.diff(trajectory.p_WN.sel(node=FEET, axis="x").values, axis=0)
+    flies = off_ground(trajectory).groupby("contact_body").all("contact").values[1:]
+    slips = trajectory.friction_mode.sel(contact=FEET, horizontal="x").values[1:] != 0
+    found = {}
+    for name, during in (("flight", flies), ("slip", slips & ~flies), ("stick", ~slips & ~flies)):
+        found[name] = 100.0 * (steps * during).sum(axis=0) / steps.sum(axis=0)
+        found[f"{name}_time"] = 100.0 * during.mean(axis=0)
+    return found
+
+
+def responses(trajectory: xarray.Dataset, period: float) -> dict[str, Any]:
+    """Of each pair of driven cables: deviation of the tension T in percent of the signal S; delays
+    (ms) behind S of T ("late"), of S - T ("yields") and of the cable's shortening, with the
+    correlations there."""
+    spacing = float(trajectory.time[1] - trajectory.time[0])
+    rows = []
+    for oscillator in trajectory.oscillator.values:
+        cable = trajectory.sel(cable=f"{oscillator} outer bottom_left", oscillator=oscillator)
+        signal, tension = cable.signal.values, cable.tension.values
+        row = {"ratio": 100.0 * tension.std() / signal.std()}
+        effects = {"late": tension, "yields": signal - tension, "shortens": -cable.length.values}
+        for name, effect in effects.items():
+            late, row[f"{name}_shape"] = delay(signal, effect, round(0.5 * period / spacing))
+            row[name] = 1e3 * spacing * late
+        rows.append(row)
+    return columns(rows)
+
+
+def rotation(trajectory: xarray.Dataset) -> dict[str, np.ndarray]:
+    """Ranges (degrees) of each tetrahedron's yaw, pitch and roll, and percents of the variance of
+    its foot's height that come with rotation."""
+    quaternions = trajectory.q_WB.transpose("body", "time", "quaternion").values
+    turned = [Rotation.from_quat(q, scalar_first=True).as_euler("ZYX", True) for q in quaternions]
+    yaw, pitch, roll = np.ptp(turned, axis=1).T
+    height = trajectory.p_WN.sel(node=FEET, axis="z").values
+    swing, rotated = height - height.mean(axis=0), height - trajectory.p_WB.sel(axis="z").values
+    lifting = 100.0 * (swing * rotated).mean(axis=0) / swing.var(axis=0)
+    return {"yaw": yaw, "pitch": pitch, "roll": roll, "lifting": lifting}
+
+
+def asymmetry(trajectory: xarray.Dataset) -> float:
+    """Greatest difference of left and right forces, relative to the mean of each kind of force."""
+    friction = trajectory.friction_force.sel(horizontal="x")
+    found = []
+    for forces in (trajectory.normal_force, friction, trajectory.tension):
+        names = forces[forces.dims[1]].str
+        left, right = (forces.values[:, names.endswith(side)] for side in ("left", "right"))
+        found.append(np.abs(left - right).max() / np.abs(forces.values).mean())
+    return float(max(found))
+
+
+# The record
+
+
+def simulated(run: Run, gait: Gait, period: str) -> tuple[Metrics, xarray.Dataset]:
+    """Metrics of a gait of a run, and its trajectory from `simulation.steady_from` on. `period` is
+    the time between samples."""
+    scenario = run.scenario.with_changes({"simulation.sample_period": period})
+    result = simulate(scenario, gait, record=True)
+    start = scenario.simulation.settling_time
+    return result.metrics, result.trajectory.sel(time=slice(start, None))
+
+
+def of_best(run: Run, gait: Gait) -> dict[str, Any]:
+    """The numbers of a best gait, by tetrahedron or pair of cables from the rear where they differ;
+    also the least gap of struts (in) and tension (lbf)."""
+    metrics, trajectory = simulated(run, gait, "5 ms")
+    assert isinstance(run.scenario.robot, Tetrahedra)
+    found = rhythm(trajectory) | {"asymmetry": asymmetry(trajectory)}
+    found["gap"] = (metrics.clearance - run.scenario.robot.strut_diameter) / INCH
+    found["taut"] = metrics.tension / POUND_FORCE
+    found |= responses(trajectory, found["period"])
+    return found | travel(trajectory) | rotation(trajectory)
+
+
+def of_initial(run: Run, gait: Gait) -> dict[str, Any]:
+    """Distance (in) of an initial gait in the steady walk, and share of feet that lag behind the
+    foot before; empty as rhythm()."""
+    metrics, trajectory = simulated(run, gait, "10 ms")
+    found = rhythm(trajectory)
+    if not found:
+        return {}
+    return {"way": metrics.steady_distance / INCH, "lagging": (found["lags"] > 0.0).mean()}
+
+
+def by_friction(coulomb: Run, factor: int) -> dict[str, Any]:
+    """Distances (in) with a factor on friction against slip backward: of the fittest gaits of new
+    trials, and of the fittest gaits of a run."""
+    out, changes = SCRATCH / f"backward_{factor}", {"friction.backward": factor}
+    scenario, resume = coulomb.scenario.with_changes(changes | TRIALS), (out / MANIFEST).exists()
+    run = evolve(scenario, out, resume=resume, reevaluate=False, report=False)
+    scenario = coulomb.scenario.with_changes(changes)
+    again = [simulate(scenario, gait).metrics.distance_in for gait in coulomb.gaits()]
+    return {"factor": factor, "evolved": run.best()["distance_in"], "replayed": again}
+
+
+def columns(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Lists of the numbers of several gaits, by name. Empty gaits are left out."""
+    full = [row for row in rows if row]
+    return {name: np.array([row[name] for row in full]).tolist() for name in full[0]}
+
+
+def make_record() -> dict[str, Any]:
+    """The record: numbers of the best gaits, of the initial gaits, and by factor of friction; also
+    the larger of twist and drift (in) of each gait."""
+    run, coulomb = load_run(HERE / "thesis"), load_run(HERE / "coulomb")
+    best, initial = run.best(), run.initial()
+    gaits = [run.gait(row["trial"], row["index"]) for _, row in initial.iterrows()]
+    aside = [rows[["twist", "lateral_drift"]].max(axis=1) / INCH for rows in (best, initial)]
+    return {
+        "versions": versions(),
+        "best": columns(of_best(run, gait) for gait in run.gaits()) | {"aside": aside[0].tolist()},
+        "initial": columns(of_initial(run, gait) for gait in gaits) | {"aside": aside[1].tolist()},
+        "friction": columns(by_friction(coulomb, factor) for factor in FACTORS),
+    }
+
+
+def load_motion(path: Path = MOTION) -> dict[str, Any]:
+    """Reads the record. Raises InputError if it is missing or damaged."""
+    record: dict[str, Any] = read_json(path, "record; run `python runs/claims.py`")
+    try:
+        claims(record)
+    except (jinja2.TemplateError, AttributeError, LookupError, TypeError, ValueError) as error:
+        problem = f"cannot be read ({error!r}); run `python runs/claims.py`"
+        raise InputError(path, "", problem) from error
+    return record
+
+
+# The table
+
+
+def over(values: np.ndarray, digits: int = 0) -> str:
+    """Median and range of values as text."""
+    middle, low, high = (fixed(f(values), digits) for f in (np.median, np.min, np.max))
+    return f"{middle} ({low} to {high})"
+
+
+def each(values: np.ndarray, digits: int = 0) -> str:
+    """Medians over the gaits (gaits, columns) as text."""
+    return listed([fixed(median, digits) for median in np.median(values, axis=0)])
+
+
+def verdict(met: np.ndarray) -> str:
+    """Verdict on a claim from the cases that meet its criterion."""
+    share = met.mean()
+    words = "holds" if share >= MOST else "holds in part" if share > LEAST else "does not hold"
+    return f"{words} ({met.sum()} of {met.size})"
+
+
+def claims(record: Mapping[str, Any]) -> Table:
+    """Table of the claims: criterion for a case, result as median and range, and verdict.
+
+    The template has a line for each claim, so that a criterion in words stands beside its formula.
+    """
+    numbers = {
+        part: {name: np.array(values) for name, values in record[part].items()}
+        for part in ("best", "initial", "friction")
+    }
+    alike, *directional = numbers["friction"]["evolved"]
+    gains = listed([ranged(*difference_of_means(alike, inches)) for inches in directional])
+    tools = {"over": over, "each": each, "verdict": verdict, "listed": listed, "gains": gains}
+    template = jinja2.Template(read_text(TEXTS, "template"), undefined=jinja2.StrictUndefined)
+    text = template.render(numbers | tools)
+    headings = ["claim of the thesis", "criterion", "result, median (range)", "verdict"]
+    return Table(headings, [line.split(" | ") for line in text.splitlines()], range(4))
+
+
+def main() -> None:
+    """Writes the record and prints the table."""
+    check_file(MOTION)
+    write_whole(MOTION, json.dumps(make_record(), indent=1, allow_nan=False) + "\n")
+    print(claims(load_motion()).markdown())
+
+
+if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    try:
+        with heeding_interrupts():
+            main()
+    except InputError as error:
+        sys.exit(f"claims.py: {error}")
+    except KeyboardInterrupt:
+        sys.exit("claims.py: interrupted; the same command goes on")
