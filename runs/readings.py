@@ -12,10 +12,10 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas
@@ -26,7 +26,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
-from tetra_drake.files import read_text, write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import Table, fixed, listed, ranged
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
@@ -48,6 +48,10 @@ _SECOND_SAMPLE = {"simulation.steady_from": "0 s"}
 _OTHER_TAU = {"optimizer.tau_mutation": "listing"}
 _STIFF = {"friction.stiffness": "0.3 lbf/in", "friction.proportional_stiction": 0.0}
 _AT_ONCE = {"cpg.start_up": "0 s"}
+
+
+Record: TypeAlias = dict[str, list[dict[str, float]]]
+"""Numbers of the trials by reading."""
 
 
 @dataclass(frozen=True)
@@ -192,66 +196,68 @@ def results(trials: pandas.DataFrame) -> dict[str, float]:
     }
 
 
-def factor(trials: pandas.DataFrame) -> float:
+def factor(trials: pandas.DataFrame, keys: Iterable[str] = THESIS) -> float:
     """Factor by which our results differ from THESIS: the exponential of the root mean square of
     the logarithms of their ratios."""
-    ratios = [max(value, 1e-3) / THESIS[key] for key, value in results(trials).items()]
+    ours = results(trials)
+    ratios = [max(ours[key], 1e-3) / THESIS[key] for key in keys]
     return math.exp(math.sqrt(np.mean(np.square(np.log(ratios)))))
 
 
-def factor_with_interval(trials: pandas.DataFrame) -> tuple[float, float, float]:
-    """The factor, and its 95 % interval by bootstrap over the trials."""
+def factor_interval(trials: pandas.DataFrame) -> tuple[float, float]:
+    """95 % interval of the factor, by bootstrap over the trials."""
     drawn = resampled(np.arange(len(trials)), np.random.default_rng(0))[:500]
-    factors = np.array([factor(trials.iloc[rows]) for rows in drawn])
-    return factor(trials), *interval_of_resamples(factors)
+    return interval_of_resamples(np.array([factor(trials.iloc[rows]) for rows in drawn]))
 
 
-def load_record() -> dict[str, list[dict[str, float]]]:
+def load_record(path: Path) -> Record:
     """The recorded trials by reading. Raises InputError if the record cannot be read."""
-    if not RECORD.exists():
-        return {}
+    record: Record = read_json(path, "record; run `python runs/readings.py`")
     try:
-        record: dict[str, list[dict[str, float]]] = json.loads(read_text(RECORD, "record"))
-    except json.JSONDecodeError as error:
-        raise InputError(RECORD, "", f"is damaged: {error}; delete it") from None
+        ranking(record)
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError(path, "", f"cannot be read ({error!r}); delete it") from error
     return record
 
 
-def ranking(record: Mapping[str, list[dict[str, float]]]) -> Table:
+def tables_of(record: Record) -> dict[str, pandas.DataFrame]:
+    """Tables of the trials by reading, the nearest to the thesis first."""
+    tables = {name: pandas.DataFrame(trials) for name, trials in record.items()}
+    return dict(sorted(tables.items(), key=lambda item: factor(item[1])))
+
+
+def ranking(record: Record) -> Table:
     """Table of the recorded readings, the nearest to the thesis first, below the thesis's row."""
-    tables = {name: pandas.DataFrame(trials) for name, trials in record.items() if name in READINGS}
-    factors = {name: factor_with_interval(table) for name, table in tables.items()}
-    headings = ["reading", "off by a factor", "best initial (in)", "its mean", "backward (%)"]
-    headings += ["best evolved (in)", "its mean", "farthest (in)", "rise (%)", "of the best (%)"]
-    headings += ["mean fitness (in)", "τ_A (s)", "iterations", "best still rises"]
-    percent = {key: fixed(100.0 * (THESIS[key] - 1.0), 0) for key in ("rise", "best_rise")}
-    thesis = ["**the thesis**", "1", "6.6", "-", "nearly half", "14.34", "-", "-"]
-    thesis += [percent["rise"], percent["best_rise"], "rises", "0.2", "at most 2000", "yes"]
-    rows = [thesis]
-    for name in sorted(factors, key=lambda name: factors[name][0]):
-        rows.append(row_of(READINGS[name].about, factors[name], tables[name]))
+    headings = ["reading", "off by a factor", "of distances and directions"]
+    headings += ["best initial (in)", "mean of the trials", "backward (%)", "best evolved (in)"]
+    headings += ["mean of the trials", "rise (%)", "rise of the best (%)", "mean fitness (in)"]
+    headings += ["τ_A (s)", "iterations", "the best still rises"]
+    thesis = ["**the thesis**", "1", "1", "6.6", "", "nearly half", "14.34", "", "32", "51"]
+    rows = [[*thesis, "rises", "0.2", "at most 2000", "yes"]]
+    ranked = {name: trials for name, trials in tables_of(record).items() if name in READINGS}
+    rows += [row_of(READINGS[name].about, trials) for name, trials in ranked.items()]
     return Table(headings, rows)
 
 
-def row_of(about: str, off: tuple[float, float, float], trials: pandas.DataFrame) -> list[str]:
+def row_of(about: str, trials: pandas.DataFrame) -> list[str]:
     """Row of a reading in the table: numbers with 95 % intervals over its trials."""
-    ours = results(trials)
-    still_rises = trials.at[trials["best_in"].idxmax(), "last_rise"] >= SteadyState().stop_rise
+    ours, middle, most = results(trials), trials.median(), trials.max()
+    last_rise = trials.at[trials["best_in"].idxmax(), "last_rise"]
     return [
         about,
-        ranged(*off),
+        ranged(factor(trials), *factor_interval(trials)),
+        fixed(factor(trials, ("initial", "backward", "evolved"))),
         fixed(ours["initial"]),
         mean_of(trials["initial_best_in"]),
         mean_of(100.0 * trials["backward"]),
         fixed(ours["evolved"]),
         mean_of(trials["best_in"]),
-        fixed(trials["farthest_in"].max()),
         mean_of(100.0 * (trials["best_in"] / trials["initial_best_in"] - 1.0)),
         fixed(100.0 * (ours["best_rise"] - 1.0), 0),
         f"{fixed(trials['initial_mean'].mean())} → {fixed(trials['mean'].mean())}",
-        f"{fixed(trials['tau_a_s'].median(), 3)} (to {fixed(trials['tau_a_s'].max(), 3)})",
-        f"{trials['iterations'].median():.0f} (to {trials['iterations'].max():.0f})",
-        "yes" if still_rises else "no",
+        f"{fixed(middle['tau_a_s'], 3)} (to {fixed(most['tau_a_s'], 3)})",
+        f"{fixed(middle['iterations'], 0)} (to {fixed(most['iterations'], 0)})",
+        "yes" if last_rise >= SteadyState().stop_rise else "no",
     ]
 
 
@@ -266,12 +272,12 @@ def main(names: Sequence[str]) -> None:
         problem = f"found {listed(sorted(unknown))}, expected {listed([*ALL])}"
         raise InputError("NAME", "", problem)
     for name in names or ALL:
-        record = load_record()
+        record = load_record(RECORD) if RECORD.exists() else {}
         if name not in record:
             made = record | {name: numbers(name)}
             text = json.dumps({key: made[key] for key in ALL if key in made}, indent=1)
             write_whole(RECORD, text + "\n")
-    print(ranking(load_record()).text())
+    print(ranking(load_record(RECORD)).text())
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ import jinja2
 import numpy as np
 import pandas
 from analyse import load_analysis
+from claims import claims, load_motion
+from readings import RECORD, load_record, ranking, results, tables_of
 from record import load_times
 from settle import difference_of_means, numbers
 from tables import best_gait
@@ -187,6 +189,7 @@ def page(run: Run) -> str:
     template = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True).from_string(
         read_text(TEMPLATE, "template")
     )
+    record = load_record(RECORD)
     return template.render(
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
@@ -195,8 +198,9 @@ def page(run: Run) -> str:
         reached=reached,
         apart=apart,
         number=fixed,
-        readings="",
-        claims="",
+        readings=ranking(record).markdown(),
+        read={name: results(trials) for name, trials in tables_of(record).items()},
+        claims=claims(load_motion()).markdown(),
     )
 
 
