@@ -36,9 +36,9 @@ def analysed(monkeypatch):
 
 def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed):
     scratch, out = tmp_path / "scratch", tmp_path / "runs"
-    (out / "tiny").mkdir(parents=True)
-    kept = {"README.md", "map.png"}
-    for name in (*kept, "figures"):
+    (out / "tiny/trial_07").mkdir(parents=True)  # of an older run
+    kept = {"README.md", "map.png", "readings.json"}
+    for name in kept:
         (out / "tiny" / name).write_text("of an older run")
     record.record("tiny", TINY, scratch=scratch, out=out)
     run = load_run(out / "tiny")
