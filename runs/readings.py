@@ -26,8 +26,9 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
-from tetra_drake.files import read_json, write_whole
+from tetra_drake.files import check_file, read_json, write_whole
 from tetra_drake.formatting import Table, fixed, listed, ranged
+from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
@@ -155,6 +156,7 @@ def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
         "farthest_in": made["distance_in"].max(),
         "tau_a_s": best["tau_a_s"],
         "initial_mean": means[0],
+        "mean_200": means[min(last, settings.stop_after)],
         "mean": means[last],
         "last_rise": means[last] - means[max(0, last - settings.stop_window)],
         "iterations": last,
@@ -271,6 +273,7 @@ def main(names: Sequence[str]) -> None:
     if unknown := {*names} - {*ALL}:
         problem = f"found {listed(sorted(unknown))}, expected {listed([*ALL])}"
         raise InputError("NAME", "", problem)
+    check_file(RECORD)
     for name in names or ALL:
         record = load_record(RECORD) if RECORD.exists() else {}
         if name not in record:
@@ -282,6 +285,9 @@ def main(names: Sequence[str]) -> None:
 
 if __name__ == "__main__":
     try:
-        main(sys.argv[1:])
+        with heeding_interrupts():
+            main(sys.argv[1:])
     except InputError as error:
         sys.exit(f"readings.py: {error}")
+    except KeyboardInterrupt:
+        sys.exit("readings.py: interrupted; the same command goes on")

@@ -15,15 +15,16 @@ from typing import Any
 import jinja2
 import numpy as np
 import pandas
+import readings
 from analyse import load_analysis
 from claims import claims, load_motion
-from readings import RECORD, load_record, ranking, results, tables_of
 from record import load_times
 from settle import difference_of_means, numbers
 from tables import best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
 from thinning import last_population
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_text, write_whole
@@ -184,12 +185,20 @@ def apart(first: str, second: str) -> str:
     return ranged(*difference_of_means(distances[0][name], distances[1][name]))
 
 
+def without_slip(run: Run) -> str:
+    """Distances of a run's best gaits where the deflection becomes 0 at the stiction range."""
+    scenario = run.scenario.with_changes({"friction.reset": "range"})
+    walks = [simulate(scenario, gait).metrics.distance_in for gait in run.gaits()]
+    return over_trials(pandas.Series(walks))
+
+
 def page(run: Run) -> str:
     """Text of the page."""
     template = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True).from_string(
         read_text(TEMPLATE, "template")
     )
-    record = load_record(RECORD)
+    record = readings.load_record(readings.RECORD)
+    tables = readings.tables_of(record)
     return template.render(
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
@@ -198,8 +207,10 @@ def page(run: Run) -> str:
         reached=reached,
         apart=apart,
         number=fixed,
-        readings=ranking(record).markdown(),
-        read={name: results(trials) for name, trials in tables_of(record).items()},
+        ranking=readings.ranking(record).markdown(),
+        without_slip=without_slip(run),
+        trials=tables,
+        read={name: readings.results(trials) for name, trials in tables.items()},
         claims=claims(load_motion()).markdown(),
     )
 
