@@ -25,7 +25,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from tetra_drake.physics.kinematics import P_WN, V_WN
+from tetra_drake.laws.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_nodes
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS, TOP

@@ -33,8 +33,8 @@ from tetra_drake.experiment import evolve
 from tetra_drake.files import check_file, read_json, read_text, write_whole
 from tetra_drake.formatting import Table, fixed, listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.laws.curves import travelling_index
 from tetra_drake.machine import versions
-from tetra_drake.physics.curves import travelling_index
 from tetra_drake.results.measures import dominant_frequency, off_ground
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.metrics import Metrics

@@ -30,7 +30,7 @@ from tetra_drake.experiment import evolve
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import Table, fixed
-from tetra_drake.physics.cable import CABLE
+from tetra_drake.laws.cable import CABLE
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.readings import Readings
@@ -79,7 +79,7 @@ class RollingPolicy:
     """
 
     cables: np.ndarray
-    """Driven cables, records of physics.cable.CABLE."""
+    """Driven cables, records of laws.cable.CABLE."""
     rest: np.ndarray
     """Free lengths (cables,) in m at rest."""
     half: float

@@ -15,7 +15,7 @@ import tetra_drake
 PACKAGE = Path(tetra_drake.__file__).parent
 ROWS = [
     ["errors", "files", "formatting", "interrupts", "machine"],
-    ["simd", "physics", "scenario", "options", "robot"],
+    ["kernels", "laws", "scenario", "options", "robot"],
     ["systems", "visualization", "results", "engines", "gym", "prototype"],
     ["optimizers", "evolution", "analysis", "figures", "report", "experiment", "cli"],
 ]
@@ -63,7 +63,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
         settled |= free
 
 
-@pytest.mark.parametrize("folder", ["physics", "engines/compiled"])
+@pytest.mark.parametrize("folder", ["laws", "engines/compiled"])
 def test_neither_the_laws_nor_the_compiled_engine_use_drake(folder: str) -> None:
     for file in (PACKAGE / folder).glob("*.py"):
         for name in imports(file):

@@ -11,7 +11,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Sine
 
-from tetra_drake.physics.cable import CableLaw
+from tetra_drake.laws.cable import CableLaw
 from tetra_drake.systems import AddCables, AddFrame, Cable
 
 builder = DiagramBuilder()

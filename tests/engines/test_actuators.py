@@ -20,8 +20,8 @@ from scipy.linalg import expm
 
 from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import engine_of
-from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.inertia import XX
+from tetra_drake.laws.cable import PASSIVE
+from tetra_drake.laws.inertia import XX
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import Actuation, TensionMotor, Winch

@@ -33,13 +33,13 @@ from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.physics.forces import Forces, compute_state_forces
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.forces import Forces, compute_state_forces
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
 from tetra_drake.scenario.engine_kinds import Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 G = 9.80665

@@ -24,11 +24,12 @@ from helpers.structures import (
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
 from tetra_drake.experiment import evolve
-from tetra_drake.physics.cable import LENGTH, PASSIVE
-from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL
-from tetra_drake.physics.feedback import sense
-from tetra_drake.physics.forces import Forces
-from tetra_drake.physics.mode_change import modes_after_step
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.cable import LENGTH, PASSIVE
+from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL
+from tetra_drake.laws.feedback import sense
+from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.report import run_figures
 from tetra_drake.results.result import save_result
 from tetra_drake.robot.gait import seeded_gait
@@ -37,7 +38,6 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.simd.packed import Packed
 
 AMPLITUDE, FREQUENCY, INTERVAL = 1.5, 2.0 * np.pi, 0.5  # N, rad/s, s between recorded centres
 

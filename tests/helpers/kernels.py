@@ -4,12 +4,12 @@ import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Solver, implicit_matrix
 from tetra_drake.engines.compiled.rosenbrock import Step, take_step
-from tetra_drake.physics.forces import Forces, compute_forces, move_robot, sizes_of
-from tetra_drake.physics.model import Model
-from tetra_drake.simd.allocation import allocate
-from tetra_drake.simd.compiling import compiled
-from tetra_drake.simd.lanes import Real, Table
-from tetra_drake.simd.packed import Packed, unpacked
+from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.compiling import compiled
+from tetra_drake.kernels.lanes import Real, Table
+from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.laws.forces import Forces, compute_forces, move_robot, sizes_of
+from tetra_drake.laws.model import Model
 
 Parts = Packed[tuple[Model, Solver, Forces, Step]]
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario

@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 
 from helpers.structures import SIDES_ALONE
-from tetra_drake.physics.contact import MODE_COLUMNS
+from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure

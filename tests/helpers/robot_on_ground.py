@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
-from tetra_drake.physics.forces import Forces, add_ground_forces, move_contacts
-from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
+from tetra_drake.laws.forces import Forces, add_ground_forces, move_contacts
+from tetra_drake.laws.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.robot.robot import make_model, make_structure
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.simd.packed import Packed
 
 REST = (0.0, 0.0, 0.0)
 TOUCHING = (0.0, 0.0, -1e-4)

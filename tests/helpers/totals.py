@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tetra_drake.physics.tally import Tally
-from tetra_drake.simd.allocation import allocate
+from tetra_drake.kernels.allocation import allocate
+from tetra_drake.laws.tally import Tally
 
 
 def make_totals(bodies: int = 5) -> Tally:

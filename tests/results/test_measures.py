@@ -7,7 +7,7 @@ import pytest
 from helpers import prism
 from helpers.made_up_walk import PERIOD, make_row, make_walk
 
-from tetra_drake.physics.curves import travelling_index
+from tetra_drake.laws.curves import travelling_index
 from tetra_drake.results.measures import (
     distance_walked,
     dominant_frequency,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.actuations import MOTOR, WINCH
 
-from tetra_drake.physics.cable import CableLaw
+from tetra_drake.laws.cable import CableLaw
 from tetra_drake.prototype.command_file import command_columns
 from tetra_drake.robot.command import (
     Command,

@@ -7,7 +7,7 @@ import pytest
 from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 
-from tetra_drake.physics.kinematics import V_WN
+from tetra_drake.laws.kinematics import V_WN
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario

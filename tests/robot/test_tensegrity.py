@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from helpers.structures import driven_as_recorded, recorded_structure, unit_inertias
 
-from tetra_drake.physics.cable import TENSION
-from tetra_drake.physics.contact import NORMAL
+from tetra_drake.laws.cable import TENSION
+from tetra_drake.laws.contact import NORMAL
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import node_positions

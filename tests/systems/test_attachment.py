@@ -17,8 +17,8 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from tetra_drake.errors import SimulationFailure
-from tetra_drake.physics.cable import CableLaw
-from tetra_drake.physics.contact import NormalForce
+from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.contact import NormalForce
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot

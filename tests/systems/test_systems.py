@@ -1,4 +1,4 @@
-"""The systems of the diagram and their wiring; their laws are tested in tests/physics.
+"""The systems of the diagram and their wiring; their laws are tested in tests/laws.
 
 A lone tetrahedron settles and slides on the ground in tests/diagrams/test_one_tetrahedron.py.
 """
@@ -11,8 +11,8 @@ import pytest
 from one_tetrahedron import make_diagram, make_standing_tetrahedron
 from pydrake.systems.analysis import Simulator
 
-from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS
-from tetra_drake.physics.friction import STICK
+from tetra_drake.laws.contact import CONTACT, MODE, MODE_COLUMNS
+from tetra_drake.laws.friction import STICK
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions

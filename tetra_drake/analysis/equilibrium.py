@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tetra_drake.physics.cable import TENSION
-from tetra_drake.physics.contact import NORMAL
-from tetra_drake.physics.kinematics import FORCE
-from tetra_drake.physics.rigid_motions import rigid_motions
+from tetra_drake.laws.cable import TENSION
+from tetra_drake.laws.contact import NORMAL
+from tetra_drake.laws.kinematics import FORCE
+from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of

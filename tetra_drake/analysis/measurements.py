@@ -22,7 +22,7 @@ from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import MOST_BYTES, read_bytes, read_text
-from tetra_drake.physics.cable import TENSION
+from tetra_drake.laws.cable import TENSION
 from tetra_drake.prototype.command_file import TIME, column_numbers, load_command, table_cells
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest

@@ -14,10 +14,10 @@ import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.actuator import has_drive
-from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.contact import NormalForce
-from tetra_drake.physics.inertia import XX
+from tetra_drake.laws.actuator import has_drive
+from tetra_drake.laws.cable import PASSIVE
+from tetra_drake.laws.contact import NormalForce
+from tetra_drake.laws.inertia import XX
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import (
     ACTUATED_COLOUR,

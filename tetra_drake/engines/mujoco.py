@@ -36,10 +36,12 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
-from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE
-from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
-from tetra_drake.physics.forces import Forces, Parts, compute_strut_forces, pull_of_cable
+from tetra_drake.kernels.compiling import compiled
+from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.laws.actuator import DRIVE, DRIVE_COLUMNS, RATE
+from tetra_drake.laws.cable import PASSIVE
+from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.laws.forces import Forces, Parts, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.equilibrium import (
@@ -55,8 +57,6 @@ from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.simd.compiling import compiled
-from tetra_drake.simd.packed import Packed, unpacked
 
 Array = np.ndarray
 

@@ -1,4 +1,4 @@
-"""Observer of a Drake or MuJoCo simulation: computes the tally (see physics.tally) from states."""
+"""Observer of a Drake or MuJoCo simulation: computes the tally (see laws.tally) from states."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tetra_drake.physics.actuator import DRIVE
-from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
-from tetra_drake.physics.forces import Forces, compute_forces, move_robot
-from tetra_drake.physics.model import Model
-from tetra_drake.physics.tally import Tally, observe, update_clearance
+from tetra_drake.kernels.compiling import compiled, machine_code
+from tetra_drake.kernels.lanes import Table
+from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.laws.actuator import DRIVE
+from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
+from tetra_drake.laws.forces import Forces, compute_forces, move_robot
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.tally import Tally, observe, update_clearance
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
-from tetra_drake.simd.compiling import compiled, machine_code
-from tetra_drake.simd.lanes import Table
-from tetra_drake.simd.packed import Packed, unpacked
 
 Parts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
 """A robot, its tally, and the memory for its forces."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
-from tetra_drake.physics.contact import MODE_COLUMNS
-from tetra_drake.physics.kinematics import interpolate_state
+from tetra_drake.laws.contact import MODE_COLUMNS
+from tetra_drake.laws.kinematics import interpolate_state
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
 

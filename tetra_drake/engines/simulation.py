@@ -18,8 +18,8 @@ from tetra_drake.engines.interface import check_can_be_watched, engine_of
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
+from tetra_drake.laws.cable import CableLaw
 from tetra_drake.machine import threads_for
-from tetra_drake.physics.cable import CableLaw
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import controlled_robot
 from tetra_drake.robot.gait import Gait

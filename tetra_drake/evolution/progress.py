@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import duration, rounded
-from tetra_drake.simd.compiling import compiling_time
+from tetra_drake.kernels.compiling import compiling_time
 
 if TYPE_CHECKING:
     from rich.progress import TaskID

@@ -9,8 +9,8 @@ import numpy as np
 import pandas
 import xarray
 
-from tetra_drake.physics import actuator
-from tetra_drake.physics.cable import CableLaw
+from tetra_drake.laws import actuator
+from tetra_drake.laws.cable import CableLaw
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import DrivenCables
@@ -30,7 +30,7 @@ class Loads(NamedTuple):
     table: pandas.DataFrame
     """A row per driven cable, with units in the names of the columns: peaks, and means over the
     steady stretch. Limits that do not exist are NaN. Lengths and speeds are as in
-    physics.actuator.wound()."""
+    laws.actuator.wound()."""
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:

@@ -13,7 +13,7 @@ import numpy as np
 from tetra_drake.analysis.equilibrium import EquilibriumStudy
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed, rounded
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.robot import BEARS, Robot, overlaps, undisturbed_structure

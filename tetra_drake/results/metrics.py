@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tetra_drake.formatting import fixed
-from tetra_drake.physics.tally import Tally
+from tetra_drake.laws.tally import Tally
 from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes

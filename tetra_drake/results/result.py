@@ -15,8 +15,8 @@ from tetra_drake import __version__
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.formatting import heading_html
+from tetra_drake.laws.tally import Tally
 from tetra_drake.machine import versions
-from tetra_drake.physics.tally import Tally
 from tetra_drake.results.metrics import compute_fitness, compute_metrics, headline
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait

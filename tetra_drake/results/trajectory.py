@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.files import write_whole
-from tetra_drake.physics import cable
-from tetra_drake.physics.actuator import has_drive, wound
-from tetra_drake.physics.contact import STICK_POINT
-from tetra_drake.physics.forces import forces_of_motion
-from tetra_drake.physics.kinematics import P_WN, V_WN
+from tetra_drake.laws import cable
+from tetra_drake.laws.actuator import has_drive, wound
+from tetra_drake.laws.contact import STICK_POINT
+from tetra_drake.laws.forces import forces_of_motion
+from tetra_drake.laws.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 
@@ -64,9 +64,9 @@ class Motion:
     """Actuation signals (k, m)."""
     modes: np.ndarray
     """Modes of the contact nodes (k, contacts, MODE_COLUMNS) during the step that contains the
-    time, or ends there; see physics.contact."""
+    time, or ends there; see laws.contact."""
     drives: np.ndarray
-    """States of the actuators (k, drives); see physics.actuator."""
+    """States of the actuators (k, drives); see laws.actuator."""
     ground_forces: np.ndarray | None = None
     """Forces of the ground along t1, t2 and n (k, contacts, 3), if the engine has its own law of
     contact. None if they follow from states and modes."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.cable import CableLaw
+from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.scenario.scenario import Scenario

@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from tetra_drake.physics.kinematics import FORCE
+from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.blueprint import Blueprint

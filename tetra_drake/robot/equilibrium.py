@@ -12,18 +12,18 @@ import numpy as np
 from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.cable import LENGTH, PASSIVE
-from tetra_drake.physics.capsules import BARREL, PARALLEL
-from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
-from tetra_drake.physics.forces import Forces, Parts, compute_forces, move_robot
-from tetra_drake.physics.kinematics import FORCE, P_WN, move_bodies
-from tetra_drake.physics.model import Model
-from tetra_drake.physics.rigid_motions import rigid_motions
-from tetra_drake.physics.stiffness import stiffness_matrix
+from tetra_drake.kernels.compiling import LOGGER, compiled
+from tetra_drake.kernels.lanes import Table
+from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.laws.cable import LENGTH, PASSIVE
+from tetra_drake.laws.capsules import BARREL, PARALLEL
+from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL, update_modes
+from tetra_drake.laws.forces import Forces, Parts, compute_forces, move_robot
+from tetra_drake.laws.kinematics import FORCE, P_WN, move_bodies
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.rigid_motions import rigid_motions
+from tetra_drake.laws.stiffness import stiffness_matrix
 from tetra_drake.robot.statics import null_space
-from tetra_drake.simd.compiling import LOGGER, compiled
-from tetra_drake.simd.lanes import Table
-from tetra_drake.simd.packed import Packed, unpacked
 
 ROUNDING = 64 * np.finfo(float).eps
 """Largest force left in equilibrium, as a share of the robot's greatest stiffness times its

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics import terrain
-from tetra_drake.physics.contact import Ground, NormalForce
-from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
+from tetra_drake.laws import terrain
+from tetra_drake.laws.contact import Ground, NormalForce
+from tetra_drake.laws.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.common_sections import GroundSection
 from tetra_drake.scenario.friction_kinds import FrictionKind
@@ -103,7 +103,7 @@ def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:
 
 
 def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
-    """Axes of the surface below points (points, 3) in m: t1, t2 and n (see physics.terrain) as rows
+    """Axes of the surface below points (points, 3) in m: t1, t2 and n (see laws.terrain) as rows
     of (points, 3, 3)."""
     frames = ground_frames(p_WN, ground)
     axes = np.zeros((len(p_WN), 3, 3))
@@ -115,7 +115,7 @@ def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
 
 def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
     """Frames (points, FRAME_COLUMNS) of the surface below points (points, 3) in m; see
-    physics.terrain."""
+    laws.terrain."""
     frames = np.empty((len(p_WN), terrain.FRAME_COLUMNS))
     nodes = np.zeros((len(p_WN), NODE_COLUMNS))
     nodes[:, P_WN : P_WN + 3] = p_WN

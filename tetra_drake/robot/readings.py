@@ -6,13 +6,13 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.physics import cable, contact, kinematics
-from tetra_drake.physics.forces import forces_of_motion
+from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.compiling import compiled
+from tetra_drake.kernels.lanes import Table
+from tetra_drake.laws import cable, contact, kinematics
+from tetra_drake.laws.forces import forces_of_motion
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.simd.allocation import allocate
-from tetra_drake.simd.compiling import compiled
-from tetra_drake.simd.lanes import Table
 
 
 class Readings(NamedTuple):
@@ -64,7 +64,7 @@ class Readings(NamedTuple):
         ground_forces: np.ndarray,
     ) -> Self:
         """The readings of a robot at a time (s), from the state (13 n,) of its bodies and the
-        tables `cable_forces` of physics.cable and `ground_forces` of physics.contact."""
+        tables `cable_forces` of laws.cable and `ground_forces` of laws.contact."""
         nodes, bodies = moved_nodes(structure, state), len(structure.bodies)
         return cls(
             time=time,
@@ -119,7 +119,7 @@ def readings_at(
 
     Args:
         state: state (13 n,) of the bodies.
-        modes: modes of the contact nodes; see physics.contact.
+        modes: modes of the contact nodes; see laws.contact.
         signals: signals (m,) in N.
         drives: states of the actuators (drives,).
         ground_forces: table `ground_forces` of an engine with its own law of contact.

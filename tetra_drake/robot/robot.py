@@ -12,14 +12,15 @@ from typing import Any, Self
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics import cable
-from tetra_drake.physics.capsules import NearStruts, find_near_struts, find_touch
-from tetra_drake.physics.contact import MODE_COLUMNS, Ground, NormalForce
-from tetra_drake.physics.feedback import Senses
-from tetra_drake.physics.forces import Forces
-from tetra_drake.physics.mode_change import modes_after_step
-from tetra_drake.physics.model import Bodies, Model
-from tetra_drake.physics.oscillator import Network, steered_input
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws import cable
+from tetra_drake.laws.capsules import NearStruts, find_near_struts, find_touch
+from tetra_drake.laws.contact import MODE_COLUMNS, Ground, NormalForce
+from tetra_drake.laws.feedback import Senses
+from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.mode_change import modes_after_step
+from tetra_drake.laws.model import Bodies, Model
+from tetra_drake.laws.oscillator import Network, steered_input
 from tetra_drake.robot.elastic_struts import axial_forces, elastic_struts, with_elongations
 from tetra_drake.robot.equilibrium import Equilibrium, Unactuated, find_equilibrium
 from tetra_drake.robot.gait import Gait, check_gait
@@ -31,7 +32,6 @@ from tetra_drake.scenario.common_sections import CpgSection
 from tetra_drake.scenario.metrics import looks_for_distance
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
-from tetra_drake.simd.packed import Packed
 
 AMPLITUDE = 0.5
 """Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""
@@ -155,7 +155,7 @@ class Robot:
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
         """Input u0 of each neuron (..., 2m), for turns (...); see
-        physics.oscillator.steered_input()."""
+        laws.oscillator.steered_input()."""
         sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.external_input
         return np.asarray(steered_input(u0, turns[..., np.newaxis], sides))
 
@@ -222,7 +222,7 @@ class Robot:
         return np.asarray(cable.elastic_stretch(force, law))
 
     def starting_drives(self) -> np.ndarray:
-        """States of the actuators at t = 0 (drives,); see physics.actuator and
+        """States of the actuators at t = 0 (drives,); see laws.actuator and
         cables_of_drives."""
         cables = self.structure.cables[self.cables_of_drives]
         return np.asarray(self.scenario.actuation.drives(self._at_start(cables)))
@@ -237,13 +237,13 @@ class Robot:
         return DrivenCables.at_rest(law, self._starting_lengths(driven), signal)
 
     def _starting_lengths(self, cables: np.ndarray) -> Any:
-        """Lengths of cables, records of physics.cable.CABLE, in m at t = 0."""
+        """Lengths of cables, records of laws.cable.CABLE, in m at t = 0."""
         p_WN = node_positions(self.structure, self.structure.initial_state)
         return np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
 
     @functools.cached_property
     def starting_modes(self) -> np.ndarray:
-        """Modes of the contact nodes at t = 0 (see physics.contact). A node that touches the ground
+        """Modes of the contact nodes at t = 0 (see laws.contact). A node that touches the ground
         sticks."""
         modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
         parts = Packed((self.model, Forces.of(self.model)))

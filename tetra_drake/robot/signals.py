@@ -13,7 +13,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.physics.oscillator import make_neurons, network_output
+from tetra_drake.laws.oscillator import make_neurons, network_output
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tetra_drake.physics.actuator import Limits
+from tetra_drake.laws.actuator import Limits
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 

@@ -22,11 +22,11 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from tetra_drake.physics import cable, kinematics
-from tetra_drake.physics.capsules import Search
-from tetra_drake.physics.model import Couplings
-from tetra_drake.physics.node_forces import AnchorSprings, NodeLoads
-from tetra_drake.physics.struts import Struts
+from tetra_drake.laws import cable, kinematics
+from tetra_drake.laws.capsules import Search
+from tetra_drake.laws.model import Couplings
+from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
+from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
 from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import WORLD, Blueprint
@@ -221,7 +221,7 @@ def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Table `nodes` of physics.kinematics for a state (13 n,) of the bodies; without forces."""
+    """Table `nodes` of laws.kinematics for a state (13 n,) of the bodies; without forces."""
     nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
     kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes

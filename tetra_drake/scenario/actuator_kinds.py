@@ -16,8 +16,8 @@ from tetra_drake.scenario.quantities import Length, Speed, Time
 from tetra_drake.scenario.section import Kinds, Section
 
 if TYPE_CHECKING:
-    from tetra_drake.physics.actuator import Actuator
-    from tetra_drake.physics.cable import CableLaw
+    from tetra_drake.laws.actuator import Actuator
+    from tetra_drake.laws.cable import CableLaw
 
 
 class DrivenCables(NamedTuple):
@@ -35,7 +35,7 @@ class DrivenCables(NamedTuple):
     @classmethod
     def at_rest(cls, law: CableLaw, length: Any, signal: Any) -> Self:
         """Cables of these lengths (m) at rest, with signals (N), at their original free lengths."""
-        from tetra_drake.physics.cable import cable_tension
+        from tetra_drake.laws.cable import cable_tension
 
         rate: Any = np.zeros(len(length))
         tension = np.maximum(cable_tension(length, rate, signal, law), 0.0)
@@ -65,7 +65,7 @@ class ActuatorKind(Section):
         return ""
 
     def drives(self, cables: DrivenCables) -> Any:
-        """States of the actuators (..., drives); see physics.actuator."""
+        """States of the actuators (..., drives); see laws.actuator."""
         raise NotImplementedError
 
     def commands(self, cables: DrivenCables) -> Any:
@@ -85,7 +85,7 @@ class Force(ActuatorKind):
     commanded = "force_N"
 
     def actuator(self) -> Actuator:
-        from tetra_drake.physics import actuator
+        from tetra_drake.laws import actuator
 
         return actuator.Actuator.of(actuator.DIRECT)
 
@@ -108,7 +108,7 @@ class LimitedActuator(ActuatorKind):
 
 
 class Winch(LimitedActuator):
-    """A winch on each driven cable: signals command its free length. See physics.actuator."""
+    """A winch on each driven cable: signals command its free length. See laws.actuator."""
 
     commanded = "free_length_mm"
     command_unit = 1e-3
@@ -120,7 +120,7 @@ class Winch(LimitedActuator):
     """Least free length of a cable."""
 
     def actuator(self) -> Actuator:
-        from tetra_drake.physics import actuator
+        from tetra_drake.laws import actuator
 
         return actuator.Actuator.of(actuator.WINCH, **dict(self))
 
@@ -142,13 +142,13 @@ class Winch(LimitedActuator):
 
 class TensionMotor(LimitedActuator):
     """A motor on each driven cable that controls the tension. The commanded tension is the sum of
-    the signal and the forces of the cable's spring and damper. See physics.actuator."""
+    the signal and the forces of the cable's spring and damper. See laws.actuator."""
 
     commanded = "tension_N"
     plays_cable = True
 
     def actuator(self) -> Actuator:
-        from tetra_drake.physics import actuator
+        from tetra_drake.laws import actuator
 
         return actuator.Actuator.of(actuator.TENSION_MOTOR, **dict(self))
 
@@ -161,7 +161,7 @@ class TensionMotor(LimitedActuator):
         return cables.tension
 
     def commands(self, cables: DrivenCables) -> Any:
-        from tetra_drake.physics.cable import cable_tension
+        from tetra_drake.laws.cable import cable_tension
 
         law, signal, length, rate, _, _ = cables
         return np.clip(cable_tension(length, rate, signal, law), 0.0, self.max_force)

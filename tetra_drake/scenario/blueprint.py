@@ -74,7 +74,7 @@ class Blueprint:
     cable_ends: np.ndarray
     """Indices of the two nodes of each cable (cables, 2), from the lower body to the higher."""
     cable_laws: tuple[Mapping[str, float], ...]
-    """Constants of each cable, by the names of physics.cable.CableLaw."""
+    """Constants of each cable, by the names of laws.cable.CableLaw."""
     slack: bool
     """True if cables go slack instead of pushing."""
     oscillators: tuple[str, ...]

@@ -19,7 +19,7 @@ from tetra_drake.scenario.section import Section, Varied
 Value = TypeVar("Value")
 
 Pathway = Literal["length", "load", "pitch"]
-"""A signal that can be fed back to the oscillators; see physics.feedback."""
+"""A signal that can be fed back to the oscillators; see laws.feedback."""
 
 PATHWAYS: tuple[str, ...] = get_args(Pathway)
 

@@ -24,7 +24,7 @@ from tetra_drake.scenario.section import Kinds, Section, Varied
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 if TYPE_CHECKING:
-    from tetra_drake.physics.friction import FrictionLaw
+    from tetra_drake.laws.friction import FrictionLaw
 
 
 MUJOCO_FRICTION = 0.5
@@ -74,7 +74,7 @@ class FrictionKind(Section):
 class ResetIntegrator(FrictionKind):
     """Friction of the thesis (Table 2, Eq. 3-5), independent of the load.
 
-    A bristle holds a node until it is bent by `stiction_range`. See physics.friction. The keys from
+    A bristle holds a node until it is bent by `stiction_range`. See laws.friction. The keys from
     `stiffness` on are other readings of the thesis's text.
     """
 
@@ -101,7 +101,7 @@ class ResetIntegrator(FrictionKind):
     not given, friction is independent of it."""
 
     def law(self) -> FrictionLaw:
-        from tetra_drake.physics.friction import FrictionLaw, ResetConstants
+        from tetra_drake.laws.friction import FrictionLaw, ResetConstants
 
         return FrictionLaw.of(
             ResetConstants(
@@ -132,7 +132,7 @@ class ResetIntegrator(FrictionKind):
 class Coulomb(FrictionKind):
     """Friction that grows with the load, and may depend on the direction of travel.
 
-    A bristle holds a node until its force exceeds `static` times the load. See physics.friction.
+    A bristle holds a node until its force exceeds `static` times the load. See laws.friction.
     """
 
     modes = "0 sticks, else the signs of the direction of slip"
@@ -162,7 +162,7 @@ class Coulomb(FrictionKind):
         return self.model_copy(update={"stiffness": 0.0})
 
     def law(self) -> FrictionLaw:
-        from tetra_drake.physics.friction import CoulombConstants, FrictionLaw
+        from tetra_drake.laws.friction import CoulombConstants, FrictionLaw
 
         return FrictionLaw.of(
             CoulombConstants(

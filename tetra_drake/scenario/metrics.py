@@ -13,11 +13,11 @@ import numpy as np
 
 from tetra_drake.files import json_number
 from tetra_drake.formatting import Table
-from tetra_drake.physics.curves import curvature, travelling_index
+from tetra_drake.laws.curves import curvature, travelling_index
 from tetra_drake.scenario.units import INCH, INCHES, Units, current
 
 if TYPE_CHECKING:
-    from tetra_drake.physics.tally import Tally
+    from tetra_drake.laws.tally import Tally
 
 STRAIGHT = 0.01
 """Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
@@ -88,7 +88,7 @@ class Walk(Poses):
         return 1.0 / float(steady_time or 1)
 
     def mean(self, effort: str) -> float:
-        """A total of physics.tally.Effort as mean over the steady stretch and the actuators."""
+        """A total of laws.tally.Effort as mean over the steady stretch and the actuators."""
         per_actuator_time = self.per_steady_time / max(self.actuators, 1)
         return per_actuator_time * float(getattr(self.tally.effort, effort)[0])
 

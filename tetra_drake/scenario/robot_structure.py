@@ -17,7 +17,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from tetra_drake.physics.rigid_motions import rigid_motions
+from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.scenario.blueprint import WORLD, Blueprint
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.quantities import (
@@ -145,18 +145,18 @@ class CableGroup(Section):
         return self
 
     def law(self, free_length: float) -> dict[str, float]:
-        """The constants of a cable, by the names of physics.cable.CableLaw."""
+        """The constants of a cable, by the names of laws.cable.CableLaw."""
         return dict(stiffness=self.stiffness, damping=self.damping, free_length=free_length)
 
     def greatest_tension(self, length: float) -> float:
         """Tension (N) of a cable of this length (m) with a free length of 0."""
-        from tetra_drake.physics.cable import CableLaw, elastic_tension
+        from tetra_drake.laws.cable import CableLaw, elastic_tension
 
         return elastic_tension(length, CableLaw(**self.law(0.0)))
 
     def free_length_at(self, length: float) -> float:
         """Free length (m) of a cable. `length` (m) is the distance of its nodes in the file."""
-        from tetra_drake.physics.cable import CableLaw, elastic_stretch
+        from tetra_drake.laws.cable import CableLaw, elastic_stretch
 
         if self.free_length is not None:
             return self.free_length

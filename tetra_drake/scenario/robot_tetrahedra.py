@@ -107,7 +107,7 @@ class RowCables(Section):
     """True if a cable pulls only while it is stretched; otherwise it also pushes (Eq. 6)."""
 
     def law(self, cable: str) -> dict[str, float]:
-        """Constants of a cable of a junction, by the names of physics.cable.CableLaw."""
+        """Constants of a cable of a junction, by the names of laws.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
         return dict(stiffness=stiffness, damping=self.damping, free_length=self.free_length)
 
@@ -264,7 +264,7 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
     neglected: twice the density moves T1 by less than 0.003 in. Refuses cables that balance at no
     spacing.
     """
-    from tetra_drake.physics.cable import CableLaw, elastic_tension
+    from tetra_drake.laws.cable import CableLaw, elastic_tension
 
     height = strut_length * math.sqrt(2.0 / 3.0)
     radius = strut_length / math.sqrt(3.0)

@@ -14,7 +14,7 @@ from tetra_drake.scenario.quantities import InverseSpeed, Stiffness
 from tetra_drake.scenario.section import Kinds, Section
 
 if TYPE_CHECKING:
-    from tetra_drake.physics.capsules import Search, StrutContactLaw
+    from tetra_drake.laws.capsules import Search, StrutContactLaw
 
 
 class NoStrutContact(Section):
@@ -24,14 +24,14 @@ class NoStrutContact(Section):
 
     def law(self, search: Search) -> StrutContactLaw:
         """The law in the form of the kernels. `search` has the distances of the search."""
-        from tetra_drake.physics.capsules import StrutContactLaw
+        from tetra_drake.laws.capsules import StrutContactLaw
 
         return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
 
 
 class HuntCrossley(Section):
     """Struts touch as capsules of their radii, without friction. The force at a depth d of their
-    overlap is F = k d (1 + c d'); see physics.capsules."""
+    overlap is F = k d (1 + c d'); see laws.capsules."""
 
     stiffness: Stiffness = Field(gt=0)
     """Force per depth, k."""
@@ -41,8 +41,8 @@ class HuntCrossley(Section):
 
     def law(self, search: Search) -> StrutContactLaw:
         """The law in the form of the kernels. `search` has the distances of the search."""
-        from tetra_drake.physics.capsules import StrutContactLaw
-        from tetra_drake.physics.contact import NormalForce
+        from tetra_drake.laws.capsules import StrutContactLaw
+        from tetra_drake.laws.contact import NormalForce
 
         normal = NormalForce(self.stiffness, damping=self.stiffness * self.dissipation)
         return StrutContactLaw(acts=True, normal=np.array(normal), search=np.array(search))

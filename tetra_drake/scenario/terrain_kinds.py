@@ -1,7 +1,7 @@
 """Kinds of terrain, and the grid of heights of each kind.
 
 The ground is the surface z = h(x, y) in the world: x forward, y left, z up. The robot starts around
-the origin, T1's base at x = 0, and walks along +x. physics.terrain makes the surface from heights.
+the origin, T1's base at x = 0, and walks along +x. laws.terrain makes the surface from heights.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
+"""LeafSystems of the diagram: ports, state and events. The laws are in `laws`."""
 
 from tetra_drake.robot.structure import AddFrame
 from tetra_drake.systems.attachment import Attach

@@ -16,13 +16,13 @@ from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, Leaf
 from pydrake.systems.primitives import Integrator
 
 from tetra_drake.errors import InputError, SimulationFailure, check_type
-from tetra_drake.physics import actuator, cable, kinematics
-from tetra_drake.physics.forces import Forces, compute_cable_forces
-from tetra_drake.physics.model import Model
+from tetra_drake.kernels.compiling import machine_code
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws import actuator, cable, kinematics
+from tetra_drake.laws.forces import Forces, compute_cable_forces
+from tetra_drake.laws.model import Model
 from tetra_drake.scenario.actuator_kinds import Actuation, ActuatorKind, DrivenCables, Force
 from tetra_drake.scenario.refusals import hint
-from tetra_drake.simd.compiling import machine_code
-from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.attachment import (
     Attach,
     Nodes,
@@ -50,7 +50,7 @@ class CableNetwork(LeafSystem):
     | tensions          | (cables,)      | N      | tension of each cable                    |
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (cables,)      | m/s    | rate of each cable's length              |
-    | cable_forces      | (7 cables,)    | SI     | table of physics.cable, row by row       |
+    | cable_forces      | (7 cables,)    | SI     | table of laws.cable, row by row       |
     | ends              | (6 cables,)    | m      | positions of the two ends, by cable      |
     | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 

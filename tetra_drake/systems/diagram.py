@@ -13,7 +13,7 @@ from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.cable import CableLaw
+from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples

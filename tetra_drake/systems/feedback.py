@@ -6,21 +6,21 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS
-from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS
-from tetra_drake.physics.feedback import sense
+from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
+from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
+from tetra_drake.laws.feedback import sense
 from tetra_drake.robot.robot import Robot
 
 
 class Feedback(LeafSystem):
-    """Feedback from cables, ground and bodies to the oscillators (see physics.feedback). It has no
+    """Feedback from cables, ground and bodies to the oscillators (see laws.feedback). It has no
     state.
 
     | port          | shape         | unit | meaning                                               |
     |---------------|---------------|------|-------------------------------------------------------|
     | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
-    | cable_forces  | (7 cables,)   | SI   | table of physics.cable, row by row, from the cables   |
-    | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
+    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables   |
+    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground |
     | feedback      | (2m,)         | 1    | f of Eq. 7 for the neurons of m oscillators           |
     """
 

@@ -20,12 +20,12 @@ from pydrake.systems.framework import (
 )
 
 from tetra_drake.errors import InputError, check_type
-from tetra_drake.physics import contact
-from tetra_drake.physics.forces import Forces, compute_ground_forces
-from tetra_drake.physics.mode_change import mode_margin, modes_after_step, next_mode_change
-from tetra_drake.physics.model import Model
-from tetra_drake.simd.compiling import machine_code
-from tetra_drake.simd.packed import Packed
+from tetra_drake.kernels.compiling import machine_code
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws import contact
+from tetra_drake.laws.forces import Forces, compute_ground_forces
+from tetra_drake.laws.mode_change import mode_margin, modes_after_step, next_mode_change
+from tetra_drake.laws.model import Model
 from tetra_drake.systems.attachment import (
     Attach,
     Nodes,
@@ -47,12 +47,12 @@ class GroundContact(LeafSystem):
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
     |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
-    | ground_forces     | (3 m,)  | N      | table of physics.contact, row by row              |
+    | ground_forces     | (3 m,)  | N      | table of laws.contact, row by row              |
 
-    On flat ground t1 and t2 are x and y; otherwise see `physics.terrain`; `physics.friction`
+    On flat ground t1 and t2 are x and y; otherwise see `laws.terrain`; `laws.friction`
     explains modes.
 
-    The discrete state is `modes` of `physics.contact`. Deflections follow from the stick points, so
+    The discrete state is `modes` of `laws.contact`. Deflections follow from the stick points, so
     no continuous state has to be reset. Modes are updated at the end of a step; Initialize() sets
     them from the pose.
 

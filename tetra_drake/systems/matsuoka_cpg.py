@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
-from tetra_drake.physics import oscillator
+from tetra_drake.laws import oscillator
 
 
 class MatsuokaCpg(LeafSystem):
@@ -62,7 +62,7 @@ class MatsuokaCpg(LeafSystem):
         derivatives.SetFromVector(neurons[:, oscillator.U_RATE : oscillator.V_RATE + 1].T.ravel())
 
     def _neurons(self, context: Context) -> np.ndarray:
-        """Table `neurons` of physics.oscillator, from the state."""
+        """Table `neurons` of laws.oscillator, from the state."""
         return oscillator.make_neurons(context.get_continuous_state_vector().value())
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:

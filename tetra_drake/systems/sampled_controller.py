@@ -14,8 +14,8 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS
-from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS
+from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
+from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 
@@ -29,8 +29,8 @@ class HeldSignals(LeafSystem):
     | port          | shape         | unit | meaning                                               |
     |---------------|---------------|------|-------------------------------------------------------|
     | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
-    | cable_forces  | (7 cables,)   | SI   | table of physics.cable, row by row, from the cables   |
-    | ground_forces | (3 contacts,) | N    | table of physics.contact, row by row, from the ground |
+    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables   |
+    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground |
     | signals       | (m,)          | N    | signals of the cables                                 |
 
     The signals change as the actions of engines.simulation.Simulation do: linearly, within one

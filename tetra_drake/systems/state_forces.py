@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics.forces import Forces, compute_state_forces, compute_strut_forces
+from tetra_drake.kernels.compiling import machine_code
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.forces import Forces, compute_state_forces, compute_strut_forces
 from tetra_drake.robot.robot import Robot
-from tetra_drake.simd.compiling import machine_code
-from tetra_drake.simd.packed import Packed
 
 
 class StateForces(LeafSystem):
@@ -19,7 +19,7 @@ class StateForces(LeafSystem):
     | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant |
     | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin        |
 
-    See `physics.capsules` and `physics.node_forces`. The forces are continuous, so no step has to
+    See `laws.capsules` and `laws.node_forces`. The forces are continuous, so no step has to
     end where struts begin to touch. But long steps could carry struts through each other.
     """
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from tetra_drake.formatting import Say
-from tetra_drake.physics.cable import CableLaw, elastic_tension
+from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario

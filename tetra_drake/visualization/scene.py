@@ -10,8 +10,8 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import Box, Cylinder, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
-from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.contact import Ground
+from tetra_drake.laws.cable import PASSIVE
+from tetra_drake.laws.contact import Ground
 from tetra_drake.robot.bodies import strut_pose
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot

@@ -5,7 +5,7 @@ import pytest
 from helpers.kernels import Stepper
 
 from tetra_drake.engines.compiled.rosenbrock import larger
-from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
+from tetra_drake.laws.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario

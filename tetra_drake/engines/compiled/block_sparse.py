@@ -15,8 +15,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.simd.compiling import inlined
-from tetra_drake.simd.lanes import Real, Table
+from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.lanes import Real, Table
 
 BLOCK = 6
 

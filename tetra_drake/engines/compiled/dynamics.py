@@ -11,17 +11,17 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK, Schedule
-from tetra_drake.physics import contact, inertia
-from tetra_drake.physics.cable import DIRECTION, TENSION_PER_RATE
-from tetra_drake.physics.forces import Forces
-from tetra_drake.physics.friction import friction_damping
-from tetra_drake.physics.kinematics import P_BN_W
-from tetra_drake.physics.model import Model
-from tetra_drake.physics.node_forces import AnchorSprings
-from tetra_drake.physics.terrain import to_world
-from tetra_drake.physics.vectors import cross, put_vector, vector_at
-from tetra_drake.simd.compiling import inlined, merged
-from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
+from tetra_drake.kernels.compiling import inlined, merged
+from tetra_drake.kernels.lanes import Real, Table, any_lane, named, select
+from tetra_drake.laws import contact, inertia
+from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
+from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.friction import friction_damping
+from tetra_drake.laws.kinematics import P_BN_W
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.node_forces import AnchorSprings
+from tetra_drake.laws.terrain import to_world
+from tetra_drake.laws.vectors import cross, put_vector, vector_at
 
 CABLES_AT_ONCE = 6
 """Number of cables of a pair of bodies whose damping is summed at once."""

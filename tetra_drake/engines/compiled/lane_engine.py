@@ -14,16 +14,16 @@ from tetra_drake.engines.compiled.lane_tables import in_lanes, numbers_of, views
 from tetra_drake.engines.compiled.places import LAST, NEXT, ROUND, Memory, Places, advance
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.actuator import DRIVE
-from tetra_drake.physics.terrain import SurfaceGrid
+from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.compiling import machine_code
+from tetra_drake.kernels.lanes import FieldArray
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.actuator import DRIVE
+from tetra_drake.laws.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.simd.allocation import allocate
-from tetra_drake.simd.compiling import machine_code
-from tetra_drake.simd.lanes import FieldArray
-from tetra_drake.simd.packed import Packed
 
 FIRST = SurfaceGrid._fields.index("first")
 """Column of Ground.grid with the index of the first height. It differs between robots, because one

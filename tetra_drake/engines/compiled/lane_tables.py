@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.simd.lanes import FieldArray, lane_table
+from tetra_drake.kernels.lanes import FieldArray, lane_table
 
 
 def numbers_of(values: Any) -> np.ndarray:

@@ -20,16 +20,25 @@ import numpy as np
 from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
-from tetra_drake.physics import actuator, contact, oscillator
-from tetra_drake.physics.capsules import time_to_pass
-from tetra_drake.physics.feedback import Senses, sense
-from tetra_drake.physics.forces import Forces, compute_forces, move_robot
-from tetra_drake.physics.kinematics import interpolate_state
-from tetra_drake.physics.mode_change import time_to_mode_change
-from tetra_drake.physics.model import Model
-from tetra_drake.physics.tally import Tally, observe
-from tetra_drake.simd.compiling import inlined, merged
-from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, by_lane, maximum, minimum, select
+from tetra_drake.kernels.compiling import inlined, merged
+from tetra_drake.kernels.lanes import (
+    Real,
+    Table,
+    Truth,
+    any_lane,
+    by_lane,
+    maximum,
+    minimum,
+    select,
+)
+from tetra_drake.laws import actuator, contact, oscillator
+from tetra_drake.laws.capsules import time_to_pass
+from tetra_drake.laws.feedback import Senses, sense
+from tetra_drake.laws.forces import Forces, compute_forces, move_robot
+from tetra_drake.laws.kinematics import interpolate_state
+from tetra_drake.laws.mode_change import time_to_mode_change
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.tally import Tally, observe
 
 Array = np.ndarray
 

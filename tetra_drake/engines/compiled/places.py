@@ -15,13 +15,13 @@ from typing import Annotated, NamedTuple, TypeAlias
 
 from tetra_drake.engines.compiled import loop
 from tetra_drake.engines.compiled.loop import Constants, LaneState, Log
-from tetra_drake.physics import cable, contact, kinematics
-from tetra_drake.physics.forces import move_robot
-from tetra_drake.physics.tally import update_clearance
+from tetra_drake.kernels.compiling import compiled, inlined
+from tetra_drake.kernels.lanes import Table, any_lane, by_lane, floor, select
+from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.laws import cable, contact, kinematics
+from tetra_drake.laws.forces import move_robot
+from tetra_drake.laws.tally import update_clearance
 from tetra_drake.robot.readings import Readings
-from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Table, any_lane, by_lane, floor, select
-from tetra_drake.simd.packed import Packed, unpacked
 
 ROUND = 32
 """Steps of a robot (about 40 ms of motion) between two computations of the clearance. They find the

@@ -13,9 +13,10 @@ from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.lane_tables import shared
 from tetra_drake.engines.compiled.loop import Constants, LaneState
 from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation
-from tetra_drake.physics.actuator import DRIVE, Limits
-from tetra_drake.physics.forces import sizes_of
-from tetra_drake.physics.oscillator import make_neurons
+from tetra_drake.kernels.allocation import allocate
+from tetra_drake.laws.actuator import DRIVE, Limits
+from tetra_drake.laws.forces import sizes_of
+from tetra_drake.laws.oscillator import make_neurons
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.results.result import motion_times
 from tetra_drake.robot.gait import Gait
@@ -23,7 +24,6 @@ from tetra_drake.robot.robot import Robot, initial_neurons
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.simd.allocation import allocate
 
 _SPARE_MARKS = 4
 """Number of marks that a gait may have more than the first gait on the same engine."""

@@ -44,13 +44,13 @@ from tetra_drake.engines.compiled.touching import (
     solve_touching,
     subtract_springs,
 )
-from tetra_drake.physics.forces import Forces, compute_forces, move_robot
-from tetra_drake.physics.inertia import INERTIA_COLUMNS
-from tetra_drake.physics.kinematics import P_BN_W, move_bodies
-from tetra_drake.physics.model import Model
-from tetra_drake.physics.vectors import Vector, cross, vector_at
-from tetra_drake.simd.compiling import inlined, merged
-from tetra_drake.simd.lanes import Real, Table, select
+from tetra_drake.kernels.compiling import inlined, merged
+from tetra_drake.kernels.lanes import Real, Table, select
+from tetra_drake.laws.forces import Forces, compute_forces, move_robot
+from tetra_drake.laws.inertia import INERTIA_COLUMNS
+from tetra_drake.laws.kinematics import P_BN_W, move_bodies
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.vectors import Vector, cross, vector_at
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 

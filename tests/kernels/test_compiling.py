@@ -1,0 +1,157 @@
+"""Where compiled kernels are kept. A copy of the package runs in a fresh process, with a plain
+file where its cache folder would be: unwritable even for root."""
+
+import logging
+import math
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+import tetra_drake
+from tetra_drake.kernels import compiling
+from tetra_drake.kernels.compiling import LOGGER, compiled, compiling_time
+
+PROGRAM = """
+import numpy as np
+from tetra_drake.laws.oscillator import oscillator_output
+neurons, output = np.eye(2, 9), np.empty(1)
+oscillator_output(neurons, output)
+print(output[0])
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A read-only installation."""
+    target = tmp_path / "installed" / "tetra_drake"
+    without_cache = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(tetra_drake.__file__).parent, target, ignore=without_cache)
+    (target / "laws" / "__pycache__").write_text("in the way")
+    return target.parent
+
+
+def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
+    """What the program prints."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
+    environment |= {"PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment |= {"XDG_CACHE_HOME": str(cache_home), "HOME": str(cache_home)}
+    command = [sys.executable, "-c", program]
+    return subprocess.check_output(command, env=environment, cwd=package, text=True)
+
+
+@pytest.mark.parametrize(("folder", "caches"), [("cache", True), ("file/cache", False)])
+def test_a_read_only_installation_caches_for_the_user_if_it_can(package, tmp_path, folder, caches):
+    (tmp_path / "file").write_text("")
+    assert float(run(package, tmp_path / folder)) == 1.0
+    assert any(tmp_path.rglob("oscillator.oscillator_output*.nbc")) == caches
+
+
+IMPORTS = {
+    "name": ("from {package}.constant import VALUE", "VALUE"),
+    "module": ("from {package} import (\n    constant as other,\n)", "other.VALUE"),
+    "dotted": ("import {package}.constant as constant", "constant.VALUE"),
+}
+"""Ways in which a module gets a constant of another one."""
+
+
+def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(package, tmp_path):
+    # outer() contains inner(), which uses a constant of a third module; they may be in any folder.
+    kernels, name = package / "tetra_drake" / "elsewhere" / "deeper", "tetra_drake.elsewhere.deeper"
+    kernels.mkdir(parents=True)
+    begin = "from tetra_drake.kernels.compiling import compiled, inlined\n"
+    (kernels / "constant.py").write_text("VALUE = 1.0\n")
+    program = ""
+    for way, (imported, value) in IMPORTS.items():
+        (kernels / f"inner_{way}.py").write_text(
+            f"{begin}{imported.format(package=name)}\n@inlined\ndef inner():\n    return {value}\n"
+        )
+        (kernels / f"outer_{way}.py").write_text(
+            f"{begin}from {name}.inner_{way} import inner\n"
+            "@compiled\ndef outer():\n    return inner()\n"
+        )
+        program += f"from {name}.outer_{way} import outer\n"
+        program += "print(outer(), sum(outer.stats.cache_hits.values()))\n"
+    (kernels / "__pycache__").write_text("in the way")
+
+    def values_and_hits() -> list[str]:
+        return run(package, tmp_path / "cache", program).splitlines()
+
+    assert values_and_hits() == ["1.0 0"] * 3
+    assert values_and_hits() == ["1.0 1"] * 3
+    (kernels / "constant.py").write_text("VALUE = 2.0\n")
+    assert values_and_hits() == ["2.0 0"] * 3
+
+
+def twice(x):
+    return x + x
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where numba keeps machine code."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_processes_that_save_at_once_do_not_spoil_the_cache(folder, monkeypatch):
+    replace, other = os.replace, compiled(twice)
+
+    def after_another(*paths):
+        monkeypatch.setattr(os, "replace", replace)
+        other(0.25)
+        replace(*paths)
+
+    monkeypatch.setattr(os, "replace", after_another)
+    assert compiled(twice)(21) == 42
+    later = compiled(twice)
+    assert (later(21), later(0.25), *later.stats.cache_hits.values()) == (42, 0.5, 1, 1)
+
+
+def truncate(file: Path, other: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-100])
+
+
+def take_another(file: Path, other: Path) -> None:
+    file.write_bytes(other.read_bytes())
+
+
+@pytest.mark.parametrize("damage", [truncate, take_another])
+def test_damaged_machine_code_is_made_again(folder, damage):
+    def results_and_hits() -> list[float]:
+        """Of a kernel that is compiled or loaded anew, for an integer and a real number."""
+        kernel = compiled(twice)
+        return [kernel(3), kernel(0.25), sum(kernel.stats.cache_hits.values())]
+
+    assert results_and_hits() == [6, 0.5, 0]
+    damage(*folder.rglob("*.nbc"))
+    assert results_and_hits() == [6, 0.5, 1]
+    assert results_and_hits() == [6, 0.5, 2]
+
+
+def test_values_of_a_closure_are_never_those_of_an_earlier_one(folder):
+    def make(factor):
+        def times(x):
+            return factor * x
+
+        return compiled(times)
+
+    assert [make(factor)(2.0) for factor in (3.0, 5.0)] == [6.0, 10.0]
+
+
+@pytest.mark.parametrize(("moment", "minute", "times"), [(0, 60, 1), (0, 0, 2)])
+def test_compilation_that_takes_longer_than_a_moment_is_announced_once_in_a_minute(
+    folder, monkeypatch, caplog, moment, minute, times
+):
+    for name, value in {"_MOMENT": moment, "_MINUTE": minute, "_told": -math.inf}.items():
+        monkeypatch.setattr(compiling, name, value)
+    before = compiling_time()
+    for number in (3, 0.25):
+        compiled(twice)(number)
+    told = [(record.name, record.levelno) for record in caplog.records]
+    assert told == [(LOGGER, logging.WARNING)] * times
+    assert compiling_time() > before

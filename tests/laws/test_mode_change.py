@@ -1,0 +1,156 @@
+"""When modes change, by each law of friction, on flat ground and on a slope."""
+
+import numpy as np
+import pytest
+from helpers.robot_on_ground import RobotOnGround
+
+from tetra_drake.laws.contact import HEADING, MODE
+from tetra_drake.laws.friction import ResetConstants, first_zero
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.terrain_kinds import Flat, Incline
+
+SLOPE = 0.2
+R = np.array([[np.cos(SLOPE), 0, -np.sin(SLOPE)], [0, 1, 0], [np.sin(SLOPE), 0, np.cos(SLOPE)]])
+
+
+@pytest.mark.parametrize(
+    ("value", "rate", "rate_rate", "expected"),
+    [
+        (1.0, -2.0, 0.0, 0.5),  # 1 - 2 t
+        (1.0, 0.0, -50.0, 0.2),  # 1 - 25 t^2
+        (1.0, -3.0, 4.0, 0.5),  # 1 - 3 t + 2 t^2 = (1 - t)(1 - 2 t)
+        (1.0, 3.0, 4.0, 9.0),  # both roots in the past
+        (1.0, -1.0, 4.0, 9.0),  # turns before zero
+        (0.0, -1.0, 0.0, 9.0),  # is there already: the mode changes now, not later
+        (1.0, -0.01, 0.0, 9.0),  # beyond the horizon
+    ],
+)
+def test_first_zero_of_a_quadratic(value, rate, rate_rate, expected):
+    assert first_zero(value, rate, rate_rate, 9.0) == pytest.approx(expected, rel=1e-14)
+
+
+# The reset integrator, on flat ground.
+
+
+@pytest.fixture
+def reset(scenario: Scenario) -> RobotOnGround:
+    """The robot just landed."""
+    robot = RobotOnGround(scenario, np.eye(3))
+    robot.update()
+    return robot
+
+
+def test_the_margin_crosses_zero_at_the_stiction_range_and_at_the_surface(reset):
+    p0 = ResetConstants(*reset.model.ground.friction.constants).stiction_range
+    near, far = ((factor * p0, 0.0, -1e-4) for factor in (0.9, 1.1))
+    assert reset.margin(p=near) > 0.0 > reset.margin(p=far)
+    assert reset.margin(p=(0.0, 0.0, -1e-6)) > 0.0 > reset.margin(p=(0.0, 0.0, 1e-6))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("mode", [-1.0, 1.0])
+def test_the_margin_of_a_slipping_node_is_its_speed_that_way(reset, axis, mode):
+    reset.modes[2, MODE + axis] = mode  # of T2's bottom left
+    for speed in (3e-6, -3e-6):  # the least of all margins; the others are 1e-4 m
+        state = reset.state()
+        state[35 + 6 + 3 + axis] = mode * speed
+        assert reset.margin_at(state) == pytest.approx(speed, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("v_x", "upward", "expected"),
+    [
+        (0.05, 0.0, 0.004 * 0.0254 / 0.05),  # free at p0 / v
+        (0.0, 2.0, 0.01),  # 2 m/s^2 lift nodes 1e-4 m deep after sqrt(2 * 1e-4 / 2) s
+    ],
+)
+def test_a_mode_change_is_foreseen_when_it_comes(reset, v_x, upward, expected):
+    time = reset.time_to_change((v_x, 0.0, 0.0), (0.0, 0.0, upward))
+    assert time == pytest.approx(expected, rel=1e-9)
+
+
+# Coulomb friction, on flat ground and on a slope.
+
+
+@pytest.fixture(params=[Flat(), Incline(slope=SLOPE)], ids=["flat", "incline"])
+def sliding(request: pytest.FixtureRequest, scenario: Scenario) -> RobotOnGround:
+    """The robot just landed."""
+    law = Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, damping=70.0)
+    scenario = scenario.with_changes({"friction": law, "terrain": request.param})
+    robot = RobotOnGround(scenario, R if isinstance(request.param, Incline) else np.eye(3))
+    robot.update()
+    return robot
+
+
+def test_a_stuck_node_breaks_free_when_its_bristle_reaches_the_limit(sliding, scenario):
+    # c v + k v t = mu_s F_N at F_N = stiffness * 1e-4 m
+    limit = 0.6 * scenario.ground.stiffness * 1e-4
+    expected = (limit - 70.0 * 1e-4) / (1000.0 * 1e-4)
+    assert sliding.time_to_change((1e-4, 0.0, 0.0)) == pytest.approx(expected, rel=1e-6)
+    assert sliding.time_to_change((0.0, -1e-4, 0.0)) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_node_in_slip_sticks_when_its_damping_holds_it(sliding, scenario):
+    # c (v - a t) = mu_k F_N
+    sliding.modes[:, MODE] = 1.0
+    limit = 0.5 * scenario.ground.stiffness * 1e-4
+    expected = (70.0 * 0.01 - limit) / 70.0
+    time = sliding.time_to_change((0.01, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    assert time == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_growing_load_makes_it_stick_sooner(sliding, scenario):
+    # F_N = (k + lambda w) d grows by k w + lambda w^2 as d grows by w; c v stays.
+    sliding.modes[:, MODE] = 1.0
+    w, depth, k, damping = 1e-3, 1e-4, scenario.ground.stiffness, scenario.ground.damping
+    load = (k + damping * w) * depth
+    expected = (70.0 * 0.01 - 0.5 * load) / (0.5 * (k * w + damping * w**2))
+    assert sliding.time_to_change((0.01, 0.0, -w)) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_node_over_a_slope_lands_when_the_gap_is_closed(sliding):
+    # 1 mm over the plane, at 5 mm/s along it and 2 mm/s towards it: 0.5 s, whatever the slope.
+    sliding.modes[:] = 0.0
+    time = sliding.time_to_change((5e-3, 0.0, -2e-3), p=(0.0, 0.0, 1e-3))
+    assert time == pytest.approx(0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("mode", [0.0, 1.0])
+def test_the_margin_crosses_zero_where_the_pull_crosses_the_limit(sliding, mode, scenario):
+    sliding.modes[:, MODE] = mode
+    limit = (0.5 if mode else 0.6) * scenario.ground.stiffness * 1e-4
+    below, above = (sliding.margin((factor * limit / 70.0, 0.0, 0.0)) for factor in (0.999, 1.001))
+    assert below * above < 0.0
+    assert (below < 0.0) == bool(mode), "in slip, a mode change is due below it"
+
+
+@pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-0.6, 0.8, 0.0)])
+def test_beyond_the_limit_a_node_that_moves_back_stays_stuck(sliding, way):
+    # The bristle is a millimetre out: 1 N.
+    p = 1e-3 * np.array(way) - [0.0, 0.0, 1e-4]
+    assert sliding.margin(-1e-5 * np.array(way), p=p) > 0.0
+    assert sliding.margin(1e-5 * np.array(way), p=p) < 0.0
+
+
+def test_a_node_that_sticks_again_does_so_where_it_is(sliding):
+    assert sliding.update((0.02, 0.0, 0.0), (1e-3, 0.0, -1e-4)), "breaks free"
+    np.testing.assert_allclose(sliding.modes[:-1, MODE : MODE + 2], [[1.0, 0.0]] * 10, atol=1e-9)
+    slow, there = (1e-3, 0.0, 0.0), (5e-3, 1e-3, -1e-4)
+    assert sliding.update(slow, there), "70 * 1e-3 N is below 0.5 * 0.44 N"
+    assert not sliding.modes[:, MODE : MODE + 2].any()
+    _, ground_forces = sliding.forces(slow, there)
+    np.testing.assert_allclose(ground_forces[:-1, :2], [[-0.07, 0.0]] * 10, atol=1e-9)
+
+
+def test_the_heading_is_that_of_the_body_at_touchdown(sliding):
+    np.testing.assert_allclose(sliding.modes[:-1, HEADING : HEADING + 2], [[1.0, 0.0]] * 10)
+    state = sliding.structure.initial_state
+    turn = np.array([np.cos(0.3), 0.0, 0.0, np.sin(0.3)])  # by 0.6 about z
+    state[:35].reshape(5, 7)[:, :4] = turn
+    state[:35].reshape(5, 7)[:, 4:] += [0.0, 0.0, -0.2]
+    sliding.modes[:] = 0.0
+    sliding.update_at(state)
+    forward = np.array([np.cos(0.6), np.sin(0.6), 0.0]) @ sliding.R
+    expected = forward[:2] / np.linalg.norm(forward[:2])
+    np.testing.assert_allclose(sliding.modes[:, HEADING : HEADING + 2], [expected] * 11, atol=1e-9)

@@ -1,0 +1,60 @@
+"""The Matsuoka network: Eq. 7 by hand, its fixed point, and the order of its two integrators.
+
+Its agreement with the thesis's listing is tested in tests/robot/test_signals.py.
+"""
+
+import numpy as np
+import pytest
+
+from tetra_drake.laws.oscillator import (
+    Network,
+    U,
+    V,
+    correct_neurons,
+    make_neurons,
+    network_output,
+    predict_neurons,
+)
+
+
+def neurons_at(u: list[float] | np.ndarray, v: list[float] | np.ndarray) -> np.ndarray:
+    """The neurons with these states."""
+    return make_neurons(np.concatenate([u, v]))
+
+
+# While both neurons of this oscillator fire, Eq. 7 is linear, without kinks. Halving the step then
+# divides the error of a method by 2^order.
+LINEAR = Network.of([[0.0, 0.4], [0.4, 0.0]], tau_a=0.3, tau_b=0.6, self_inhibition_weight=2.5)
+
+
+def by_listing(steps: int) -> np.ndarray:
+    return last_output(steps, samples=steps, listing=True)
+
+
+def by_runge_kutta(steps: int) -> np.ndarray:
+    return last_output(steps, samples=steps + 1, listing=False)
+
+
+def last_output(steps: int, *, samples: int, listing: bool) -> np.ndarray:
+    neurons, output = neurons_at([0.3, 0.25], [0.1, 0.12]), np.empty((samples, 1))
+    network_output(LINEAR, np.full((1, 2), 0.5), 0.2 / steps, listing, neurons, output)
+    return output[-1]
+
+
+def by_heun(steps: int) -> np.ndarray:
+    """Refuses each step once, and goes back to its start."""
+    neurons, inputs = neurons_at([0.3, 0.25], [0.1, 0.12]), np.full(2, 0.5)
+    for _ in range(steps):
+        for accepted in (False, True):
+            predict_neurons(LINEAR, inputs, 0.2 / steps, neurons)
+            correct_neurons(LINEAR, inputs, 0.2 / steps, accepted, neurons)
+    return neurons[:, [U, V]]
+
+
+@pytest.mark.parametrize(
+    ("at_the_end", "steps", "order"), [(by_listing, 4, 1), (by_runge_kutta, 4, 4), (by_heun, 8, 2)]
+)
+def test_integrators_have_their_order(at_the_end, steps, order):
+    exact = at_the_end(4096)
+    coarse, fine = (np.abs(at_the_end(n) - exact).max() for n in (steps, 2 * steps))
+    assert coarse / fine == pytest.approx(2.0**order, rel=0.15)

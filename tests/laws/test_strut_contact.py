@@ -1,0 +1,114 @@
+"""The contact of two struts, against hand-made pairs."""
+
+import itertools
+
+import numpy as np
+import pytest
+from helpers.states import disturbed
+
+from tetra_drake.laws.capsules import (
+    NearStruts,
+    Search,
+    StrutContactLaw,
+    add_contact_force,
+    find_near_struts,
+)
+from tetra_drake.laws.contact import NormalForce
+from tetra_drake.laws.kinematics import FORCE, NODE_COLUMNS, P_WN, V_WN
+from tetra_drake.laws.struts import Struts, strut_distance
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import moved_nodes
+from tetra_drake.scenario.load import load_scenario
+
+LAW = NormalForce(stiffness=1e4, damping=2e4)
+RADIUS = 0.01
+
+
+def forces_between(first, second, v_WN=None) -> np.ndarray:
+    """Forces (2, 6) of two struts on each other, from the ends of both: force, and torque about the
+    origin of World."""
+    nodes = np.zeros((4, NODE_COLUMNS))
+    nodes[:, P_WN : P_WN + 3] = p_WN = np.array([*first, *second], dtype=float)
+    if v_WN is not None:
+        nodes[:, V_WN : V_WN + 3] = v_WN
+    length = np.linalg.norm(p_WN[1::2] - p_WN[::2], axis=1)
+    struts = Struts(
+        np.array([0, 2]), np.array([1, 3]), np.array([0, 1, 2]), length, np.full(2, RADIUS)
+    )
+    add_contact_force(struts, LAW, nodes, 0, 1)
+    force = nodes[:, FORCE : FORCE + 3]
+    wrenches = np.hstack([force, np.cross(p_WN, force)])
+    return wrenches.reshape(2, 2, 6).sum(axis=1)
+
+
+ALONG_X = [(-1, 0, 0), (1, 0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("speed", "force"),
+    [(-0.1, LAW.stiffness * 0.002 + LAW.damping * 0.002 * 0.1), (10.0, 0.0)],
+)
+def test_struts_that_cross_push_by_stiffness_and_dissipation_and_never_pull(speed, force):
+    # 18 mm apart they overlap by 2 mm. The upper one falls, or rises fast.
+    above = [(0, -1, 0.018), (0, 1, 0.018)]
+    moving = np.repeat([[0, 0, 0], [0, 0, speed]], 2, axis=0)
+    below, on_top = forces_between(ALONG_X, above, moving)
+    np.testing.assert_allclose(on_top[:3], [0.0, 0.0, force], rtol=1e-12)
+    np.testing.assert_allclose(below, -on_top, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        [(0, -1, 0.021), (0, 1, 0.021)],  # crossing, 1 mm above
+        [(1.021, 0, 0), (2, 0, 0)],  # end to end
+        [(0, -1, 0), (0, 1, 0)],  # their axes meet
+        ALONG_X,  # the same place
+    ],
+)
+def test_struts_apart_or_with_axes_that_meet_exert_no_force(second):
+    assert not forces_between(ALONG_X, second).any()
+
+
+@pytest.mark.parametrize(
+    ("second", "place"),
+    [
+        ([(-1, 0, 0.018), (1, 0, 0.018)], 0.0),  # parallel, side by side
+        ([(0, 0, 0.018), (2, 0, 0.018)], 0.5),  # parallel, half beyond
+        ([(0.7, 0, 0.018), (0.7, 0, 1)], 0.7),  # an end above
+        ([(0.7, -1, 0.018), (0.7, 1, 0.018)], 0.7),  # across
+    ],
+)
+def test_struts_touch_where_they_are_nearest_and_parallel_ones_in_the_middle(second, place):
+    below, _ = forces_between(ALONG_X, second)
+    # Away from their middles, parallel struts count as thinner, here by 0.3 % of both radii.
+    force, thinner = LAW.stiffness * 0.002, LAW.stiffness * 0.004 * 2.0 * RADIUS
+    np.testing.assert_allclose(below[:2], 0.0, atol=1e-3 * force)
+    assert abs(force + below[2]) <= (thinner if place == 0.5 else 1e-3 * force)
+    np.testing.assert_allclose(below[4], -place * below[2], atol=2e-3 * force)
+
+
+def test_all_pairs_of_struts_within_a_limit_are_found():
+    structure = Robot.of(load_scenario("six_bar")).structure
+    state = disturbed(structure, 3, pose=0.02, speed=0.0)
+    struts, nodes = structure.strut_table, moved_nodes(structure, state)
+    all_pairs, near = itertools.combinations(range(struts.length.size), 2), NearStruts.of(struts)
+    distances = {pair: strut_distance(struts, nodes, *pair) for pair in all_pairs}
+    for nearest in [0.0, *distances.values()]:
+        limit = nearest + 1e-9
+        search = Search(near=limit, drift=0.0, passage=0.0, lightest=1.0)
+        law = StrutContactLaw(True, np.array(LAW), np.array(search))
+        find_near_struts(struts, law, structure.radius, state, nodes, near)
+        expected = [list(pair) for pair, distance in distances.items() if distance <= limit]
+        assert near.pairs[: near.count[0]].tolist() == expected
+
+
+def test_the_force_is_continuous_as_struts_turn_through_parallel():
+    # Without smoothing, the contact would jump by 2 m from one end to the other at angle 0.
+    angles, ends = np.linspace(-0.1, 0.1, 2001), np.array([[-1.0], [1.0]])
+    turned = [ends * [np.cos(angle), np.sin(angle), 0.0] for angle in angles]
+    tilted = [ends * [1.0, 0.0, np.sin(angle / 20.0)] for angle in angles]
+    for motion in (turned, tilted):
+        seconds = np.add(motion, [0.0, 0.0, 0.018])
+        wrenches = np.array([forces_between(ALONG_X, second)[0] for second in seconds])
+        assert np.abs(np.diff(wrenches, axis=0)).max() < 0.04 * np.abs(wrenches).max()

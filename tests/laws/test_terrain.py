@@ -1,0 +1,111 @@
+"""The surface of the ground and the frames in it, against planes, differences and splines."""
+
+import numpy as np
+import pytest
+
+from tetra_drake.laws.contact import Ground
+from tetra_drake.laws.terrain import GAP, N_X, T1_X, T2_Y, SurfaceGrid, surface
+from tetra_drake.robot.ground import ground_frames, ground_heights, make_ground
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.terrain_kinds import HeightField, Incline, Rough, Steps
+
+INCH = 0.0254
+ROUGH = Rough(amplitude=0.5 * INCH, wavelength=5.0 * INCH, seed=3)
+
+
+@pytest.fixture
+def ground(scenario: Scenario, structure: Structure):
+    """A function that gives the ground of a terrain, under the robot."""
+    return lambda terrain: make_ground(scenario.with_changes({"terrain": terrain}), structure)
+
+
+def at(ground: Ground, x: float, y: float) -> tuple[float, float, float]:
+    """Height of the surface and its gradient."""
+    return surface(x, y, SurfaceGrid(*ground.grid), ground.heights)
+
+
+def saved(heights: np.ndarray, folder) -> str:
+    """The name of a file with heights."""
+    np.save(folder / "heights.npy", heights)
+    return str(folder / "heights.npy")
+
+
+def test_a_plane_is_exact(ground, tmp_path):
+    x, y = 0.5 * np.arange(-4, 5)[:, np.newaxis], 0.5 * np.arange(-3, 4)
+    made = ground(HeightField(file=saved(0.2 * x - 0.3 * y - 0.5, tmp_path), cell=0.5))
+    for place in ((0.0, 0.0), (0.123, -0.456), (-1.7, 1.2)):
+        expected = 0.2 * place[0] - 0.3 * place[1] - 0.5, 0.2, -0.3
+        assert at(made, *place) == pytest.approx(expected, abs=1e-14)
+
+
+def test_a_lonely_height_is_a_biquadratic_spline(ground, tmp_path):
+    # The quadratic B-spline is 3/4 at its control point, 1/2 half a cell away, 1/8 a cell away.
+    heights = np.zeros((101, 9))
+    heights[53, 5] = -1.0
+    made = ground(HeightField(file=saved(heights, tmp_path), cell=0.4))
+    for dx, dy, expected in [(0, 0, 0.75 * 0.75), (0.2, 0, 0.5 * 0.75), (-0.4, 0.4, 1 / 64)]:
+        assert at(made, 1.2 + dx, 0.4 + dy)[0] == pytest.approx(-expected, abs=1e-13)
+    assert at(made, 1.2 + 0.61, 0.4) == (0.0, 0.0, 0.0), "one and a half cells away"
+
+
+@pytest.mark.parametrize(
+    "terrain", [ROUGH, Steps(height=0.25 * INCH, depth=6.0 * INCH, count=3, start=20.0 * INCH)]
+)
+def test_the_gradient_is_that_of_the_heights_and_continuous(ground, terrain):
+    made, h = ground(terrain), 1e-7
+    for x, y in np.random.default_rng(0).uniform(-0.5, 1.5, (200, 2)):
+        _, h_x, h_y = at(made, x, y)
+        slope = (at(made, x + h, y)[0] - at(made, x - h, y)[0]) / (2 * h)
+        assert h_x == pytest.approx(slope, abs=1e-6)
+        slope = (at(made, x, y + h)[0] - at(made, x, y - h)[0]) / (2 * h)
+        assert h_y == pytest.approx(slope, abs=1e-6)
+
+
+def test_beyond_the_grid_the_surface_goes_on_as_it_is_at_the_edge(ground, tmp_path):
+    x = 0.5 * np.arange(-4, 5)[:, np.newaxis]
+    made = ground(HeightField(file=saved(0.1 * x + np.zeros((9, 7)) - 0.5, tmp_path), cell=0.5))
+    edge = at(made, 1.75, 0.1)  # half a cell within the last height
+    for far in (1.76, 5.0, 1e9, np.inf, np.nan):
+        assert at(made, far, 0.1) == (pytest.approx(edge[0], abs=1e-8), 0.0, 0.0)
+    assert at(made, 0.3, np.nan)[1:] == (pytest.approx(0.1), 0.0)
+
+
+def test_a_frame_is_orthonormal_and_its_first_tangent_is_worlds_x_in_the_plane(ground):
+    made = ground(ROUGH)
+    p_WN = np.random.default_rng(1).uniform(-0.5, 1.0, (50, 3))
+    p_WN[:, 2] = ground_heights(p_WN[:, :2], made) - 1e-3
+    for p, frame in zip(p_WN, ground_frames(p_WN, made), strict=True):
+        n, t_1 = frame[N_X : N_X + 3], frame[T1_X : T1_X + 3]
+        R = np.array([t_1, [0.0, *frame[T2_Y : T2_Y + 2]], n])
+        np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
+        assert np.linalg.det(R) == pytest.approx(1.0)
+        _, h_x, h_y = at(made, *p[:2])
+        np.testing.assert_allclose(n, np.array([-h_x, -h_y, 1.0]) * n[2], atol=1e-14)
+        projected = np.array([1.0, 0.0, 0.0]) - n[0] * n
+        np.testing.assert_allclose(t_1, projected / np.linalg.norm(projected), atol=1e-14)
+        assert frame[GAP] == pytest.approx(-1e-3 * n[2], rel=1e-9)
+
+
+def test_a_robot_that_starts_in_the_ground_or_off_the_grid_is_refused(ground, refused, tmp_path):
+    # Steps of 1 in at 0, 6 and 12 in: T4 stands at 3 * 2.94 in = 8.82 in, on the second one.
+    for terrain, found in (
+        (
+            Steps(height=1.0 * INCH, depth=6.0 * INCH, count=3, start=0.0),
+            "T4 bottom_left 2 in below the ground",
+        ),
+        (HeightField(file=saved(np.zeros((3, 3)), tmp_path), cell=0.1), "off its grid"),
+    ):
+        with refused("thesis", "terrain", found):
+            ground(terrain)
+
+
+def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground():
+    robot = Robot.of(load_scenario("six_bar").with_changes({"terrain": Incline(slope=0.1)}))
+    start = node_positions(robot.structure, robot.structure.initial_state)
+    gaps = ground_frames(start[robot.structure.contacts], robot.ground)[:, GAP]
+    gaps -= robot.ground.radius
+    depth = robot.weight / 3.0 / robot.scenario.ground.stiffness  # three feet bear it
+    assert gaps.min() == pytest.approx(-depth, rel=1e-3)

@@ -1,0 +1,225 @@
+"""Compilation of kernels by numba, and the cache of their machine code."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import functools
+import hashlib
+import inspect
+import logging
+import math
+import pickle
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import event
+from numba.core.caching import CompileResultCacheImpl, NullCache
+from numba.core.serialize import dumps
+from numba.extending import overload
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import write_whole
+
+F = TypeVar("F", bound=Callable[..., object])
+
+LOGGER = "tetra_drake"
+"""Name of the logger that gets a warning when compilation takes long."""
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "no_cfunc_wrapper": True,  # only C code would call the wrapper
+}
+_MOMENT, _MINUTE = 2.0, 60.0
+"""Time (s) after which a compilation is announced, and time for which no other one is."""
+_told = -math.inf
+"""Time of the last announcement."""
+_TIMES = event.TimingListener()
+event.register("numba:compile", _TIMES)
+
+
+def compiling_time() -> float:
+    """Time (s) that this process has spent on compilations that are finished."""
+    return _TIMES.duration if _TIMES.done else 0.0
+
+
+def compiled(function: F, *, nogil: bool = False) -> F:
+    """Decorator of a kernel that Python calls. The machine code is cached on disk.
+
+    The cache is beside the source or in the user's cache folder. If neither can be written to (as
+    in a read-only installation without a home), the kernel is compiled in each process.
+
+    Division follows NumPy, without a check for zero. A product and a sum may be rounded together.
+    With `nogil`, other Python threads run during a call. Without it, the kernel is inlined in other
+    kernels, because calls with many tables are slow.
+    """
+    return _kernel(function, nogil=nogil, forceinline=not nogil)
+
+
+def merged(function: F) -> F:
+    """Decorator of a large kernel. Its source becomes part of kernels that call it. It is compiled
+    separately only if Python calls it."""
+    return _kernel(function, inline="always")
+
+
+def inlined(function: F) -> F:
+    """Decorator of a function that becomes part of kernels that call it.
+
+    Python calls the plain function. To compile it for calls from Python would take as long again.
+    """
+    options: Any = _OPTIONS | {"forceinline": True}
+
+    @overload(function, jit_options=options)
+    @functools.wraps(function)
+    def implementation(*_: object) -> F:
+        return function
+
+    return function
+
+
+def machine_code(kernel: F, *arguments: object) -> F:
+    """Machine code of a kernel for arguments of the given types.
+
+    A call does not check types: with other types it fails or computes nonsense.
+    """
+    if not hasattr(kernel, "compile"):  # compilation is switched off
+        return kernel
+    return cast(F, kernel.compile(tuple(numba.typeof(argument) for argument in arguments)))
+
+
+def _kernel(function: F, **options: Any) -> F:
+    kernel: Any = numba.njit(**_OPTIONS, **options)(function)
+    if hasattr(kernel, "_cache"):  # False with NUMBA_DISABLE_JIT
+        kernel._cache = KernelCache(function)
+    return cast(F, kernel)
+
+
+class KernelCache(NullCache):
+    """Cache of a kernel's machine code, with a file for each signature.
+
+    Numba's own cache numbers its files in an index. The index is wrong after two processes have
+    saved at the same time. Here the name of a file contains a digest of the signature. The file
+    begins with a digest of its content and of everything that the content depends on. A file that
+    is damaged, out of date or of another kernel is replaced.
+
+    Numba asks the cache at the first call of a kernel with arguments of new types:
+
+        load_overload(sig) ──→ machine code, read from the file of this signature
+              │
+              ↓ None: there is no such file, and the timer of the announcement starts
+        numba compiles
+              ↓
+        save_overload(sig, data): the timer stops, the file is written
+    """
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        file = inspect.getfile(function)
+        self._kernel = f"{Path(file).stem}.{function.__qualname__}"
+        self._origin = f"{self._kernel} {numba.__version__} {sys.version} {source_stamp(file)} "
+        self._content: CompileResultCacheImpl | None = None
+        if not function.__closure__:  # the machine code would contain the closure's values
+            with contextlib.suppress(RuntimeError):  # no folder can be written to
+                self._content = CompileResultCacheImpl(function)
+        self._timers: dict[object, threading.Timer] = {}
+
+    @property
+    def cache_path(self) -> str | None:
+        """Folder of the cache files; None if no folder can be written to."""
+        return str(self._content.locator.get_cache_path()) if self._content else None
+
+    def load_overload(self, sig: object, target_context: Any) -> Any:
+        """The cached kernel for a signature; None if it must be compiled."""
+        target_context.refresh()
+        if self._content:
+            path, key = self._entry(sig, target_context.codegen())
+            seal, data = _read(path)
+            if seal == _seal(key, data):
+                saved_sig, reduced = pickle.loads(data)
+                if saved_sig == sig:  # different types may have the same name
+                    return self._content.rebuild(target_context, reduced)
+        timer = threading.Timer(_MOMENT, announce, [self._content is not None])
+        timer.daemon = True
+        timer.start()
+        self._timers[sig] = timer
+        return None
+
+    def save_overload(self, sig: object, data: Any) -> None:
+        """Saves the compiled kernel for a signature, if the folder can be written to."""
+        self._timers.pop(sig).cancel()
+        if self._content and self._content.check_cachable(data):
+            path, key = self._entry(sig, data.codegen)
+            content = dumps((sig, self._content.reduce(data)))
+            with contextlib.suppress(InputError, OSError):
+                write_whole(path, _seal(key, content) + content)
+
+    def _entry(self, sig: object, codegen: Any) -> tuple[Path, str]:
+        """Cache file for a signature, and a text with everything that its content depends on."""
+        variant = f"{sig} {codegen.magic_tuple()} {sys.implementation.cache_tag}"
+        digest = hashlib.sha256(variant.encode()).hexdigest()[:16]
+        return Path(str(self.cache_path), f"{self._kernel}.{digest}.nbc"), self._origin + variant
+
+
+def _seal(key: str, content: bytes) -> bytes:
+    return hashlib.sha256(key.encode() + content).digest()
+
+
+def _read(path: Path) -> tuple[bytes, bytes]:
+    """The digest and the content of a cache file; empty if it cannot be read."""
+    try:
+        file = path.read_bytes()
+    except OSError:
+        file = b""
+    size = hashlib.sha256().digest_size
+    return file[:size], file[size:]
+
+
+def announce(kept: bool) -> None:
+    """Logs that kernels are being compiled, at most once in _MINUTE. `kept` is True if the machine
+    code will be cached."""
+    global _told
+    if time.monotonic() < _told + _MINUTE:
+        return
+    _told = time.monotonic()
+    lost = " each time, as no folder can be written to: set NUMBA_CACHE_DIR"
+    often = "; later runs reuse the code" if kept else lost
+    logging.getLogger(LOGGER).warning(
+        "tetra_drake is compiling for this processor, which may take a minute%s", often
+    )
+
+
+def source_stamp(file: str) -> str:
+    """Digest of the sources of a module and of all modules of this package that it imports."""
+    sources: set[Path] = set()
+    pending = [Path(file).resolve()]
+    while pending:
+        path = pending.pop()
+        if path not in sources:
+            sources.add(path)
+            pending += _imported(path)
+    return hashlib.sha256(b"".join(sorted(path.read_bytes() for path in sources))).hexdigest()
+
+
+@functools.cache
+def _imported(path: Path) -> tuple[Path, ...]:
+    """Files of the modules of this package that a module imports.
+
+    A name imported from a package may be a module: `from tetra_drake.laws import contact`.
+    """
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+    package = __name__.partition(".")[0]
+    root = Path(__file__).resolve().parents[__name__.count(".")]
+    modules = [root.joinpath(*name.split(".")) for name in names if name.startswith(f"{package}.")]
+    files = [module.with_suffix(".py") for module in modules]
+    files += [module / "__init__.py" for module in modules]
+    return tuple(file for file in files if file.is_file())

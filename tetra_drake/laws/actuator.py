@@ -1,0 +1,153 @@
+"""Actuators: the effect of a signal S on the cable that it drives.
+
+    direct         adds a force to the tension, without limits (Eq. 6)
+    winch          winds the cable. Its state is the free length; the command is l0 - S / k
+    tension motor  controls the tension. Its state is the tension; the command is the tension of
+                   Eq. 6, so software imitates the spring and the damper of the cable
+
+The state of an actuator is called its *drive*: the free length (m) of a winch, or the tension (N)
+of a tension motor. A direct force has no drive.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, named, select
+from tetra_drake.laws.cable import (
+    CableLaw,
+    cable_tension,
+    elastic_tension,
+    most_tension,
+    slack_tension,
+)
+
+DIRECT, WINCH, TENSION_MOTOR = range(3)
+"""Kinds of actuators."""
+
+DRIVE, RATE, LIMITED, DRIVE_COLUMNS = range(4)
+"""Columns of the table `drives`, and their number: the drive, its rate per s, and 1 if a limit
+binds or 0. There is a row for each actuator with a drive."""
+
+
+class Limits(NamedTuple):
+    """Limits of an actuator in SI units; NaN without a limit."""
+
+    max_force: Real = math.nan
+    max_speed: Real = math.nan
+    time_constant: Real = math.nan
+    least_length: Real = math.nan
+
+
+class Actuator(NamedTuple):
+    """The actuators of all driven cables."""
+
+    kind: int
+    limits: Table
+    """Table of the numbers of Limits."""
+
+    @classmethod
+    def of(cls, kind: int, **limits: float) -> Self:
+        """Actuators of a kind, with limits by name; see Limits."""
+        return cls(kind, np.array(Limits(**limits)))
+
+
+class ActuatorForce(NamedTuple):
+    """Tension that an actuator gives its cable, and the rate of its drive."""
+
+    tension: Real
+    """Tension in N."""
+    tension_per_rate: Real
+    """Derivative of the tension with respect to the rate of the length, dT/d(dl/dt), in N s/m."""
+    rate: Real
+    """Rate of the drive, per s."""
+    limited: Real
+    """1 if a limit binds, otherwise 0."""
+
+
+@inlined
+def has_drive(actuator: Actuator) -> bool:
+    """True if the actuators have drives (states)."""
+    return actuator.kind != DIRECT
+
+
+@inlined
+def wound(actuator: Actuator, drive: Table, otherwise: Table) -> Table:
+    """The drive, if it is the free length of a cable on a winch; `otherwise` for other actuators.
+    Both may be numbers or tables."""
+    if actuator.kind == WINCH:
+        return drive
+    return otherwise
+
+
+@inlined
+def actuator_force(
+    actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
+) -> ActuatorForce:
+    """Force of an actuator with a drive. `length` (m) is the length of its cable, `rate` (m/s) the
+    rate of the length."""
+    limits = named(Limits, actuator.limits)
+    if actuator.kind == WINCH:
+        return winch_force(drive, length, rate, signal, law, limits)
+    return motor_force(drive, length, rate, signal, law, limits)
+
+
+@inlined
+def winch_force(
+    drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
+) -> ActuatorForce:
+    """Force of a winch. `drive` is the free length of its cable.
+
+    The cable goes slack as a passive one does; see laws.cable. The winch follows its command
+    with a lag. It pays out with at most max_speed, and winds with at most max_speed
+    (1 - tension / max_force). Above max_force the cable pulls it backward. The tension depends on
+    the winding speed because of the cable's damping, and the winding speed depends on the tension
+    because of the force-speed line. Both equations are linear, within limits, and are solved
+    together. A command below least_length counts as least_length, so the winch slows down before
+    it. A sudden stop would be a jump of the tension, which an integrator cannot handle.
+    """
+    elastic = elastic_tension(length - drive, law)
+    wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
+    allowed = maximum(wanted, (limits.least_length - drive) / limits.time_constant)
+    allowed = minimum(allowed, limits.max_speed)
+    per_force = limits.max_speed / limits.max_force
+    stiffening = 1.0 + per_force * law.damping
+    on_line = (per_force * (elastic + law.damping * rate) - limits.max_speed) / stiffening
+    on_line = minimum(on_line, per_force * most_tension(elastic) - limits.max_speed)
+    slowed = on_line > maximum(allowed, -limits.max_speed)
+    winds = maximum(allowed, maximum(on_line, -limits.max_speed))
+    tension, tension_per_rate = slack_tension(elastic, rate - winds, law)
+    return ActuatorForce(
+        tension=tension,
+        tension_per_rate=select(slowed, tension_per_rate / stiffening, tension_per_rate),
+        rate=winds,
+        limited=select(winds != wanted, 1.0, 0.0),
+    )
+
+
+@inlined
+def motor_force(
+    drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
+) -> ActuatorForce:
+    """Force of a tension motor. `drive` is its tension.
+
+    The motor keeps its cable taut at any length, so its software plays the spring and the damper of
+    Eq. 6, but it does not push. It follows its command with a lag. Its tension is at most
+    max_force (1 - winding speed / max_speed).
+    """
+    left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
+    most = limits.max_force * left
+    on_line = (drive > most) & (left > 0.0) & (left < 1.0)
+    command = cable_tension(length, rate, signal, law)
+    target = minimum(maximum(command, 0.0), limits.max_force)
+    limited = (drive > most) | (command > limits.max_force)
+    return ActuatorForce(
+        tension=minimum(drive, most),
+        tension_per_rate=select(on_line, limits.max_force / limits.max_speed, 0.0),
+        rate=(target - drive) / limits.time_constant,
+        limited=select(limited, 1.0, 0.0),
+    )

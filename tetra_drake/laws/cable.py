@@ -1,0 +1,111 @@
+"""Cables: springs with damping, and an actuation force added to the tension (Eq. 6).
+
+The cables of Eq. 6 also push. Other cables go slack: such a cable pulls only while it is stretched,
+and its damper then at most doubles its tension, or takes it away. With the stretch x = l - l0,
+
+    E = max(0, k x)
+    T = E + c dl/dt, limited to 0 ... 2 E
+
+A loose cable exerts no force, however fast it lengthens. The tension is continuous. Where the
+damper is weaker than the spring, this is Eq. 6.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, select
+
+PASSIVE = -1
+"""Value of `signal` for a cable without actuation."""
+
+
+class CableLaw(NamedTuple):
+    """Constants of a cable, or tables (cables,) of the constants of all cables; SI units."""
+
+    stiffness: Real
+    damping: Real
+    free_length: Real
+
+    @classmethod
+    def of(cls, cables: Table) -> Self:
+        """Constants of the cables in an array of dtype CABLE."""
+        return cls(*(cables[name].copy() for name in cls._fields))
+
+
+CABLE = np.dtype(
+    [
+        *((name, np.int64) for name in ("node_a", "node_b", "signal")),
+        *((name, float) for name in CableLaw._fields),
+    ]
+)
+"""Record of a cable: indices of its two nodes, index of its signal, and its constants in SI."""
+
+
+class Cables(NamedTuple):
+    """Cables in the form of the kernels: a table (cables,) for each field of CABLE."""
+
+    node_a: Table
+    node_b: Table
+    signal: Table
+    law: Table
+    """Constants of all cables: a CableLaw of tables."""
+
+    @classmethod
+    def of(cls, cables: Table) -> Self:
+        """Cables from an array of dtype CABLE."""
+        node_a, node_b, signal = (cables[name].copy() for name in ("node_a", "node_b", "signal"))
+        return cls(node_a, node_b, signal, CableLaw.of(cables))
+
+
+@inlined
+def law_of(cables: Cables, i: int) -> CableLaw:
+    """Constants of cable i."""
+    law = cables.law
+    return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i])
+
+
+DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6, 7
+"""Columns of the table `cable_forces` (cables, 7), and their number: direction from node a to node
+b in the world frame, length l (m), tension T (N), the derivative dT/d(dl/dt) (N s/m), and the rate
+dl/dt (m/s)."""
+
+
+@inlined
+def elastic_tension(stretch: Real, law: CableLaw) -> Real:
+    """Tension (N) of a cable at rest. `stretch` (m) is its length minus its free length."""
+    return law.stiffness * stretch
+
+
+def elastic_stretch(tension: Real, law: CableLaw) -> Real:
+    """Stretch (m) of a cable at rest with a tension (N): the inverse of elastic_tension()."""
+    return tension / law.stiffness
+
+
+@inlined
+def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
+    """Tension (N) of a cable by Eq. 6.
+
+    `length` is in m, `rate` (m/s) is the rate of the length, `signal` (N) is the actuation force.
+    """
+    return elastic_tension(length - law.free_length, law) + law.damping * rate + signal
+
+
+@inlined
+def most_tension(elastic: Real) -> Real:
+    """Greatest tension (N) of a cable that goes slack, 2 E. `elastic` (N) is elastic_tension()."""
+    return 2.0 * maximum(elastic, 0.0)
+
+
+@inlined
+def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]:
+    """Tension (N) of a cable that goes slack, and its derivative by the rate (N s/m).
+
+    `elastic` (N) is elastic_tension(), `rate` (m/s) the rate of the length.
+    """
+    linear = elastic + law.damping * rate
+    tension = minimum(maximum(linear, 0.0), most_tension(elastic))
+    return tension, select(tension == linear, law.damping, 0.0)

@@ -1,0 +1,283 @@
+"""Ground contact: normal force (Eq. 1), friction, and the modes of contact nodes.
+
+A contact node touches the ground with a sphere about it, its *foot*. The ground acts on the foot's
+lowest point, along the normal of the surface. So friction has a lever about the node. A foot
+without radius is the node itself, as in the thesis.
+
+The bristle's deflection is the way that the material at the lowest point slides, not the way of the
+point: a foot that rolls does not bend its bristle. Within a step, it is the distance of the node
+from the stick point, plus what the foot has turned along the ground since the beginning of the
+step. At the end of a step, the stick point moves so that the deflection stays.
+
+The state of a contact node is a row of the table `modes` (contacts, 12):
+
+- contact: 1 if the node touches the ground, otherwise 0
+- friction mode along the tangents t1 and t2; see `friction`
+- stick point: the point in the world where the bristle deflection is zero
+- heading of the node's body at touchdown
+- orientation of the node's body at the beginning of the step; used only by round feet
+
+The laws use the frames of `terrain`. On flat ground these are the axes of the world.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.lanes import (
+    Real,
+    Table,
+    Truth,
+    any_lane,
+    inverse_sqrt,
+    maximum,
+    named,
+    not_,
+    select,
+)
+from tetra_drake.laws import friction, kinematics, terrain
+from tetra_drake.laws.vectors import cross, difference, put_vector, sum_of, vector_at
+
+CONTACT, MODE, STICK_POINT, HEADING, ORIENTATION, MODE_COLUMNS = 0, 1, 3, 6, 8, 12
+"""Columns of the table `modes`, and their number: contact (0 or 1), friction mode (along t1, t2),
+stick point (x, y, z) in m, heading (along t1, t2), orientation (inverse quaternion, w first)."""
+
+FRICTION_1, FRICTION_2, NORMAL, GROUND_FORCE_COLUMNS = range(4)
+"""Columns of the table `ground_forces` (contacts, 3), and their number: friction along t1 and t2,
+normal force (N)."""
+
+
+class NormalForce(NamedTuple):
+    """Constants of the normal force (Table 1); SI units."""
+
+    stiffness: Real
+    damping: Real
+
+
+class Ground(NamedTuple):
+    """Ground in the form of the kernels, and the nodes that may touch it (contact nodes)."""
+
+    contacts: Table
+    """Rows (contacts,) of the table `nodes` that touch the ground. The row of a foot without radius
+    is the contact node; rows of round feet, their lowest points, come after all nodes."""
+    centres: Table
+    """Indices of the contact nodes (contacts,)."""
+    radius: Table
+    """Radii of the feet (contacts,)."""
+    carriers: Table
+    """Index of the body of each contact node (contacts,), ascending."""
+    is_round: bool
+    """True if a foot has a radius."""
+    normal: Table
+    """Table of the numbers of NormalForce."""
+    friction: friction.FrictionLaw
+    flat: bool
+    grid: Table
+    """Table of the numbers of SurfaceGrid."""
+    heights: Table
+    """Heights (points,) of the surface's control points in m, row by row."""
+
+    @classmethod
+    def nowhere(cls) -> Self:
+        """Ground that no node may touch."""
+        no_index, none = np.zeros(0, dtype=np.int64), np.zeros(0)
+        return cls(
+            contacts=no_index,
+            centres=no_index,
+            radius=none,
+            carriers=no_index,
+            is_round=False,
+            normal=np.zeros(2),
+            friction=friction.FrictionLaw(0, np.zeros(1)),
+            flat=True,
+            grid=np.zeros(len(terrain.SurfaceGrid._fields)),
+            heights=none,
+        )
+
+    def under(self, centres: Table, *, carriers: Table, radius: Table, nodes: int) -> Self:
+        """This ground under feet with a `radius` (contacts,) in m about the nodes `centres`, of a
+        model with a number of `nodes`."""
+        of_round = np.flatnonzero(radius)
+        contacts = centres.copy()
+        contacts[of_round] = nodes + np.arange(of_round.size)
+        surface = terrain.SurfaceGrid(*self.grid)._replace(reach=radius.max(initial=0.0))
+        return self._replace(
+            contacts=contacts,
+            centres=centres,
+            radius=radius,
+            carriers=carriers,
+            is_round=of_round.size > 0,
+            grid=np.array(surface),
+        )
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of round feet in the table `nodes`."""
+        return int(np.count_nonzero(self.contacts != self.centres))
+
+
+@inlined
+def meet_ground(ground: Ground, state: Table, nodes: Table, frames: Table) -> None:
+    """Writes the frames of the surface below the contact nodes to `frames` (contacts,
+    FRAME_COLUMNS), and the lowest points of round feet to the table `nodes` of `kinematics`.
+
+    On flat ground, `frames` is not used.
+    """
+    if not ground.flat:
+        grid = named(terrain.SurfaceGrid, ground.grid)
+        terrain.find_frames(nodes, ground.centres, grid, ground.heights, frames)
+    if ground.is_round:
+        for i in range(ground.contacts.size):
+            if ground.contacts[i] != ground.centres[i]:
+                place_foot(ground, i, state, nodes, frames)
+
+
+@inlined
+def place_foot(ground: Ground, i: int, state: Table, nodes: Table, frames: Table) -> None:
+    """Writes the lowest point of a round foot, with the velocity of the body there, to `nodes`. The
+    gap in `frames` becomes the distance of this point from the surface."""
+    centre, foot, radius = ground.centres[i], ground.contacts[i], ground.radius[i]
+    if not ground.flat:
+        frames[i, terrain.GAP] -= radius
+    drop = terrain.to_world(0.0, 0.0, -radius, frames, i, ground.flat)
+    turns = cross(kinematics.angular_velocity(state, ground.carriers[i]), drop)
+    for column in (kinematics.P_BN_W, kinematics.P_WN):
+        put_vector(sum_of(vector_at(nodes, centre, column), drop), foot, column, nodes)
+    velocity = sum_of(vector_at(nodes, centre, kinematics.V_WN), turns)
+    put_vector(velocity, foot, kinematics.V_WN, nodes)
+    put_vector((0.0, 0.0, 0.0), foot, kinematics.FORCE, nodes)
+
+
+@inlined
+def add_foot_forces(ground: Ground, nodes: Table, generalized: Table) -> None:
+    """Adds the forces on round feet to the generalized force (6 bodies,)."""
+    for i in range(ground.contacts.size):
+        if ground.contacts[i] != ground.centres[i]:
+            kinematics.add_force_at(nodes, ground.contacts[i], ground.carriers[i], generalized)
+
+
+@inlined
+def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
+    """Distance (m) from the ground to a foot; negative in the ground."""
+    if ground.flat:
+        return nodes[ground.contacts[i], kinematics.P_WN + 2]
+    return frames[i, terrain.GAP]
+
+
+@inlined
+def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
+    """Normal force (N) on a node by Eq. 1 with n = 1.
+
+    `depth` (m) is the node's depth in the ground, `depth_rate` (m/s) its rate. The ground never
+    pulls.
+    """
+    force = law.stiffness * depth + law.damping * depth * depth_rate
+    return select(depth > 0.0, maximum(force, 0.0), 0.0)
+
+
+@inlined
+def sliding(
+    state: Table, nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
+) -> tuple[friction.Slide, Real]:
+    """Motion of foot i along the ground, and the rate (m/s) of its gap."""
+    p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
+    v_WN = vector_at(nodes, ground.contacts[i], kinematics.V_WN)
+    deflection = difference(p_WN, vector_at(modes, i, STICK_POINT))
+    if ground.is_round:
+        turn = kinematics.turn_from(modes, i, ORIENTATION, state, ground.carriers[i])
+        drop = terrain.to_world(0.0, 0.0, -ground.radius[i], frames, i, ground.flat)
+        deflection = sum_of(deflection, cross(turn, drop))
+    v_1, v_2, v_n = terrain.to_frame(v_WN, frames, i, ground.flat)
+    x_1, x_2, _ = terrain.to_frame(deflection, frames, i, ground.flat)
+    t1 = friction.TangentSlide(v_1, x_1, modes[i, MODE])
+    t2 = friction.TangentSlide(v_2, x_2, modes[i, MODE + 1])
+    heading = modes[i, HEADING], modes[i, HEADING + 1]
+    law = named(NormalForce, ground.normal)
+    normal = normal_force(-gap(nodes, ground, frames, i), -v_n, law)
+    return friction.Slide(t1, t2, heading, normal), v_n
+
+
+@inlined
+def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, modes: Table) -> Truth:
+    """Updates `modes` for the nodes of a state. Returns True in lanes where a mode changed.
+
+    A node that lands sticks where it lands. A node that sticks again does so at its present
+    position; this is the reset of the reset integrator, unless the deflection is kept.
+    """
+    changed = False
+    for i in range(ground.contacts.size):
+        touched, touches = modes[i, CONTACT] != 0.0, gap(nodes, ground, frames, i) <= 0.0
+        if not any_lane(touched | touches):
+            continue
+        slide, _ = sliding(state, nodes, modes, ground, frames, i)
+        before = slide.t1.mode, slide.t2.mode
+        after = friction.next_mode(slide, touched & touches, ground.friction)
+        lands = touches & not_(touched)
+        if any_lane(lands):
+            set_heading(state, ground, frames, i, lands, modes)
+        begins_1, begins_2 = friction.begins_to_stick(slide, after, ground.friction)
+        sticks_here = lands | begins_1, lands | begins_2
+        bend = friction.kept_deflection(before, ground.friction)
+        move_stick_point(state, nodes, ground, frames, i, sticks_here, bend, slide, modes)
+        modes[i, CONTACT] = select(touches, 1.0, 0.0)
+        modes[i, MODE], modes[i, MODE + 1] = after
+        changed = changed | (touched ^ touches)
+        changed = changed | (after[0] != before[0]) | (after[1] != before[1])
+    return changed
+
+
+@inlined
+def move_stick_point(
+    state: Table,
+    nodes: Table,
+    ground: Ground,
+    frames: Table,
+    i: int,
+    along: tuple[Truth, Truth],
+    bend: friction.Pair,
+    slide: friction.Slide,
+    modes: Table,
+) -> None:
+    """Moves the stick point of a contact node so that its deflection is `bend`. `along` says, for
+    t1 and t2, whether the stick point moves along this tangent.
+
+    With round feet, the orientation is stored, and along the other tangents the stick point moves
+    so that the deflection stays.
+    """
+    p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
+    if ground.is_round:
+        x_1 = select(along[0], bend[0], slide.t1.deflection)
+        x_2 = select(along[1], bend[1], slide.t2.deflection)
+        deflection = terrain.to_world(x_1, x_2, 0.0, frames, i, ground.flat)
+        put_vector(difference(p_WN, deflection), i, STICK_POINT, modes)
+        kinematics.put_orientation(state, ground.carriers[i], i, ORIENTATION, modes)
+        return
+    bent = terrain.to_world(bend[0], bend[1], 0.0, frames, i, ground.flat)
+    p_x, p_y, p_z = difference(p_WN, bent)
+    stick_x, stick_y, stick_z = vector_at(modes, i, STICK_POINT)
+    if ground.flat:
+        modes[i, STICK_POINT] = select(along[0], p_x, stick_x)
+        modes[i, STICK_POINT + 1] = select(along[1], p_y, stick_y)
+        return
+    x_1 = select(along[0], slide.t1.deflection - bend[0], 0.0)
+    x_2 = select(along[1], slide.t2.deflection - bend[1], 0.0)
+    x, y, z = terrain.to_world(x_1, x_2, 0.0, frames, i, False)
+    both = along[0] & along[1]
+    modes[i, STICK_POINT] = select(both, p_x, stick_x + x)
+    modes[i, STICK_POINT + 1] = select(both, p_y, stick_y + y)
+    modes[i, STICK_POINT + 2] = select(both, p_z, stick_z + z)
+
+
+@inlined
+def set_heading(
+    state: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
+) -> None:
+    """Stores the heading of a contact node's body: its x axis, projected into the tangent plane."""
+    forward = kinematics.forward_axis(state, ground.carriers[i])
+    h_1, h_2, _ = terrain.to_frame(forward, frames, i, ground.flat)
+    per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))
+    modes[i, HEADING] = select(where, h_1 * per_length, modes[i, HEADING])
+    modes[i, HEADING + 1] = select(where, h_2 * per_length, modes[i, HEADING + 1])

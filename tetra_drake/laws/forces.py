@@ -1,0 +1,344 @@
+"""Forces of cables, ground, anchors, loads and gravity on a robot in a given state."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple, Self, TypeAlias
+
+import numpy as np
+
+from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.compiling import compiled, inlined
+from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
+from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.laws import actuator, cable, capsules, contact, kinematics, terrain
+from tetra_drake.laws.friction import friction_force
+from tetra_drake.laws.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.node_forces import add_anchor_forces, add_loads
+from tetra_drake.laws.vectors import (
+    add_vector,
+    difference,
+    dot,
+    put_vector,
+    scaled,
+    subtract_vector,
+    vector_at,
+)
+
+
+class Forces(NamedTuple):
+    """Memory for the forces in a state. Kernels write to it."""
+
+    nodes: Annotated[Table, "nodes", kinematics.NODE_COLUMNS]
+    frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]
+    """Frames of the surface at the contact nodes; see laws.terrain."""
+    cable_forces: Annotated[Table, "cables", cable.CABLE_FORCE_COLUMNS]
+    ground_forces: Annotated[Table, "contacts", contact.GROUND_FORCE_COLUMNS]
+    inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
+    """Inertia of the bodies along the world's axes; unused if they are isotropic."""
+    drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
+    """Drives of the actuators, in the order of the driven cables. Column DRIVE is input, the other
+    columns are output."""
+    near_struts: capsules.NearStruts
+
+    @classmethod
+    def of(cls, robot: Model) -> Self:
+        """Memory for the forces on a robot."""
+        return allocate(cls, sizes_of(robot))
+
+
+def sizes_of(robot: Model) -> dict[str, int]:
+    """Sizes of a robot's tables, for allocate()."""
+    drivers, has_drive = robot.cables.signal, actuator.has_drive(robot.actuator)
+    near = capsules.near_sizes(robot.struts)
+    if not robot.strut_contact.acts:
+        near = dict.fromkeys(near, 0)
+    bodies = len(robot.bodies.mass)
+    return near | {
+        "touches": min(near["strut_pairs"], 3 * bodies),
+        "bodies": bodies,
+        "nodes": len(robot.p_BN) + robot.ground.rows,
+        "contacts": robot.ground.contacts.size,
+        "cables": drivers.size,
+        "drives": np.count_nonzero(drivers != cable.PASSIVE) if has_drive else 0,
+    }
+
+
+Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
+"""A robot and the memory for its forces, packed for kernels that Python calls often."""
+
+
+@inlined
+def move_robot(robot: Model, state: Table, forces: Forces) -> None:
+    """Computes nodes, frames and inertia for a state (13 bodies,). Forces on the nodes become
+    zero."""
+    move_contacts(robot, state, forces)
+    if not robot.isotropic:
+        turn_inertia(state, robot.bodies.inertia, forces.inertia)
+
+
+@inlined
+def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
+    """Computes nodes, feet and frames for a state. Forces on them become zero."""
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    contact.meet_ground(robot.ground, state, forces.nodes, forces.frames)
+
+
+@inlined
+def pull_of_cable(
+    robot: Model, i: int, drive: int, length: Real, rate: Real, signals: Table, drives: Table
+) -> tuple[Real, Real, int]:
+    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the index of
+    the next drive.
+
+    `drive` is the index of the cable's drive, if it has one; then its rate and limit are written to
+    `drives`. The length is in m, its rate in m/s, `signals` (signals,) in N. An
+    actuation force acts beside the spring and the damper of a cable that goes slack.
+    """
+    driver, signal = robot.cables.signal[i], 0.0
+    if driver != cable.PASSIVE:
+        signal = signals[driver]
+    law = cable.law_of(robot.cables, i)
+    if driver == cable.PASSIVE or not actuator.has_drive(robot.actuator):
+        if not robot.slack:
+            return cable.cable_tension(length, rate, signal, law), law.damping, drive
+        elastic = cable.elastic_tension(length - law.free_length, law)
+        tension, tension_per_rate = cable.slack_tension(elastic, rate, law)
+        tension += signal
+        return maximum(tension, 0.0), select(tension > 0.0, tension_per_rate, 0.0), drive
+    driven = actuator.actuator_force(
+        robot.actuator, drives[drive, actuator.DRIVE], length, rate, signal, law
+    )
+    drives[drive, actuator.RATE] = driven.rate
+    drives[drive, actuator.LIMITED] = driven.limited
+    return driven.tension, driven.tension_per_rate, drive + 1
+
+
+@inlined
+def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
+    """Adds the forces of all cables to the forces on the nodes.
+
+    `signals` (signals,) are in N. Also writes the rates of the drives, and with `write_parts` the
+    table `cable_forces`.
+    """
+    nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
+    drive = 0
+    for i in range(parts.shape[0]):
+        a, b = robot.cables.node_a[i], robot.cables.node_b[i]
+        p_AB = difference(
+            vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN)
+        )
+        v_AB = difference(
+            vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN)
+        )
+        square = dot(p_AB, p_AB)
+        per_length = inverse_sqrt(square)
+        length, direction = square * per_length, scaled(per_length, p_AB)
+        rate = dot(v_AB, direction)
+        tension, tension_per_rate, drive = pull_of_cable(
+            robot, i, drive, length, rate, signals, drives
+        )
+        force = scaled(tension, direction)
+        add_vector(force, a, kinematics.FORCE, nodes)
+        subtract_vector(force, b, kinematics.FORCE, nodes)
+        if write_parts:
+            put_vector(direction, i, cable.DIRECTION, parts)
+            parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
+            parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
+
+
+@inlined
+def add_ground_forces(
+    robot: Model, state: Table, modes: Table, write_parts: bool, forces: Forces
+) -> None:
+    """Adds the forces of the ground to the forces on nodes and round feet.
+
+    `modes` is the table of `contact`. With `write_parts`, also writes the table `ground_forces`.
+    """
+    ground, nodes, frames, parts = robot.ground, forces.nodes, forces.frames, forces.ground_forces
+    for i in range(parts.shape[0]):
+        touches = modes[i, contact.CONTACT] != 0.0
+        if not any_lane(touches | (contact.gap(nodes, ground, frames, i) <= 0.0)):
+            if write_parts:
+                put_vector((0.0, 0.0, 0.0), i, contact.FRICTION_1, parts)
+            continue
+        slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
+        f_1, f_2 = friction_force(slide, ground.friction)
+        f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
+        if write_parts:
+            put_vector((f_1, f_2, slide.normal), i, contact.FRICTION_1, parts)
+        force = terrain.to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
+        add_vector(force, ground.contacts[i], kinematics.FORCE, nodes)
+
+
+@inlined
+def compute_forces(
+    robot: Model,
+    state: Table,
+    modes: Table,
+    signals: Table,
+    write_parts: bool,
+    forces: Forces,
+    generalized: Table,
+) -> None:
+    """Writes the generalized force (6 bodies,) of cables, ground, anchors, loads, gravity and
+    gyroscopic torques.
+
+    move_robot() must have been called for the same state. With `write_parts`, also writes
+    `cable_forces` and `ground_forces`.
+    """
+    add_cable_forces(robot, signals, write_parts, forces)
+    add_ground_forces(robot, state, modes, write_parts, forces)
+    add_state_forces(robot, state, forces)
+    gather_forces(robot, forces.nodes, generalized)
+    bodies = generalized.size // 6
+    for body in range(bodies):
+        generalized[6 * body + 5] -= robot.bodies.weight[body]
+    if robot.isotropic:
+        return
+    for body in range(bodies):
+        t, v = 6 * body, 7 * bodies + 6 * body
+        w_WB = state[v], state[v + 1], state[v + 2]
+        torque = gyroscopic_torque(forces.inertia, body, w_WB)
+        for axis in range(3):
+            generalized[t + axis] += torque[axis]
+
+
+@inlined
+def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
+    """Writes the generalized force (6 bodies,) of the forces on nodes and round feet."""
+    kinematics.gather_forces(nodes, robot.first_node, generalized)
+    if robot.ground.is_round:
+        contact.add_foot_forces(robot.ground, nodes, generalized)
+
+
+@inlined
+def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
+    """Adds the forces between struts, of anchors and of loads to the forces on the nodes."""
+    add_strut_forces(robot, state, forces)
+    add_anchor_forces(robot.anchors, forces.nodes)
+    add_loads(robot.loads, forces.nodes)
+
+
+@inlined
+def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
+    """Adds the forces between struts that touch to the forces on the nodes."""
+    law, near, nodes = robot.strut_contact, forces.near_struts, forces.nodes
+    if not law.acts:
+        return
+    search = named(capsules.Search, law.search)
+    if capsules.have_moved(nodes, near, search.drift):
+        capsules.find_near_struts(robot.struts, law, robot.bodies.radius, state, nodes, near)
+    normal = named(contact.NormalForce, law.normal)
+    for k in range(near.count[0]):
+        i, j = near.pairs[k, 0], near.pairs[k, 1]
+        capsules.add_contact_force(robot.struts, normal, nodes, i, j)
+
+
+@compiled
+def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> float:
+    """Writes the generalized force of all cables (6 bodies,): [t_W; f_W] at each body's origin.
+
+    Also writes nodes, `cable_forces` and the rates of the drives. Returns a number that is finite
+    if all forces are.
+    """
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_cable_forces(robot, signals, True, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+    total = 0.0
+    for i in range(generalized.size):
+        total += generalized[i]
+    return total
+
+
+@compiled
+def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
+    """Writes the generalized force of the ground (6 bodies,): [t_W; f_W] at each body's origin.
+
+    Also writes nodes, frames and `ground_forces`.
+    """
+    robot, forces = unpacked(parts)
+    move_contacts(robot, state, forces)
+    add_ground_forces(robot, state, modes, True, forces)
+    gather_forces(robot, forces.nodes, generalized)
+
+
+@compiled
+def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None:
+    """Writes the generalized force of touching struts, anchors and loads (6 bodies,): [t_W; f_W] at
+    each body's origin.
+
+    Also writes nodes.
+    """
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_state_forces(robot, state, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+
+
+@compiled
+def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized: Table) -> float:
+    """Writes the generalized force of touching struts (6 bodies,): [t_W; f_W] at each body's
+    origin. Returns the longest step (s), at most `horizon`; see capsules.time_to_pass().
+
+    Also writes nodes.
+    """
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_strut_forces(robot, state, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+    law, near = robot.strut_contact, forces.near_struts
+    return capsules.time_to_pass(robot.struts, law, forces.nodes, near, horizon)
+
+
+def forces_of_motion(
+    robot: Model, states: np.ndarray, modes: np.ndarray, signals: np.ndarray, drives: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Tables `nodes` (k, nodes, NODE_COLUMNS), without the rows of feet, `cable_forces`
+    (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS) of a
+    motion with k samples; see forces_along()."""
+    forces, samples = Forces.of(robot), len(states)
+    nodes = np.empty((samples, len(robot.p_BN), kinematics.NODE_COLUMNS))
+    cable_forces = np.empty((samples, *forces.cable_forces.shape))
+    ground_forces = np.empty((samples, *forces.ground_forces.shape))
+    given = states, modes, signals, drives
+    forces_along(Packed((robot, forces)), *given, nodes, cable_forces, ground_forces)
+    return nodes, cable_forces, ground_forces
+
+
+@compiled
+def forces_along(
+    parts: Parts,
+    states: Table,
+    modes: Table,
+    signals: Table,
+    drives: Table,
+    nodes: Table,
+    cable_forces: Table,
+    ground_forces: Table,
+) -> None:
+    """Writes the tables `nodes`, `cable_forces` and `ground_forces` of a motion with k samples; see
+    forces_of_motion().
+
+    The motion has states (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m) in N,
+    and drives (k, drives).
+    """
+    robot, forces = unpacked(parts)
+    generalized = np.empty(6 * robot.bodies.mass.size)
+    for k in range(states.shape[0]):
+        move_robot(robot, states[k], forces)
+        for i in range(drives.shape[1]):
+            forces.drives[i, actuator.DRIVE] = drives[k, i]
+        compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
+        copy_rows(forces.nodes, nodes[k])
+        copy_rows(forces.cable_forces, cable_forces[k])
+        copy_rows(forces.ground_forces, ground_forces[k])
+
+
+@inlined
+def copy_rows(table: Table, rows: Table) -> None:
+    """Writes the first rows of a table."""
+    for i in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            rows[i, c] = table[i, c]

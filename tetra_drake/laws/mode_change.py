@@ -1,0 +1,112 @@
+"""Changes of contact and friction modes: detection, margin, and prediction of their time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tetra_drake.kernels.compiling import compiled, inlined
+from tetra_drake.kernels.lanes import Real, Table, Truth, any_lane, minimum, named, select
+from tetra_drake.kernels.packed import unpacked
+from tetra_drake.laws import contact, friction
+from tetra_drake.laws.forces import Forces, Parts, move_contacts
+from tetra_drake.laws.kinematics import P_BN_W, node_acceleration
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.terrain import to_frame
+from tetra_drake.laws.vectors import Vector, cross, difference, sum_of, vector_at
+
+Array = np.ndarray
+
+
+@compiled
+def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
+    """Updates `modes` for a state, as update_modes() does. Also writes nodes and frames."""
+    robot, forces = unpacked(parts)
+    move_contacts(robot, state, forces)
+    return contact.update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
+
+
+@compiled
+def mode_margin(parts: Parts, state: Array, modes: Array) -> float:
+    """Mode margin of the robot: positive until the first mode changes, zero at the change.
+
+    It is the least of the gaps of nodes in the air, the depths of nodes in the ground (m), and the
+    margins of friction. Only the sign has a meaning. Also writes nodes and frames.
+    """
+    robot, forces = unpacked(parts)
+    move_contacts(robot, state, forces)
+    ground, nodes, frames = robot.ground, forces.nodes, forces.frames
+    margin = math.inf
+    for i in range(ground.contacts.size):
+        distance = contact.gap(nodes, ground, frames, i)
+        if modes[i, contact.CONTACT] == 0.0:
+            margin = min(margin, distance)
+            continue
+        margin = min(margin, -distance)
+        slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
+        margin = min(margin, friction.friction_margin(slide, ground.friction))
+    return margin
+
+
+@inlined
+def time_to_mode_change(
+    robot: Model, state: Table, acceleration: Table, modes: Table, forces: Forces, horizon: Real
+) -> Real:
+    """Predicted time (s) to the next mode change, at most `horizon`.
+
+    The prediction assumes constant accelerations of the nodes, and the tangent plane in place of
+    the ground. `acceleration` is dv/dt, 6 numbers per body. `forces` has the nodes and frames of
+    the state.
+    """
+    ground, nodes, frames = robot.ground, forces.nodes, forces.frames
+    time, law = horizon, named(contact.NormalForce, ground.normal)
+    for i in range(ground.contacts.size):
+        a_WN = foot_acceleration(ground, i, state, acceleration, nodes)
+        a_1, a_2, a_n = to_frame(a_WN, frames, i, ground.flat)
+        slide, v_n = contact.sliding(state, nodes, modes, ground, frames, i)
+        touches = modes[i, contact.CONTACT] != 0.0
+        distance = contact.gap(nodes, ground, frames, i)
+        up = select(touches, -1.0, 1.0)  # sign of the motion away from the surface
+        time = minimum(time, friction.first_zero(up * distance, up * v_n, up * a_n, horizon))
+        if not any_lane(touches):
+            continue
+        rate = law.damping * (v_n * v_n + distance * a_n) - law.stiffness * v_n
+        rate = select(slide.normal > 0.0, rate, 0.0)
+        change = friction.time_to_friction_change(slide, (a_1, a_2), rate, ground.friction, horizon)
+        time = minimum(time, select(touches, change, horizon))
+    return time
+
+
+@inlined
+def foot_acceleration(
+    ground: contact.Ground, i: int, state: Table, acceleration: Table, nodes: Table
+) -> Vector:
+    """Rate (m/s²) of the velocity at the lowest point of foot i. The point moves with the contact,
+    not with the material, so that it has the centripetal acceleration of the node."""
+    centre, body = ground.centres[i], ground.carriers[i]
+    a_WN = node_acceleration(state, acceleration, nodes, centre, body)
+    if not ground.is_round:
+        return a_WN
+    p_BC_W = vector_at(nodes, ground.contacts[i], P_BN_W)
+    a = 6 * body
+    alpha = acceleration[a], acceleration[a + 1], acceleration[a + 2]
+    return sum_of(a_WN, cross(alpha, difference(p_BC_W, vector_at(nodes, centre, P_BN_W))))
+
+
+@compiled
+def next_mode_change(
+    parts: Parts,
+    state: Array,
+    acceleration: Array,
+    modes: Array,
+    horizon: float,
+) -> tuple[bool, float]:
+    """Updates `modes` for a state. Returns whether a mode changed, and the predicted time (s) to
+    the next change (see time_to_mode_change()).
+
+    Also writes nodes and frames.
+    """
+    robot, forces = unpacked(parts)
+    due = modes_after_step(parts, state, modes)
+    return due, time_to_mode_change(robot, state, acceleration, modes, forces, horizon)

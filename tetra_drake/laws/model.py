@@ -1,0 +1,98 @@
+"""Constants of a robot in the form of the kernels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.kernels.lanes import Table
+from tetra_drake.laws.actuator import DIRECT, Actuator
+from tetra_drake.laws.cable import CABLE, Cables
+from tetra_drake.laws.capsules import StrutContactLaw
+from tetra_drake.laws.contact import Ground
+from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
+from tetra_drake.laws.struts import Struts
+
+
+class Bodies(NamedTuple):
+    """Constants of the bodies; SI units."""
+
+    mass: Table
+    """Masses (bodies,)."""
+    inertia: Table
+    """Inertia (bodies, 6) about the centre of mass in the body's frame; see laws.inertia."""
+    radius: Table
+    """Largest distance of a node from the centre of mass (bodies,)."""
+    weight: Table
+    """Weights (bodies,)."""
+
+
+class Couplings(NamedTuple):
+    """Pairs of bodies joined by cables. The cables of a pair are consecutive. They run from the
+    first body, with the lower index, to the second body. Cables from fixed nodes come first."""
+
+    first: Table
+    """Index of the first body of each pair (pairs,)."""
+    second: Table
+    """Index of the second body of each pair (pairs,)."""
+    first_cable: Table
+    """Index of the first cable of each pair (pairs + 1,); the last number is the number of
+    cables."""
+    held: Table
+    """Index of the body of each cable from a fixed node (fixed cables,)."""
+
+
+class Model(NamedTuple):
+    """Constants of a robot: its structure and its physical laws; SI units."""
+
+    p_BN: Table
+    """Positions of the nodes (nodes, 3) in the frames of their bodies, in the order of the bodies;
+    then positions of fixed nodes in the world."""
+    first_node: Table
+    """Index of each body's first node (bodies + 1,); the last number is the index of the first
+    fixed node."""
+    cables: Cables
+    actuator: Actuator
+    couplings: Couplings
+    ground: Ground
+    anchors: AnchorSprings
+    loads: NodeLoads
+    bodies: Bodies
+    struts: Struts
+    strut_contact: StrutContactLaw
+    isotropic: bool
+    """True if each body has the same moment of inertia about all axes."""
+    slack: bool
+    """True if cables go slack instead of pushing."""
+
+    @classmethod
+    def of_nodes(
+        cls,
+        p_BN: Table,
+        first_node: Table,
+        *,
+        cables: Cables | None = None,
+        actuator: Actuator | None = None,
+        ground: Ground | None = None,
+        slack: bool = True,
+    ) -> Self:
+        """Model of cables, or of a ground, at nodes of bodies, and of nothing else."""
+        bodies, none = first_node.size - 1, np.zeros(0)
+        no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        first = np.zeros(bodies + 1, dtype=np.int64)
+        return cls(
+            p_BN=p_BN,
+            first_node=first_node,
+            cables=cables or Cables.of(np.zeros(0, dtype=CABLE)),
+            actuator=actuator or Actuator.of(DIRECT),
+            couplings=Couplings(no_index, no_index, first[:1], no_index),
+            ground=ground or Ground.nowhere(),
+            anchors=AnchorSprings(no_index, no_index, no_vectors, no_vectors, no_vectors),
+            loads=NodeLoads(no_index, no_vectors),
+            bodies=Bodies(np.zeros(bodies), np.zeros((bodies, 6)), *np.zeros((2, bodies))),
+            struts=Struts(no_index, no_index, first, none, none),
+            strut_contact=StrutContactLaw(acts=False, normal=np.zeros(2), search=np.zeros(4)),
+            isotropic=True,
+            slack=slack,
+        )

@@ -1,0 +1,195 @@
+"""Matsuoka network (Eq. 7-9) of n oscillators with 2n neurons. Neurons 2k and 2k + 1, counted from
+0, are the extensor and the flexor of oscillator k.
+
+The law of neuron i, with the output y = max(0, u) and weights w:
+
+    tau_A du_i/dt = u0_i + f_i - u_i - beta v_i - sum_j w_ij y_j
+    tau_B dv_i/dt = y_i - v_i
+
+The tonic input is u0, the feedback f. The signal of an oscillator is `cpg.gain` times
+y_extensor - y_flexor.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from tetra_drake.kernels.compiling import compiled, inlined
+from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, select
+
+Array = np.ndarray
+
+U, V, U_RATE, V_RATE, Y, U_START, V_START, U_SUM, V_SUM, NEURON_COLUMNS = range(10)
+"""Columns of the table `neurons` (2n, 9), and their number: inner state u, self-inhibition v, their
+rates (1/s), output y, u and v at the beginning of a step, sums of their rates."""
+
+
+class Network(NamedTuple):
+    """Constants of a network, by neuron."""
+
+    first: Table
+    """Index of the first neuron that inhibits each neuron (2n,)."""
+    beyond: Table
+    """Index of the last neuron that inhibits each neuron, plus 1 (2n,); 0 if there is none."""
+    inhibition: Table
+    """Weights W (2n, 2n): W[i, j] is the inhibition of neuron i by neuron j."""
+    per_tau_a: Table
+    """1 / tau_A (2n,) in 1/s."""
+    per_tau_b: Table
+    """1 / tau_B (2n,) in 1/s."""
+    self_inhibition_weight: Table
+    """Weight beta of self-inhibition (2n,)."""
+
+    @classmethod
+    def of(
+        cls,
+        inhibition: npt.ArrayLike,
+        *,
+        tau_a: npt.ArrayLike,
+        tau_b: npt.ArrayLike,
+        self_inhibition_weight: npt.ArrayLike,
+    ) -> Self:
+        """A network with time constants (s) and beta; each is one number, or one per neuron.
+
+        Raises ValueError if the shape of `inhibition` is not (2n, 2n), or a time constant is not
+        above 0.
+        """
+        matrix = np.array(inhibition, dtype=float)
+        if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 2:
+            raise ValueError(f"found inhibition of shape {matrix.shape}, expected (2n, 2n)")
+        for name, tau in (("tau_a", tau_a), ("tau_b", tau_b)):
+            if not np.all(np.asarray(tau) > 0.0):
+                raise ValueError(f"found {tau!r} s as {name}, expected more than 0")
+        neurons, inhibiting = len(matrix), [np.flatnonzero(row) for row in matrix]
+        first = np.array([row[0] if row.size else 0 for row in inhibiting], dtype=np.int64)
+        beyond = np.array([row[-1] + 1 if row.size else 0 for row in inhibiting], dtype=np.int64)
+        return cls(
+            first,
+            beyond,
+            matrix,
+            per_tau_a=np.full(neurons, 1.0 / np.asarray(tau_a)),
+            per_tau_b=np.full(neurons, 1.0 / np.asarray(tau_b)),
+            self_inhibition_weight=np.full(neurons, self_inhibition_weight, dtype=float),
+        )
+
+
+def make_neurons(state: Array) -> Array:
+    """Table `neurons` for a state (4n,): u of all neurons, then v."""
+    neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
+    neurons[:, U], neurons[:, V] = state.reshape(2, -1)
+    return neurons
+
+
+@inlined
+def steered_input(external_input: Real, turn: Table, side: Table) -> Table:
+    """Tonic input of a neuron for a turn, as in the steering of snakes (arXiv 2207.04899).
+
+    `side` is 1 on the left, -1 on the right, 0 for neither. Arguments are numbers or arrays.
+    """
+    return external_input * (1.0 + turn * side)
+
+
+@compiled
+def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
+    """Writes the rates of u and v (Eq. 7; -u as in listing B.2).
+
+    `inputs` (2n,) is the sum of tonic input u0 and feedback f.
+    """
+    count = neurons.shape[0]
+    for i in range(count):
+        neurons[i, Y] = maximum(neurons[i, U], 0.0)
+    for i in range(count):
+        u, v, y = neurons[i, U], neurons[i, V], neurons[i, Y]
+        total = inputs[i] - u - network.self_inhibition_weight[i] * v
+        for j in range(network.first[i], network.beyond[i]):
+            total -= network.inhibition[i, j] * neurons[j, Y]
+        neurons[i, U_RATE] = total * network.per_tau_a[i]
+        neurons[i, V_RATE] = (y - v) * network.per_tau_b[i]
+
+
+@compiled
+def oscillator_output(neurons: Table, output: Table) -> None:
+    """Writes the outputs y_extensor - y_flexor (n,), with y = max(0, u) (Eq. 8 and 9)."""
+    for k in range(output.size):
+        extensor, flexor = neurons[2 * k, U], neurons[2 * k + 1, U]
+        output[k] = maximum(extensor, 0.0) - maximum(flexor, 0.0)
+
+
+@inlined
+def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
+    """Integrates a network by one step (s) of the forward Euler method, as in listing B.1."""
+    neuron_rates(network, inputs, neurons)
+    for i in range(neurons.shape[0]):
+        neurons[i, U] += step * neurons[i, U_RATE]
+        neurons[i, V] += step * neurons[i, V_RATE]
+
+
+@inlined
+def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
+    """Integrates a network by one step (s) of the classical Runge-Kutta method of order 4."""
+    for i in range(neurons.shape[0]):
+        neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
+        neurons[i, U_SUM], neurons[i, V_SUM] = 0.0, 0.0
+    for stage in range(4):
+        weight = (1.0 if stage == 0 or stage == 3 else 2.0) / 6.0
+        reach = 1.0 if stage == 2 else 0.5  # of the next stage
+        neuron_rates(network, inputs, neurons)
+        for i in range(neurons.shape[0]):
+            neurons[i, U_SUM] += weight * neurons[i, U_RATE]
+            neurons[i, V_SUM] += weight * neurons[i, V_RATE]
+            neurons[i, U] = neurons[i, U_START] + reach * step * neurons[i, U_RATE]
+            neurons[i, V] = neurons[i, V_START] + reach * step * neurons[i, V_RATE]
+    for i in range(neurons.shape[0]):
+        neurons[i, U] = neurons[i, U_START] + step * neurons[i, U_SUM]
+        neurons[i, V] = neurons[i, V_START] + step * neurons[i, V_SUM]
+
+
+@compiled
+def network_output(
+    network: Network, inputs: Array, step: float, listing: bool, neurons: Array, output: Array
+) -> None:
+    """Writes the outputs (samples, n) of a network without lanes, one sample per step (s).
+
+    `inputs` has a row (2n,) for each of the first steps. Later steps use its last row. With
+    `listing`, the method is forward Euler, and sample i is the state after i + 1 steps, as in
+    listing B.1. Otherwise the method is Runge-Kutta, and sample i is the state after i steps.
+    """
+    last = inputs.shape[0] - 1
+    for i in range(output.shape[0]):
+        current = inputs[min(i, last)]
+        if listing:
+            euler_step(network, current, step, neurons)
+        oscillator_output(neurons, output[i])
+        if not listing:
+            runge_kutta_step(network, current, step, neurons)
+
+
+@inlined
+def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
+    """First half of a step (s) of Heun's method (order 2): an Euler step. `inputs` are at the
+    beginning of the step."""
+    neuron_rates(network, inputs, neurons)
+    for i in range(neurons.shape[0]):
+        neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
+        neurons[i, U_SUM], neurons[i, V_SUM] = neurons[i, U_RATE], neurons[i, V_RATE]
+        neurons[i, U] += step * neurons[i, U_RATE]
+        neurons[i, V] += step * neurons[i, V_RATE]
+
+
+@inlined
+def correct_neurons(
+    network: Network, inputs: Table, step: Real, accepted: Truth, neurons: Table
+) -> None:
+    """Second half of a step of Heun's method. `inputs` are at the end of the step. Without
+    `accepted`, the neurons return to the beginning of the step."""
+    neuron_rates(network, inputs, neurons)
+    half = 0.5 * step
+    for i in range(neurons.shape[0]):
+        u_rate = neurons[i, U_SUM] + neurons[i, U_RATE]
+        v_rate = neurons[i, V_SUM] + neurons[i, V_RATE]
+        u, v = neurons[i, U_START], neurons[i, V_START]
+        neurons[i, U] = select(accepted, u + half * u_rate, u)
+        neurons[i, V] = select(accepted, v + half * v_rate, v)

@@ -1,0 +1,170 @@
+"""Stiffness matrix of a robot at rest: second derivatives of its potential energy.
+
+They are exact. Finite differences of forces lose half of the digits, which hides the softest
+motions of a robot that is a billion times as stiff in other directions.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tetra_drake.laws import cable, capsules, contact, kinematics
+from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.model import Model
+from tetra_drake.laws.rigid_motions import rigid_motions
+from tetra_drake.laws.struts import Axes, axes_of, vector_between
+
+WORLD = -1
+"""Index of the world among the bodies."""
+
+
+class Springs(NamedTuple):
+    """Springs between points of two bodies, or of a body and the world. The motions of both bodies
+    add up to the displacements (k,) of a spring."""
+
+    body_a: np.ndarray
+    """Indices of the first bodies (springs,)."""
+    body_b: np.ndarray
+    motion_a: np.ndarray
+    """Displacements (springs, k, 6) by the six motions of the first bodies; see
+    rigid_motions()."""
+    motion_b: np.ndarray
+    stiffness: np.ndarray
+    """Second derivatives (springs, k, k) of the energy with respect to the displacements."""
+
+
+def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
+    """Stiffness matrix (6 bodies, 6 bodies) of a robot on flat ground: N m, N and N/m.
+
+    The displacement of a body is a rotation vector in rad, then a translation in m, in the world
+    frame. `forces` are the forces of a state without motion.
+    """
+    bodies = robot.bodies.mass.size
+    carriers = np.full(len(robot.p_BN), WORLD)
+    carriers[: robot.first_node[-1]] = np.repeat(np.arange(bodies), np.diff(robot.first_node))
+    blocks = np.zeros((bodies + 1, bodies + 1, 6, 6))  # the last blocks are the world's
+    for springs in (
+        _cables(robot, forces, carriers),
+        _supports(robot, forces, carriers),
+        _touching_struts(robot, forces, carriers),
+    ):
+        _add_springs(springs, blocks)
+    _add_turning(robot.ground, forces.nodes, carriers, blocks)
+    return blocks[:bodies, :bodies].transpose(0, 2, 1, 3).reshape(6 * bodies, 6 * bodies)
+
+
+def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
+    """The cables as springs. A slack cable has no stiffness."""
+    cables, parts, nodes = robot.cables, forces.cable_forces, forces.nodes
+    p_BN_W = nodes[:, kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    direction = parts[:, cable.DIRECTION : cable.DIRECTION + 3]
+    along = np.einsum("ci,cj->cij", direction, direction)
+    tension = parts[:, cable.TENSION]
+    lengthwise = np.where((tension > 0.0) | (not robot.slack), cables.law.stiffness, 0.0)
+    sideways = tension / parts[:, cable.LENGTH]
+    return Springs(
+        carriers[cables.node_a],
+        carriers[cables.node_b],
+        rigid_motions(p_BN_W[cables.node_a]),
+        -rigid_motions(p_BN_W[cables.node_b]),
+        (lengthwise - sideways)[:, None, None] * along + sideways[:, None, None] * np.eye(3),
+    )
+
+
+def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
+    """Contacts with the ground, and anchors, as springs to the world."""
+    ground, anchors = robot.ground, robot.anchors
+    law = contact.NormalForce(*ground.normal)
+    presses = forces.ground_forces[:, contact.NORMAL] > 0.0
+    vertical = np.array([0.0, 0.0, law.stiffness])
+    axes = np.concatenate([presses[:, None] * vertical, anchors.stiffness])
+    nodes = np.concatenate([ground.centres, anchors.nodes])
+    p_BN_W = forces.nodes[nodes, kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    world, motion = np.full(len(nodes), WORLD), rigid_motions(p_BN_W)
+    return Springs(carriers[nodes], world, motion, -motion, axes[:, None] * np.eye(3))
+
+
+def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
+    """Contacts of struts as springs. A displacement (12,) is one of both ends of the first strut,
+    then of both ends of the second."""
+    near, struts, nodes = forces.near_struts, robot.struts, forces.nodes
+    law = contact.NormalForce(*robot.strut_contact.normal)
+    ends, stiffness = [], []
+    for i, j in near.pairs[: near.count[0]].tolist():
+        touch = capsules.find_touch(struts, nodes, i, j)
+        if touch.depth > 0.0:
+            axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]
+            stiffness.append(_stiffness_of_touch(touch, axes, reach, law.stiffness))
+            ends.append([struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]])
+    of_touch = np.array(ends, dtype=int).reshape(-1, 4)
+    p_BN_W = nodes[of_touch, kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    motions = rigid_motions(p_BN_W.reshape(-1, 3)).reshape(-1, 4, 3, 6)
+    motion_a, motion_b = motions.copy(), motions.copy()
+    motion_a[:, 2:], motion_b[:, :2] = 0.0, 0.0
+    return Springs(
+        carriers[of_touch[:, 0]],
+        carriers[of_touch[:, 2]],
+        motion_a.reshape(-1, 12, 6),
+        motion_b.reshape(-1, 12, 6),
+        np.array(stiffness, dtype=float).reshape(-1, 12, 12),
+    )
+
+
+def _stiffness_of_touch(
+    touch: capsules.Touch, axes: Axes, reach: float, stiffness: float
+) -> np.ndarray:
+    """Second derivatives (12, 12) of the energy of a contact of struts, with respect to the
+    displacements of their ends. `reach` (m) is the sum of the radii.
+
+    Half the squared distance, D² / 2, is the minimum of a function of the places s and t; see
+    laws.capsules. Its second derivatives are those at fixed places, less what the places gain as
+    they move. A place at an end does not move.
+    """
+    s, t, gradient = touch.s, touch.t, np.concatenate(touch.gradient)
+    weight, by_product, second_by_product = capsules.barrel(axes, reach)
+    u, v, between = np.array(axes.u), np.array(axes.v), np.array(vector_between(axes, s, t))
+    to_u, to_v = (np.kron(ends, np.eye(3)) for ends in ([-1, 1, 0, 0], [0, 0, -1, 1]))
+    to_between = np.kron([1.0 - s, s, t - 1.0, -t], np.eye(3))
+    product = v @ to_u + u @ to_v  # the change of uv
+    bend = second_by_product * np.outer(product, product)
+    bend += by_product * (to_u.T @ to_v + to_v.T @ to_u)
+    second = to_between.T @ to_between + 0.5 * ((s - 0.5) ** 2 + (t - 0.5) ** 2) * bend
+    by_s = u @ to_between + between @ to_u + by_product * (s - 0.5) * product
+    by_t = -v @ to_between - between @ to_v + by_product * (t - 0.5) * product
+    by_place, uv = np.array([by_s, by_t]), axes.uv
+    curvature = np.array([[axes.uu + weight, -uv], [-uv, axes.vv + weight]])
+    moves = [0.0 < place < 1.0 for place in (s, t)]
+    if any(moves):
+        by_place, curvature = by_place[moves], curvature[moves][:, moves]
+        second -= by_place.T @ np.linalg.solve(curvature, by_place)
+    # The energy is k d² / 2 with the depth d = reach - D.
+    steep = np.outer(gradient, gradient)
+    distance = max(reach - touch.depth, capsules.LEAST_SQUARE**0.5)  # as in find_touch()
+    return stiffness * (steep - touch.depth / distance * (second - steep))
+
+
+def _add_springs(springs: Springs, blocks: np.ndarray) -> None:
+    """Adds the stiffness of springs to the blocks (bodies + 1, bodies + 1, 6, 6)."""
+    motion = np.concatenate([springs.motion_a, springs.motion_b], axis=2)
+    added = motion.transpose(0, 2, 1) @ springs.stiffness @ motion
+    ends = np.stack([springs.body_a, springs.body_b], axis=1)
+    for i, j in np.ndindex(2, 2):
+        block = added[:, 6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
+        np.add.at(blocks, (ends[:, i], ends[:, j]), block)
+
+
+def _add_turning(
+    ground: contact.Ground, nodes: np.ndarray, carriers: np.ndarray, blocks: np.ndarray
+) -> None:
+    """Adds the stiffness that the forces on the nodes have as the bodies turn. The line of a normal
+    force goes through the centre of a round foot, so that the force is as one on the node."""
+    p = nodes[: len(carriers), kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    forces = nodes[:, kinematics.FORCE : kinematics.FORCE + 3]
+    force, is_round = forces[: len(carriers)].copy(), ground.contacts != ground.centres
+    force[ground.centres[is_round]] += forces[ground.contacts[is_round]]
+    products = np.einsum("ni,nj->nij", p, force)
+    trace = np.einsum("nii,jk->njk", products, np.eye(3))
+    turning = trace - 0.5 * (products + products.transpose(0, 2, 1))
+    np.add.at(blocks[:, :, :3, :3], (carriers, carriers), turning)

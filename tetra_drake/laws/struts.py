@@ -1,0 +1,122 @@
+"""Struts as the kernels take them, and the nearest points of two struts."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.lanes import Real, Table, any_lane, maximum, minimum
+from tetra_drake.laws.kinematics import P_WN
+from tetra_drake.laws.vectors import Vector, difference, dot, scaled, sum_of, vector_at
+
+MARGIN = 1.0 + 1e-9
+"""Factor on bounds, so that rounding errors cannot exclude a pair whose distance equals a bound."""
+_PARALLEL = 1e-12
+"""Squared sine of the angle below which the axes of two struts count as parallel."""
+
+
+class Struts(NamedTuple):
+    """Struts of all bodies, in the order of the bodies."""
+
+    node_a: Table
+    """Index of the node at one end (struts,)."""
+    node_b: Table
+    """Index of the node at the other end (struts,)."""
+    first_strut: Table
+    """Index of each body's first strut (bodies + 1,); the last number is the number of struts."""
+    length: Table
+    """Lengths (struts,) in m."""
+    radius: Table
+    """Radii (struts,) in m."""
+
+
+class Axes(NamedTuple):
+    """Axes of two struts: vectors u and v along them, and r from the start of the second to the
+    start of the first, with their scalar products."""
+
+    u: Vector
+    v: Vector
+    r: Vector
+    uu: Real
+    vv: Real
+    uv: Real
+    ur: Real
+    vr: Real
+
+
+@inlined
+def axes_of(struts: Struts, nodes: Table, i: int, j: int) -> Axes:
+    """Axes of struts i and j. `nodes` is the table of laws.kinematics."""
+    start_i = vector_at(nodes, struts.node_a[i], P_WN)
+    start_j = vector_at(nodes, struts.node_a[j], P_WN)
+    u = difference(vector_at(nodes, struts.node_b[i], P_WN), start_i)
+    v = difference(vector_at(nodes, struts.node_b[j], P_WN), start_j)
+    r = difference(start_i, start_j)
+    uu, vv = struts.length[i] * struts.length[i], struts.length[j] * struts.length[j]
+    return Axes(u, v, r, uu, vv, uv=dot(u, v), ur=dot(u, r), vr=dot(v, r))
+
+
+@inlined
+def nearest_on_line(axes: Axes) -> Real:
+    """Place on the first axis that is nearest to the line of the second: 0 at its start, 1 at its
+    end (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9)."""
+    uu_vv = axes.uu * axes.vv
+    square_of_sine = maximum(uu_vv - axes.uv * axes.uv, _PARALLEL * uu_vv)
+    return (axes.uv * axes.vr - axes.ur * axes.vv) / square_of_sine
+
+
+@inlined
+def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
+    """Places on both axes, 0 to 1, that are nearest to each other.
+
+    `s` is the place on the first axis that is nearest to the line of the second. If a place is
+    beyond the end of its strut, the end is used, and the place on the other strut that is nearest
+    to it.
+    """
+    t = share((axes.uv * share(s) + axes.vr) / axes.vv)
+    return share((axes.uv * t - axes.ur) / axes.uu), t
+
+
+@inlined
+def vector_between(axes: Axes, s: Real, t: Real) -> Vector:
+    """Vector (m) from the place t on the second axis to the place s on the first."""
+    return difference(sum_of(axes.r, scaled(s, axes.u)), scaled(t, axes.v))
+
+
+@inlined
+def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
+    """Distance (m) between the axes of two struts."""
+    axes = axes_of(struts, nodes, i, j)
+    s, t = nearest_on_struts(axes, nearest_on_line(axes))
+    between = vector_between(axes, s, t)
+    return math.sqrt(dot(between, between))
+
+
+@inlined
+def share(x: Real) -> Real:
+    """Clamps a number to the range from 0 to 1."""
+    return minimum(maximum(x, 0.0), 1.0)
+
+
+@inlined
+def origin(state: Table, body: int) -> Vector:
+    """Position of a body's origin (m)."""
+    return state[7 * body + 4], state[7 * body + 5], state[7 * body + 6]
+
+
+@inlined
+def midpoint(struts: Struts, nodes: Table, i: int) -> Vector:
+    """Midpoint of a strut (m)."""
+    p_WA, p_WB = vector_at(nodes, struts.node_a[i], P_WN), vector_at(nodes, struts.node_b[i], P_WN)
+    return scaled(0.5, sum_of(p_WA, p_WB))
+
+
+@inlined
+def may_be_nearer(offset: Vector, reach: Real, least: Real) -> bool:
+    """False if two parts are certainly farther from each other than `least`, in all lanes.
+
+    `offset` is the vector between the centres of the parts, `reach` (m) the sum of their radii.
+    """
+    bound = reach + least
+    return any_lane(dot(offset, offset) <= MARGIN * bound * bound)

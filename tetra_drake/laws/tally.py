@@ -1,0 +1,235 @@
+"""Tally of a simulation: sums and extremes over all steps, which metrics are computed from.
+
+A part of the tally is a NamedTuple of tables, with a kernel that adds a step to them. All engines
+call observe(), which calls these kernels. scenario.metrics computes metrics from the tables.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple, Self
+
+from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, minimum, select
+from tetra_drake.laws import actuator, cable
+from tetra_drake.laws.clearance import least_strut_distance
+from tetra_drake.laws.contact import NORMAL
+from tetra_drake.laws.forces import Forces, sizes_of
+from tetra_drake.laws.kinematics import pitch_rate
+from tetra_drake.laws.model import Model
+
+
+class Step(NamedTuple):
+    """A step of a simulation, with signals and forces at its end. The first step, and a repeated
+    step, take no time."""
+
+    robot: Model
+    signals: Table
+    """Signals (signals,) in N at the end of the step."""
+    signals_before: Table
+    """Signals (signals,) in N at the beginning of the step."""
+    forces: Forces
+    duration: Real
+    """Duration of the step in s."""
+    takes_time: Truth
+    counts: Truth
+    """True if the step takes time and is in the steady stretch. Sums are over these steps."""
+    counted: Real
+    """Duration (s) of the step if it counts, otherwise 0."""
+
+
+class Effort(NamedTuple):
+    """Effort of the actuators. Integrals are over the steady stretch, summed over the actuators;
+    peaks are over all steps."""
+
+    left: Annotated[Table, "cables"]
+    """Length (m) of each driven cable at the latest step; its free length if a winch winds it."""
+    peak_force: Annotated[Table, 1]
+    """Largest tension of a driven cable, in N."""
+    peak_speed: Annotated[Table, 1]
+    """Largest speed of an actuator in either direction, in m/s."""
+    peak_power: Annotated[Table, 1]
+    """Largest power of an actuator, in W."""
+    impulse: Annotated[Table, 1]
+    """Integral of the tension, in N s."""
+    wound: Annotated[Table, 1]
+    """Length of cable wound and paid out, in m."""
+    pulled: Annotated[Table, 1]
+    """Integral of the positive power of the tension, in J."""
+    work: Annotated[Table, 1]
+    """Integral of max(0, -S dl/dt), in J. S is the signal, or the tension if actuators have
+    drives."""
+    limited: Annotated[Table, 1]
+    """Time at a limit of an actuator, in s."""
+
+
+@inlined
+def add_to_effort(effort: Effort, step: Step) -> None:
+    """Adds a step."""
+    signal, cable_forces = step.robot.cables.signal, step.forces.cable_forces
+    per_time, work = select(step.takes_time, 1.0 / step.duration, 0.0), 0.0 * step.duration
+    drive = 0
+    for i in range(effort.left.size):
+        if signal[i] == cable.PASSIVE:
+            continue
+        tension = cable_forces[i, cable.TENSION]
+        pull, left, limited = winding(step, i, drive)
+        drive += 1
+        wound = select(step.takes_time, effort.left[i] - left, 0.0)
+        effort.left[i] = left
+        speed = wound * per_time
+        effort.peak_force[0] = maximum(effort.peak_force[0], tension)
+        effort.peak_speed[0] = maximum(effort.peak_speed[0], abs(speed))
+        effort.peak_power[0] = maximum(effort.peak_power[0], tension * speed)
+        wound = select(step.counts, wound, 0.0)
+        work += maximum(pull * wound, 0.0)
+        effort.impulse[0] += step.counted * tension
+        effort.wound[0] += abs(wound)
+        effort.pulled[0] += maximum(tension * wound, 0.0)
+        effort.limited[0] += step.counted * limited
+    effort.work[0] += work
+
+
+@inlined
+def winding(step: Step, i: int, drive: int) -> tuple[Real, Real, Real]:
+    """Actuator of cable `i`: the force (N) for its work, the length (m) for Effort.left, and 1 if a
+    limit binds, otherwise 0."""
+    length, of_robot = step.forces.cable_forces[i, cable.LENGTH], step.robot.actuator
+    if not actuator.has_drive(of_robot):
+        k = step.robot.cables.signal[i]
+        return 0.5 * (step.signals_before[k] + step.signals[k]), length, 0.0 * length
+    drives, tension = step.forces.drives, step.forces.cable_forces[i, cable.TENSION]
+    left = actuator.wound(of_robot, drives[drive, actuator.DRIVE], length)
+    return tension, left, drives[drive, actuator.LIMITED]
+
+
+class Roughness(NamedTuple):
+    """Roughness of the signals."""
+
+    total: Annotated[Table, 1]
+    """Integral of (dS/dt)² of all signals, in N²/s."""
+
+
+@inlined
+def add_to_roughness(roughness: Roughness, step: Step) -> None:
+    """Adds a step."""
+    square = 0.0 * step.duration
+    for k in range(step.signals.size):
+        change = step.signals[k] - step.signals_before[k]
+        square += change * change
+    roughness.total[0] += select(step.counts, square / step.duration, 0.0)
+
+
+class Lifted(NamedTuple):
+    """Time that bodies are off the ground."""
+
+    time: Annotated[Table, "bodies"]
+    """Time (bodies,) in s while no contact node of a body bears a normal force."""
+
+
+@inlined
+def add_to_lifted(lifted: Lifted, step: Step) -> None:
+    """Adds a step."""
+    carriers, i = step.robot.ground.carriers, 0
+    for body in range(lifted.time.size):
+        load = 0.0 * step.counted
+        while i < carriers.size and carriers[i] == body:
+            load += step.forces.ground_forces[i, NORMAL]
+            i += 1
+        lifted.time[body] += select(load == 0.0, step.counted, 0.0)
+
+
+class LeastTension(NamedTuple):
+    """Least tension over all steps."""
+
+    of_all: Annotated[Table, 1, math.inf]
+    """Least tension of all cables, in N."""
+
+
+@inlined
+def add_to_tension(tension: LeastTension, step: Step) -> None:
+    """Adds a step."""
+    least = tension.of_all[0]
+    for i in range(step.forces.cable_forces.shape[0]):
+        least = minimum(least, step.forces.cable_forces[i, cable.TENSION])
+    tension.of_all[0] = least
+
+
+class Rolled(NamedTuple):
+    """Rotation of the structure about the world's y axis, over all steps."""
+
+    rate: Annotated[Table, 1]
+    """Angular velocity (rad/s) at the latest step; see kinematics.pitch_rate()."""
+    angle: Annotated[Table, 1]
+    """Integral of the rate, in rad."""
+
+
+@inlined
+def add_to_rolled(rolled: Rolled, step: Step) -> None:
+    """Adds a step."""
+    first_node = step.robot.first_node
+    rate = pitch_rate(step.forces.nodes, first_node[first_node.size - 1])
+    rolled.angle[0] += select(step.takes_time, 0.5 * step.duration * (rolled.rate[0] + rate), 0.0)
+    rolled.rate[0] = rate
+
+
+class Tally(NamedTuple):
+    """Tally of a simulation: its time, and the parts that metrics need."""
+
+    begins: Annotated[Table, 1]
+    """Time (s) at which the steady stretch begins."""
+    time: Annotated[Table, 1]
+    """Time (s) at the end of the latest step."""
+    signals: Annotated[Table, "signals"]
+    """Signals (N) at the end of the latest step."""
+    clearance: Annotated[Table, 1, math.inf]
+    """Least distance between struts, in m; see update_clearance()."""
+    effort: Effort
+    roughness: Roughness
+    lifted: Lifted
+    tension: LeastTension
+    rolled: Rolled
+
+    @classmethod
+    def of(cls, robot: Model, *, signals: int, begins: float) -> Self:
+        """The tally at the start of a simulation. `begins` (s) is the start of the steady
+        stretch."""
+        tally = allocate(cls, sizes_of(robot) | {"signals": signals})
+        tally.begins[0] = begins
+        return tally
+
+
+@inlined
+def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
+    """Adds the step that ends at `time` (s) with these signals and forces."""
+    duration = time - tally.time[0]
+    takes_time = duration > 0.0
+    counts = takes_time & (tally.time[0] >= tally.begins[0])
+    step = Step(
+        robot=robot,
+        signals=signals,
+        signals_before=tally.signals,
+        forces=forces,
+        duration=duration,
+        takes_time=takes_time,
+        counts=counts,
+        counted=select(counts, duration, 0.0),
+    )
+    add_to_effort(tally.effort, step)
+    add_to_roughness(tally.roughness, step)
+    add_to_lifted(tally.lifted, step)
+    add_to_tension(tally.tension, step)
+    add_to_rolled(tally.rolled, step)
+    for k in range(signals.size):
+        tally.signals[k] = signals[k]
+    tally.time[0] = time
+
+
+@inlined
+def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
+    """Updates the clearance for a state (13 bodies,). It is too slow to be called at every step.
+    `nodes` is the table of laws.kinematics."""
+    radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]
+    least = least_strut_distance(robot.struts, radius, first_node, state, nodes, least)
+    tally.clearance[0] = least
