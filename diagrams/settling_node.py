@@ -24,7 +24,7 @@ from one_tetrahedron import TRAILING, Samples, let_go, make_diagram
 from tetra_drake.figures.style import common_style, make_figure, save_figure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.settings.units import INCH, POUND_FORCE
 
 IMPACT_SPEED = 0.12 * INCH  # m/s, as in the thesis
 THESIS_RESTITUTION = 0.9

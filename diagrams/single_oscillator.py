@@ -38,7 +38,7 @@ from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.robot import initial_neurons
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import POUND_FORCE
+from tetra_drake.settings.units import POUND_FORCE
 from tetra_drake.systems import MatsuokaCpg
 
 TAU_A = 0.3  # s, as in the thesis's figures

@@ -30,7 +30,7 @@ from tetra_drake.results.measures import intervals
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import NODES
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.settings.units import INCH, POUND_FORCE
 
 INITIAL_SPEED = 30.0 * INCH  # m/s
 

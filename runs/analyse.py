@@ -27,6 +27,7 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluator_of
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.results.metrics import unmet_requirements
@@ -34,12 +35,11 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 SCHEMA = 6
 ANALYSIS = "analysis.json"

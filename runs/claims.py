@@ -39,7 +39,7 @@ from tetra_drake.results.measures import dominant_frequency, off_ground
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
-from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.settings.units import INCH, POUND_FORCE
 
 HERE = Path(__file__).parent
 MOTION, TEXTS = HERE / "thesis/motion.json", HERE / "claims.jinja"

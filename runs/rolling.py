@@ -38,7 +38,7 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import shown_in
+from tetra_drake.settings.units import shown_in
 
 ROLLING = "rolling"
 HERE = Path(__file__).parent / ROLLING

@@ -17,7 +17,7 @@ from analyse import Analysis, load_analysis
 from tetra_drake.analysis.statistics import interval_of_resamples, resampled
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed, ranged
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 
 def numbers(analysis: Analysis) -> dict[str, np.ndarray]:

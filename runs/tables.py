@@ -32,12 +32,12 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import Table, fixed, listed, rounded
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.report.result_folder import REPLAY
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH, SYSTEMS, Units
+from tetra_drake.settings.units import INCH, SYSTEMS, Units
 
 HERE = Path(__file__).parent
 FRONT = HERE.parent

@@ -29,7 +29,7 @@ from tetra_drake.files import write_whole
 from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 Results: TypeAlias = dict[str, list[SimulationResult]]
 """Simulated gaits of the trials, by GAITS."""

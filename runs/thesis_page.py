@@ -33,8 +33,8 @@ from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.section import flattened, written
-from tetra_drake.scenario.units import INCH, POUND_FORCE, plainest
+from tetra_drake.settings.section import flattened, written
+from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
 
 HERE = Path(__file__).parent
 PAGE, FIGURES = HERE / "thesis/THESIS.md", HERE / "thesis/redrawn"

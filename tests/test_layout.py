@@ -15,7 +15,7 @@ import tetra_drake
 PACKAGE = Path(tetra_drake.__file__).parent
 ROWS = [
     ["errors", "files", "formatting", "interrupts", "machine"],
-    ["kernels", "laws", "scenario", "options", "robot"],
+    ["kernels", "settings", "laws", "scenario", "options", "robot"],
     ["systems", "visualization", "results", "engines", "gym", "prototype"],
     ["optimizers", "evolution", "analysis", "figures", "report", "experiment", "cli"],
 ]

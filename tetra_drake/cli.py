@@ -18,7 +18,7 @@ from tetra_drake.files import check_folder, file_names, write_whole
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.options import BAD_INPUT, Command, Option, integer, number, quantity, size
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
-from tetra_drake.scenario.units import INCH, SYSTEMS, shown_in
+from tetra_drake.settings.units import INCH, SYSTEMS, shown_in
 
 if TYPE_CHECKING:
     from tetra_drake.figures.style import Print

@@ -78,7 +78,7 @@ class Command(argparse.ArgumentParser):
         named = {name: values.pop(name) for name in [*values] if name.startswith("--")}
         values |= {name.removeprefix("--"): value for name, value in named.items() if value}
         if unknown:
-            from tetra_drake.scenario.refusals import hint
+            from tetra_drake.settings.refusals import hint
 
             names = re.findall(r"--[\w-]+", parser.format_usage())
             parser.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
@@ -150,7 +150,7 @@ def quantity(unit: str, example: str, *, least: str, most: str) -> Callable[[str
     `example`, or its unit."""
 
     def read(text: str) -> float:
-        from tetra_drake.scenario.units import quantity_to_si
+        from tetra_drake.settings.units import quantity_to_si
 
         if re.fullmatch(r"[\d.]+", text):
             advice = f"did you mean '{text} {example.split()[1]}'?"

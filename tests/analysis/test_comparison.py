@@ -12,7 +12,7 @@ from tetra_drake.cli import main
 from tetra_drake.figures.comparison import comparison
 from tetra_drake.report.analysis_text import comparison_text
 from tetra_drake.scenario.common_sections import Disturbances
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 
 def trial(*fitnesses):

@@ -12,7 +12,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.terrain_kinds import Flat
-from tetra_drake.scenario.units import shown_in
+from tetra_drake.settings.units import shown_in
 
 
 def on_ground(nodes, bars, **groups):

@@ -10,8 +10,8 @@ from helpers.converged import shortly
 
 from tetra_drake.analysis.sweep import sweep
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.gait import save_gait, seeded_gait
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.scenario import Scenario

@@ -9,7 +9,7 @@ from settling_node import IMPACT_SPEED, bounce, contact_speeds, settle, velocity
 from sliding_tetrahedron import INITIAL_SPEED, flights, slide, slips, travel
 
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 STICKS = [1.0, 0.0, 0.0]
 

@@ -13,9 +13,9 @@ import pytest
 import tetrahedron_on_incline as incline
 from one_tetrahedron import BASE, let_go, make_standing_tetrahedron, start_axes, weight
 
-from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 
 def centre_velocity(motion, scenario):

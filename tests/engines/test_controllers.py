@@ -15,7 +15,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 from tetra_drake.systems import SampledController
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

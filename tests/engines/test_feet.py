@@ -18,6 +18,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS, sliding
 from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import make_surface
@@ -25,7 +26,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.sdf import make_sdf
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.common_sections import GroundSection
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario

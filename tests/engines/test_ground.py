@@ -10,12 +10,12 @@ from pydrake.systems.analysis import Simulator
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import ground_frames
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough

@@ -9,14 +9,14 @@ import xarray
 from helpers.converged import CONVERGED, shortly
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 BOTH = pytest.mark.parametrize("engine", ["drake", "compiled"])
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}

@@ -12,7 +12,7 @@ from helpers.synthetic_run import write_run
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import load_run
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 
 def test_a_run_loads_as_tables(run_small):

@@ -15,7 +15,7 @@ from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 Child = tuple[float | None, int | None]
 """Fitness, None where the gait failed, and the place it took, None where it took none."""

@@ -5,8 +5,7 @@ import pytest
 from helpers.robot_on_ground import RobotOnGround
 
 from tetra_drake.laws.contact import HEADING, MODE
-from tetra_drake.laws.friction import ResetConstants, first_zero
-from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.laws.friction import Coulomb, ResetConstants, first_zero
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline
 

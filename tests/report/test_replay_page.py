@@ -16,7 +16,7 @@ from tetra_drake.report.result_folder import check_result_folder, load_result, s
 from tetra_drake.results.metrics import headline
 from tetra_drake.results.result import save_result
 from tetra_drake.scenario.load import dump_scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 
 def test_the_title_is_by_the_scenarios_objective(folder, tiny, gait, result):

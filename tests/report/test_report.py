@@ -16,7 +16,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.formatting import rounded
 from tetra_drake.report.run_figures import simulate_shown_gaits
 from tetra_drake.report.run_page import render_report, write_report
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 from .conftest import COSTS, TRIALS
 

@@ -10,7 +10,7 @@ from tetra_drake.report.structure_page import robot_of_file, structure_text
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.units import units_for
+from tetra_drake.settings.units import units_for
 
 BEAM = """
 unit: m

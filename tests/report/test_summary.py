@@ -8,10 +8,10 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.run import load_run
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.report.summary import ground_text, result_text, results
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 
 def numbers(text):

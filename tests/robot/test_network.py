@@ -11,7 +11,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import raw_output
 from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 

@@ -6,7 +6,7 @@ import pytest
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
-from tetra_drake.scenario.units import shown_in
+from tetra_drake.settings.units import shown_in
 
 
 @pytest.fixture(params=["gait_a", "gait_b", "single_oscillators"])

@@ -21,7 +21,7 @@ from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""

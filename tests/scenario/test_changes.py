@@ -5,16 +5,16 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.robot import make_structure
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.scenario.refusals import TAG
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Kinds, keys_of
 from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.section import Kinds, keys_of
 
 
 def test_changes_are_checked_converted_and_made_in_a_copy(scenario):

@@ -7,7 +7,7 @@ import pytest
 from tetra_drake.scenario.keys import PAGE, keys_page
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
-from tetra_drake.scenario.refusals import TAG
+from tetra_drake.settings.refusals import TAG
 
 
 @pytest.fixture(scope="module")

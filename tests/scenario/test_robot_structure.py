@@ -8,9 +8,9 @@ from helpers.structure_file import FILE
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Member, StructureFile
-from tetra_drake.scenario.section import Tree
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.settings.section import Tree
 
 IN = 0.0254
 

@@ -10,8 +10,8 @@ from record import EXPERIMENTS
 from tetra_drake.errors import InputError
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.refusals import TAG
 from tetra_drake.scenario.shipped import shipped_scenarios
+from tetra_drake.settings.refusals import TAG
 
 # Exact by definition
 IN = 0.0254

@@ -22,7 +22,7 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.terrain_kinds import Incline
-from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.settings.units import INCH, POUND_FORCE
 from tetra_drake.visualization.browser import do, wait_until_loaded
 from tetra_drake.visualization.replay import (
     RESOLUTION,

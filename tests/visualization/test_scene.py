@@ -12,7 +12,7 @@ from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
-from tetra_drake.scenario.units import INCH, INCHES
+from tetra_drake.settings.units import INCH, INCHES
 from tetra_drake.visualization import scene
 from tetra_drake.visualization.replay import quiet_meshcat
 

@@ -22,10 +22,10 @@ from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say, Table, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.common_sections import separate
-from tetra_drake.scenario.quantities import Quantity
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import value_at
-from tetra_drake.scenario.units import given_quantity
+from tetra_drake.settings.quantities import Quantity
+from tetra_drake.settings.section import value_at
+from tetra_drake.settings.units import given_quantity
 
 STEP = 1e-3
 """Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and

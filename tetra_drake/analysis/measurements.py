@@ -30,12 +30,12 @@ from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.common_sections import different_keys
-from tetra_drake.scenario.quantities import Force, Length, Time, Unit
-from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Kinds, Section, keys_of
-from tetra_drake.scenario.units import given_quantity
 from tetra_drake.scenario.yaml_text import read_mapping
+from tetra_drake.settings.quantities import Force, Length, Time, Unit
+from tetra_drake.settings.refusals import hint
+from tetra_drake.settings.section import Kinds, Section, keys_of
+from tetra_drake.settings.units import given_quantity
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline

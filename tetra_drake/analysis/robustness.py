@@ -22,7 +22,7 @@ from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import varied, written
+from tetra_drake.settings.section import varied, written
 
 if TYPE_CHECKING:
     import pandas

@@ -19,7 +19,7 @@ from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Section, python_value, value_at
+from tetra_drake.settings.section import Section, python_value, value_at
 
 if TYPE_CHECKING:
     import xarray

@@ -33,7 +33,7 @@ from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Section
+from tetra_drake.settings.section import Section
 
 SCHEMA = 4
 MANIFEST = "manifest.json"

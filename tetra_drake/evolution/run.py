@@ -27,7 +27,7 @@ from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 
 if TYPE_CHECKING:
     import pandas

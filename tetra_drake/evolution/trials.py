@@ -16,7 +16,7 @@ from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.units import INCHES, Units
+from tetra_drake.settings.units import INCHES, Units
 
 _SHOW_PERIOD = 1.0  # s
 

@@ -32,7 +32,7 @@ from tetra_drake.results import measures
 from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.units import Units
+from tetra_drake.settings.units import Units
 
 _CYCLES = 3
 _LAST_SHARE = 0.25  # share of the time that is shown if no signal oscillates

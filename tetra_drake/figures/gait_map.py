@@ -23,7 +23,7 @@ from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, 
 from tetra_drake.formatting import listed
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.scenario.units import Units
+from tetra_drake.settings.units import Units
 
 _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}
 _NUMBER: Any = {"ha": "center", "va": "center", "size": "small", "weight": "bold", "zorder": 4}

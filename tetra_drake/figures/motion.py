@@ -35,7 +35,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
-from tetra_drake.scenario.units import INCH, Units
+from tetra_drake.settings.units import INCH, Units
 
 X, Y, Z = range(3)
 

@@ -33,7 +33,7 @@ from tetra_drake.figures.style import (
     write_beside,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.scenario.units import Units
+from tetra_drake.settings.units import Units
 
 _DOTS: Any = {"color": OKABE_ITO["sky_blue"], "markersize": 2.0, "alpha": 0.4, "zorder": 0}
 _LINE = {"color": OKABE_ITO["blue"], "linewidth": 1.2}

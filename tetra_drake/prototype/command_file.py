@@ -16,7 +16,7 @@ from tetra_drake.files import given_path, read_text
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
-from tetra_drake.scenario.refusals import hint
+from tetra_drake.settings.refusals import hint
 
 TIME = "time_s"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tetra_drake.analysis.comparison import Compared
 from tetra_drake.analysis.robustness import LOSS, Judgement, by_change, by_gait, chance
 from tetra_drake.formatting import Table, fixed, percents, ranged, rounded, signed
-from tetra_drake.scenario.units import Units
+from tetra_drake.settings.units import Units
 
 if TYPE_CHECKING:
     import pandas

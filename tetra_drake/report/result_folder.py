@@ -29,8 +29,8 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.metrics import METRICS, Metrics, wrong_metric
-from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.section import Section
+from tetra_drake.settings.refusals import refuse
+from tetra_drake.settings.section import Section
 
 if TYPE_CHECKING:
     import xarray

@@ -34,7 +34,7 @@ from tetra_drake.robot.weights import KINDS
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import Units
+from tetra_drake.settings.units import Units
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites.csv"

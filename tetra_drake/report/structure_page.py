@@ -21,10 +21,10 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.refusals import no_such
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.settings.refusals import no_such
 from tetra_drake.visualization.replay import save_replay
 
 if TYPE_CHECKING:

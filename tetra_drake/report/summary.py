@@ -14,7 +14,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import Units
+from tetra_drake.settings.units import Units
 
 if TYPE_CHECKING:
     import pandas

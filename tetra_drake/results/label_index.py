@@ -9,7 +9,7 @@ from xarray.core.indexing import IndexSelResult
 from xarray.indexes import PandasIndex
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.refusals import hint
+from tetra_drake.settings.refusals import hint
 
 
 class LabelIndex(PandasIndex):

@@ -14,7 +14,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes
 from tetra_drake.scenario.metrics import METRICS, UNITS, Metrics, Poses, Walk, looks_for_distance
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH, current
+from tetra_drake.settings.units import INCH, current
 
 
 def steady_start(scenario: Scenario) -> float:

@@ -27,8 +27,8 @@ from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.metrics import UNITS, Metrics
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Section
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.section import Section
+from tetra_drake.settings.units import INCH
 
 if TYPE_CHECKING:
     import xarray

@@ -18,7 +18,7 @@ from tetra_drake.robot.weights import KINDS, Weights
 from tetra_drake.scenario.common_sections import Gains
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Section
+from tetra_drake.settings.section import Section
 
 LARGEST_GAIN = 1.0
 """Largest absolute value of a feedback gain in random gaits."""

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from tetra_drake.scenario import quantities
 from tetra_drake.scenario.metrics import LIMITS
-from tetra_drake.scenario.quantities import Length, Speed, Time
-from tetra_drake.scenario.section import Kinds, Section
+from tetra_drake.settings import quantities
+from tetra_drake.settings.quantities import Length, Speed, Time
+from tetra_drake.settings.section import Kinds, Section
 
 if TYPE_CHECKING:
     from tetra_drake.laws.actuator import Actuator

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.refusals import TAG
-from tetra_drake.scenario.section import Section, Tree, joined, parts_of, python_value
 from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.section import Section, Tree, joined, parts_of, python_value
 
 REPLACED = ("objective", "require", "robot.actuated")
 """Mappings that a file replaces as a whole."""

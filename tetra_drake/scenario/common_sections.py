@@ -12,9 +12,9 @@ from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tetra_drake.scenario.quantities import DampingPerLength, Force, Speed, Stiffness, Time
-from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.section import Section, Varied
+from tetra_drake.settings.quantities import DampingPerLength, Force, Speed, Stiffness, Time
+from tetra_drake.settings.refusals import refuse
+from tetra_drake.settings.section import Section, Varied
 
 Value = TypeVar("Value")
 

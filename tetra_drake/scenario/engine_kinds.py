@@ -4,9 +4,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from tetra_drake.scenario.friction_kinds import FrictionKind
-from tetra_drake.scenario.quantities import Speed, Time
-from tetra_drake.scenario.section import Kinds, Section
+from tetra_drake.laws.friction import FrictionKind
+from tetra_drake.settings.quantities import Speed, Time
+from tetra_drake.settings.section import Kinds, Section
 
 SHORTEST_STEP = 1e-9
 """Lower limit (s) of the steps of !Compiled."""

@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
-from tetra_drake.scenario.refusals import described, refuse
+from tetra_drake.settings.refusals import described, refuse
 
 MOST_HEIGHTS = 4_000_000
 LARGEST = 1e6

@@ -17,10 +17,10 @@ from pydantic.fields import FieldInfo
 
 from tetra_drake.formatting import Table
 from tetra_drake.scenario.metrics import METRICS, Metrics
-from tetra_drake.scenario.quantities import Unit, UnitsByName, unit_of
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Kinds, Section, joined, keys_of
-from tetra_drake.scenario.units import plainest
+from tetra_drake.settings.quantities import Unit, UnitsByName, unit_of
+from tetra_drake.settings.section import Kinds, Section, joined, keys_of
+from tetra_drake.settings.units import plainest
 
 PAGE = Path(__file__).parent / "KEYS.md"
 

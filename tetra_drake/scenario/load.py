@@ -8,12 +8,12 @@ from typing import Protocol
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
-from tetra_drake.scenario.refusals import no_such
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.section import Tree, keys_of, written
 from tetra_drake.scenario.shipped import SCENARIOS, shipped_scenarios
 from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
+from tetra_drake.settings.refusals import no_such
+from tetra_drake.settings.section import Tree, keys_of, written
 
 SCENARIO = "scenario.yaml"
 """The scenario's file in the folder of a command."""

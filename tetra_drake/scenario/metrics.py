@@ -14,7 +14,7 @@ import numpy as np
 from tetra_drake.files import json_number
 from tetra_drake.formatting import Table
 from tetra_drake.laws.curves import curvature, travelling_index
-from tetra_drake.scenario.units import INCH, INCHES, Units, current
+from tetra_drake.settings.units import INCH, INCHES, Units, current
 
 if TYPE_CHECKING:
     from tetra_drake.laws.tally import Tally

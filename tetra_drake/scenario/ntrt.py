@@ -23,9 +23,9 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.blueprint import WORLD
 from tetra_drake.scenario.ntrt_assembly import Assembly, Place, Rule, TaggedPair
 from tetra_drake.scenario.ntrt_file import CLASSES, Builder
-from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.robot_structure import Member, StructureFile, components
-from tetra_drake.scenario.section import Tree
+from tetra_drake.settings.refusals import hint
+from tetra_drake.settings.section import Tree
 
 SAME_PLACE = 1e-6
 """Distance in NTRT's unit below which nodes are one node."""

@@ -13,11 +13,11 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.ntrt_file import Builder, NtrtFile, Rotation, Substructure
-from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Pair
-from tetra_drake.scenario.section import keys_of
-from tetra_drake.scenario.units import LARGEST
 from tetra_drake.scenario.yaml_text import read_mapping
+from tetra_drake.settings.refusals import hint
+from tetra_drake.settings.section import keys_of
+from tetra_drake.settings.units import LARGEST
 
 MOST_BYTES = 2**20
 """Largest size of a file in bytes."""

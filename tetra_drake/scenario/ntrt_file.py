@@ -8,10 +8,10 @@ from typing import Annotated, Any, ClassVar
 import pydantic
 from pydantic import Field
 
-from tetra_drake.scenario.refusals import hint, refuse
 from tetra_drake.scenario.robot_structure import Pair
-from tetra_drake.scenario.section import Section
-from tetra_drake.scenario.units import LARGEST
+from tetra_drake.settings.refusals import hint, refuse
+from tetra_drake.settings.section import Section
+from tetra_drake.settings.units import LARGEST
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Point = Annotated[list[Number], Field(min_length=3, max_length=3)]

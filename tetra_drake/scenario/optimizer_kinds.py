@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metrics import UNITS
-from tetra_drake.scenario.quantities import Time, UnitsByName
-from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.section import Kinds, Section
+from tetra_drake.settings.quantities import Time, UnitsByName
+from tetra_drake.settings.refusals import refuse
+from tetra_drake.settings.section import Kinds, Section
 
 MOST_GAITS = 100_000
 """Upper limit of a population."""

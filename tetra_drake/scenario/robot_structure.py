@@ -20,7 +20,14 @@ from pydantic import Field
 from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.scenario.blueprint import WORLD, Blueprint
 from tetra_drake.scenario.metrics import ROW
-from tetra_drake.scenario.quantities import (
+from tetra_drake.scenario.robot_tetrahedra import (
+    LIGHTEST,
+    LONGEST,
+    Tetrahedra,
+    check_one_per_body,
+    check_strut,
+)
+from tetra_drake.settings.quantities import (
     Acceleration,
     Damping,
     Density,
@@ -31,16 +38,9 @@ from tetra_drake.scenario.quantities import (
     Stiffness,
     Time,
 )
-from tetra_drake.scenario.refusals import described, hint, refuse
-from tetra_drake.scenario.robot_tetrahedra import (
-    LIGHTEST,
-    LONGEST,
-    Tetrahedra,
-    check_one_per_body,
-    check_strut,
-)
-from tetra_drake.scenario.section import Kinds, Section, Tree, Varied
-from tetra_drake.scenario.units import quantity_to_si
+from tetra_drake.settings.refusals import described, hint, refuse
+from tetra_drake.settings.section import Kinds, Section, Tree, Varied
+from tetra_drake.settings.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
 

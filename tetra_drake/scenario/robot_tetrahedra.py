@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.quantities import (
+from tetra_drake.settings.quantities import (
     Acceleration,
     Damping,
     Density,
@@ -20,8 +20,8 @@ from tetra_drake.scenario.quantities import (
     Position,
     Stiffness,
 )
-from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.section import Section, Tree, Varied
+from tetra_drake.settings.refusals import refuse
+from tetra_drake.settings.section import Section, Tree, Varied
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
 """Names of the nodes of a tetrahedron. The first three form the base triangle."""

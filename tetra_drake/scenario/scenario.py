@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.formatting import Table, heading_html
+from tetra_drake.laws.friction import Friction
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
@@ -27,18 +28,17 @@ from tetra_drake.scenario.common_sections import (
     separate,
 )
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
-from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.quantities import UnitsByName
-from tetra_drake.scenario.refusals import TAG, hint, refuse
 from tetra_drake.scenario.robot_structure import Robot
-from tetra_drake.scenario.section import Section, Tree, flattened, written
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.strut_contact_kinds import NoStrutContact, StrutContactKind
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
-from tetra_drake.scenario.units import Units, plainest, rounded_in_text, shortest, units_for
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
+from tetra_drake.settings.quantities import UnitsByName
+from tetra_drake.settings.refusals import TAG, hint, refuse
+from tetra_drake.settings.section import Section, Tree, flattened, written
+from tetra_drake.settings.units import Units, plainest, rounded_in_text, shortest, units_for
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
 

@@ -12,12 +12,12 @@ from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.ntrt_assembly import MOST_BYTES
 from tetra_drake.scenario.ntrt_file import NtrtFile
-from tetra_drake.scenario.refusals import TAG, described, no_such
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.section import Tree, keys_of
 from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
-from tetra_drake.scenario.units import given_quantity
 from tetra_drake.scenario.yaml_text import read_mapping
+from tetra_drake.settings.refusals import TAG, described, no_such
+from tetra_drake.settings.section import Tree, keys_of
+from tetra_drake.settings.units import given_quantity
 
 _LOG = logging.getLogger("tetra_drake")
 _KIND = StructureFile.tag

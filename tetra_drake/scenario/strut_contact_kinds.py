@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from tetra_drake.scenario.quantities import InverseSpeed, Stiffness
-from tetra_drake.scenario.section import Kinds, Section
+from tetra_drake.settings.quantities import InverseSpeed, Stiffness
+from tetra_drake.settings.section import Kinds, Section
 
 if TYPE_CHECKING:
     from tetra_drake.laws.capsules import Search, StrutContactLaw

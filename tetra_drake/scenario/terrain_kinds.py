@@ -14,10 +14,10 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.height_files import HeightFile
-from tetra_drake.scenario.kind_text import settings_text
-from tetra_drake.scenario.quantities import Angle, Length
-from tetra_drake.scenario.section import Kinds, Section
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.kind_text import settings_text
+from tetra_drake.settings.quantities import Angle, Length
+from tetra_drake.settings.section import Kinds, Section
+from tetra_drake.settings.units import INCH
 
 BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
 """Least reach of generated grids from the origin: backward, forward, sideways; in m."""

@@ -14,8 +14,8 @@ from yamlcore.loader import CommonResolver
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.scenario.refusals import TAG
-from tetra_drake.scenario.section import Tree
+from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.section import Tree
 
 
 def parse_yaml(content: str, source: object) -> Any:

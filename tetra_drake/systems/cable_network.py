@@ -22,7 +22,7 @@ from tetra_drake.laws import actuator, cable, kinematics
 from tetra_drake.laws.forces import Forces, compute_cable_forces
 from tetra_drake.laws.model import Model
 from tetra_drake.scenario.actuator_kinds import Actuation, ActuatorKind, DrivenCables, Force
-from tetra_drake.scenario.refusals import hint
+from tetra_drake.settings.refusals import hint
 from tetra_drake.systems.attachment import (
     Attach,
     Nodes,

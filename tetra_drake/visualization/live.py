@@ -13,7 +13,7 @@ from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.settings.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import (
     add_robot,

@@ -25,7 +25,7 @@ from tetra_drake.robot.path import follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metrics import looks_for_turns
-from tetra_drake.scenario.units import Units
+from tetra_drake.settings.units import Units
 from tetra_drake.visualization.scene import (
     COLOURS,
     add_robot,

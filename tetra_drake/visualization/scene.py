@@ -16,7 +16,7 @@ from tetra_drake.robot.bodies import strut_pose
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.units import INCH, Units
+from tetra_drake.settings.units import INCH, Units
 
 if TYPE_CHECKING:
     import xarray

@@ -11,12 +11,12 @@ from tetra_drake.engines.compiled.dynamics import accelerate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.friction import Coulomb, ResetIntegrator
 from tetra_drake.laws.kinematics import move_bodies
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Model
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure

@@ -24,6 +24,7 @@ from tetra_drake.errors import (
     StepBudgetExceeded,
     TimeBudgetExceeded,
 )
+from tetra_drake.laws.friction import Coulomb
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
@@ -31,7 +32,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import TensionMotor, Winch
 from tetra_drake.scenario.common_sections import PATHWAYS, Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.strut_contact_kinds import HuntCrossley

@@ -16,8 +16,8 @@ from pydantic import Field
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
-from tetra_drake.scenario.refusals import described, hint, refuse
-from tetra_drake.scenario.units import plainest, quantity_to_si
+from tetra_drake.settings.refusals import described, hint, refuse
+from tetra_drake.settings.units import plainest, quantity_to_si
 
 Info = core_schema.ValidationInfo
 

@@ -21,8 +21,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.quantities import Quantity, unit_of
-from tetra_drake.scenario.refusals import TAG, described, hint, refuse
+from tetra_drake.settings.quantities import Quantity, unit_of
+from tetra_drake.settings.refusals import TAG, described, hint, refuse
 
 Tree = dict[str, Any]
 Show = Callable[[float, str], str]

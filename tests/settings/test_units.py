@@ -7,7 +7,7 @@ import pytest
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.scenario.units import SYSTEMS, Units, plainest, quantity_to_si, shown_in
+from tetra_drake.settings.units import SYSTEMS, Units, plainest, quantity_to_si, shown_in
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
 # standard gravity (9.80665 m/s^2), whose product is the pound-force.

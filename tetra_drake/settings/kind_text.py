@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from tetra_drake.scenario.section import Section, written
-from tetra_drake.scenario.units import plainest
+from tetra_drake.settings.section import Section, written
+from tetra_drake.settings.units import plainest
 
 
 def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:

@@ -8,9 +8,9 @@ import yaml
 from pydantic import Field
 
 from tetra_drake.scenario.changes import merged
-from tetra_drake.scenario.quantities import Angle, Length, UnitsByName
-from tetra_drake.scenario.section import Kinds, Section, written
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
+from tetra_drake.settings.quantities import Angle, Length, UnitsByName
+from tetra_drake.settings.section import Kinds, Section, written
 
 
 class Flat(Section):

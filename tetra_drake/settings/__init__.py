@@ -1,0 +1,1 @@
+"""Settings: sections with units, tagged kinds, and errors of one line."""
