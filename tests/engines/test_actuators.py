@@ -20,11 +20,11 @@ from scipy.linalg import expm
 
 from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.interface import engine_of
+from tetra_drake.laws.actuator import Actuation, TensionMotor, Winch
 from tetra_drake.laws.cable import PASSIVE
 from tetra_drake.laws.inertia import XX
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.actuator_kinds import Actuation, TensionMotor, Winch
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.scenario import Scenario
 

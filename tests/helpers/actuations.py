@@ -1,6 +1,6 @@
 """Actuators for tests."""
 
-from tetra_drake.scenario.actuator_kinds import TensionMotor, Winch
+from tetra_drake.laws.actuator import TensionMotor, Winch
 
 LAW = {"max_force": "10 N", "max_speed": "0.5 m/s", "time_constant": "20 ms"}
 

@@ -5,10 +5,10 @@ from types import MappingProxyType
 
 from helpers.anchored import BAR
 from helpers.converged import shortly
+from tetra_drake.laws.capsules import HuntCrossley
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.strut_contact_kinds import HuntCrossley
 
 RADIUS = 0.5 * BAR["diameter"]
 """Radius of a bar in m."""

@@ -28,9 +28,10 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
+from pydantic import Field
 
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled, inlined
@@ -58,6 +59,8 @@ from tetra_drake.laws.vectors import (
     sum_of,
     vector_at,
 )
+from tetra_drake.settings.quantities import InverseSpeed, Stiffness
+from tetra_drake.settings.section import Kinds, Section
 
 PARALLEL = 0.01
 """Angle (rad) of two struts below which they count as thicker in the middle."""
@@ -287,3 +290,32 @@ def depth_rate(struts: Struts, nodes: Table, i: int, j: int, touch: Touch) -> Re
     rate_j = dot(start_j, vector_at(nodes, struts.node_a[j], kinematics.V_WN))
     rate_j += dot(end_j, vector_at(nodes, struts.node_b[j], kinematics.V_WN))
     return -(rate_i + rate_j)
+
+
+class NoStrutContact(Section):
+    """Struts pass through each other, as in the thesis."""
+
+    tag: ClassVar[str] = "Nothing"
+
+    def law(self, search: Search) -> StrutContactLaw:
+        """The law in the form of the kernels. `search` has the distances of the search."""
+        return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
+
+
+class HuntCrossley(Section):
+    """Struts touch as capsules of their radii, without friction. The force at a depth d of their
+    overlap is F = k d (1 + c d'); see laws.capsules."""
+
+    stiffness: Stiffness = Field(gt=0)
+    """Force per depth, k."""
+    dissipation: InverseSpeed = Field(ge=0)
+    """Hunt-Crossley dissipation c, as Drake's. It lowers the restitution of an impact at a low
+    speed v: e = 1 - 2/3 c v."""
+
+    def law(self, search: Search) -> StrutContactLaw:
+        """The law in the form of the kernels. `search` has the distances of the search."""
+        normal = NormalForce(self.stiffness, damping=self.stiffness * self.dissipation)
+        return StrutContactLaw(acts=True, normal=np.array(normal), search=np.array(search))
+
+
+StrutContactKind = Annotated[NoStrutContact | HuntCrossley, Kinds()]

@@ -10,10 +10,10 @@ import pandas
 import xarray
 
 from tetra_drake.laws import actuator
+from tetra_drake.laws.actuator import DrivenCables
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.actuator_kinds import DrivenCables
 
 _TOLERANCE = 1e-9
 """Distance (m or N) from a limit that still counts as at the limit. Without it, the tension of a

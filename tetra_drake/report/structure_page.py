@@ -13,12 +13,12 @@ import numpy as np
 from tetra_drake.analysis.equilibrium import EquilibriumStudy
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed, rounded
+from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.robot import BEARS, Robot, overlaps, undisturbed_structure
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures

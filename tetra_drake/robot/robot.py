@@ -14,6 +14,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import cable
+from tetra_drake.laws.actuator import DrivenCables
 from tetra_drake.laws.capsules import NearStruts, find_near_struts, find_touch
 from tetra_drake.laws.contact import MODE_COLUMNS, Ground, NormalForce
 from tetra_drake.laws.feedback import Senses
@@ -27,7 +28,6 @@ from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import START_DEPTH, make_ground
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions, turn_with_slope
 from tetra_drake.robot.weights import Weights
-from tetra_drake.scenario.actuator_kinds import DrivenCables
 from tetra_drake.scenario.common_sections import CpgSection
 from tetra_drake.scenario.metrics import looks_for_distance
 from tetra_drake.scenario.scenario import Scenario

@@ -13,6 +13,7 @@ import numpy as np
 
 from tetra_drake.files import json_number
 from tetra_drake.formatting import Table
+from tetra_drake.laws.actuator import LIMITS
 from tetra_drake.laws.curves import curvature, travelling_index
 from tetra_drake.settings.units import INCH, INCHES, Units, current
 
@@ -25,7 +26,7 @@ by a fifth of a millimetre."""
 
 LEAST_WAY = 1e-3
 """Least way (m) of a robot in the computation of its cost of transport."""
-ROW, LIMITS = "row of tetrahedra", "limited actuators"
+ROW = "row of tetrahedra"
 """Properties of robots that some metrics need."""
 
 

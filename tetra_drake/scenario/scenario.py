@@ -15,8 +15,9 @@ from pydantic import Field, model_validator
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.formatting import Table, heading_html
+from tetra_drake.laws.actuator import Actuation, Force
+from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.friction import Friction
-from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
     CpgSection,
@@ -32,7 +33,6 @@ from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_structure import Robot
 from tetra_drake.scenario.structure_files import with_structure
-from tetra_drake.scenario.strut_contact_kinds import NoStrutContact, StrutContactKind
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import UnitsByName

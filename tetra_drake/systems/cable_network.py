@@ -19,9 +19,9 @@ from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import actuator, cable, kinematics
+from tetra_drake.laws.actuator import Actuation, ActuatorKind, DrivenCables, Force
 from tetra_drake.laws.forces import Forces, compute_cable_forces
 from tetra_drake.laws.model import Model
-from tetra_drake.scenario.actuator_kinds import Actuation, ActuatorKind, DrivenCables, Force
 from tetra_drake.settings.refusals import hint
 from tetra_drake.systems.attachment import (
     Attach,
