@@ -31,9 +31,9 @@ from one_tetrahedron import BASE, Samples, let_go, make_standing_tetrahedron, st
 
 from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure, save_figure
 from tetra_drake.laws.friction import Coulomb
+from tetra_drake.laws.terrain import Incline
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
 GENTLE, STEEP = math.radians(10.0), math.radians(35.0)

@@ -28,6 +28,7 @@ from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluat
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.laws.friction import Coulomb
+from tetra_drake.laws.terrain import Flat, Rough
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.results.metrics import unmet_requirements
@@ -38,7 +39,6 @@ from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.settings.units import INCH
 
 SCHEMA = 6

@@ -16,8 +16,8 @@ from tetra_drake.evolution.manifest import write_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.laws.terrain import Steps
 from tetra_drake.optimizers.steady_state import SteadyState
-from tetra_drake.scenario.terrain_kinds import Steps
 
 
 @pytest.fixture

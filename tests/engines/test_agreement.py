@@ -19,10 +19,10 @@ from helpers.converged import CONVERGED, shortly
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.laws.friction import Coulomb
+from tetra_drake.laws.terrain import Flat, Incline, Obstacles, Rough, Steps
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import WALKING_SEED, Gains, Gait, seeded_gait
-from tetra_drake.scenario import terrain_kinds
 from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
@@ -59,11 +59,11 @@ KEPT = {"reset": "never", "breaks_free": "both", "stiffness": "0.3 lbf/in", "loa
 RESET = {"reset": {}, "kept": KEPT, "range": {"reset": "range"}}
 LAWS = RESET | {"coulomb": COULOMB, "firm": FIRM}
 TERRAINS = {
-    "incline": terrain_kinds.Incline(slope=np.radians(5.0)),
+    "incline": Incline(slope=np.radians(5.0)),
     # Steps are where the robot meets them at once.
-    "steps": terrain_kinds.Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
-    "rough": terrain_kinds.Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
-    "obstacles": terrain_kinds.Obstacles(
+    "steps": Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
+    "rough": Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+    "obstacles": Obstacles(
         height=0.25 * INCH, radius=1.0 * INCH, spacing=2.5 * INCH, start=14.0 * INCH
     ),
 }
@@ -284,7 +284,7 @@ def sets() -> Iterable[Any]:
     # On Coulomb friction, where errors are below 0.001 in. Under the reset integrator, distances
     # hang on whether a foot just slips.
     diagram = Drake(accuracy=1e-4, max_step=2e-3)
-    for terrain, surface in {"flat": terrain_kinds.Flat(), **TERRAINS}.items():
+    for terrain, surface in {"flat": Flat(), **TERRAINS}.items():
         changes = {"terrain": surface, "simulation.max_evaluations": 10**8, "friction": COULOMB}
         changes |= {"robot.contacts": "all"} if terrain != "flat" else {}
         yield pytest.param(Set("thesis", changes, (FINE[0], diagram), 0.05, 0.2), id=terrain)

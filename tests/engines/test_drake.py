@@ -10,12 +10,12 @@ from pydrake.systems.framework import Context
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.sampler import Sampler
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.trajectory import make_dataset
 from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 PORTS = {"signal": "signals", "tension": "tensions", "length": "lengths"}

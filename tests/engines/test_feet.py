@@ -16,20 +16,19 @@ from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
-from tetra_drake.laws.contact import MODE_COLUMNS, sliding
+from tetra_drake.laws.contact import MODE_COLUMNS, GroundSection, sliding
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.mode_change import modes_after_step
+from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.sdf import make_sdf
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.common_sections import GroundSection
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.systems import AddGroundContact
 
 G, RADIUS, SLOPE = 9.80665, 0.1, math.radians(10.0)

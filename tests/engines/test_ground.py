@@ -11,6 +11,7 @@ from pydrake.systems.analysis import Simulator
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.friction import Coulomb
+from tetra_drake.laws.terrain import Incline, Rough
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import ground_frames
 from tetra_drake.robot.robot import Robot, make_structure
@@ -18,7 +19,6 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Incline, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 INCH = 0.0254

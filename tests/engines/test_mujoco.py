@@ -13,13 +13,13 @@ from tetra_drake.engines.mjcf import loose_remark
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.laws.friction import Coulomb
+from tetra_drake.laws.terrain import Incline
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
 NO_BRISTLES = {"friction": Coulomb()}

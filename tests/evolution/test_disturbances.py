@@ -18,11 +18,11 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import InLanes
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
+from tetra_drake.laws.terrain import Steps
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
-from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"robot.cables.outer_stiffness": 0.05}
 SEED = (5, 0, 3)

@@ -7,11 +7,11 @@ from typing import Any
 from helpers.converged import shortly
 from helpers.structures import SIDES_ALONE
 from tetra_drake.laws.capsules import NoStrutContact
+from tetra_drake.laws.terrain import Nothing
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.scenario.terrain_kinds import Nothing
 
 BAR: dict[str, Any] = {"pairs": [["a", "b"]], "diameter": 0.008, "density": 1200.0}
 BAR |= {"node_diameter": 0.0, "contact_radius": 0.0}

@@ -6,8 +6,8 @@ from helpers.robot_on_ground import RobotOnGround
 
 from tetra_drake.laws.contact import HEADING, MODE
 from tetra_drake.laws.friction import Coulomb, ResetConstants, first_zero
+from tetra_drake.laws.terrain import Flat, Incline
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat, Incline
 
 SLOPE = 0.2
 R = np.array([[np.cos(SLOPE), 0, -np.sin(SLOPE)], [0, 1, 0], [np.sin(SLOPE), 0, np.cos(SLOPE)]])

@@ -4,13 +4,23 @@ import numpy as np
 import pytest
 
 from tetra_drake.laws.contact import Ground
-from tetra_drake.laws.terrain import GAP, N_X, T1_X, T2_Y, SurfaceGrid, surface
+from tetra_drake.laws.terrain import (
+    GAP,
+    N_X,
+    T1_X,
+    T2_Y,
+    HeightField,
+    Incline,
+    Rough,
+    Steps,
+    SurfaceGrid,
+    surface,
+)
 from tetra_drake.robot.ground import ground_frames, ground_heights, make_ground
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import HeightField, Incline, Rough, Steps
 
 INCH = 0.0254
 ROUGH = Rough(amplitude=0.5 * INCH, wavelength=5.0 * INCH, seed=3)

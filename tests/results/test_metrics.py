@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.totals import make_totals
 
+from tetra_drake.laws.terrain import Incline, Rough
 from tetra_drake.results.metrics import (
     compute_fitness,
     compute_metrics,
@@ -19,7 +20,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Incline, Rough
 
 INCH = 0.0254
 

@@ -9,12 +9,12 @@ from helpers.quantities import with_unit
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.friction import Coulomb
+from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP
-from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
 

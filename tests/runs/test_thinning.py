@@ -11,9 +11,9 @@ from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.laws.terrain import HeightField
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.scenario.terrain_kinds import HeightField
 
 AGAIN, ALONE, EDGE, BEYOND = range(20, 24)
 """Evaluations that nothing else makes matter: reevaluated; alone in its cell of the map, and one

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import NdBSpline
 
-from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
-from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import (
+from tetra_drake.laws.terrain import (
     Grid,
     HeightField,
     Incline,
@@ -17,6 +15,8 @@ from tetra_drake.scenario.terrain_kinds import (
     Steps,
     Terrain,
 )
+from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
+from tetra_drake.scenario.scenario import Scenario
 
 IN = 0.0254
 AHEAD = 20.0 * IN

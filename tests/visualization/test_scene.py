@@ -8,10 +8,10 @@ from helpers.meshcat_page import commands
 from matplotlib.colors import hex2color
 from pydrake.geometry import MeshcatParams
 
+from tetra_drake.laws.terrain import Incline, Rough, Steps
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.settings.units import INCH, INCHES
 from tetra_drake.visualization import scene
 from tetra_drake.visualization.replay import quiet_meshcat

@@ -19,10 +19,10 @@ from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import pull_cables
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces
+from tetra_drake.laws.terrain import Incline
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain_kinds import Incline
 
 FUNCTIONS = 380
 """Number of functions that numba compiles in prepare(), roughly."""

@@ -38,9 +38,9 @@ from tetra_drake.evolution.manifest import (
     write_manifest,
 )
 from tetra_drake.files import check_file, check_folder, make_folder
+from tetra_drake.laws.height_files import RECORDED
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.robot.gait import Gait, Vector, save_gait
-from tetra_drake.scenario.height_files import RECORDED
 from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
 

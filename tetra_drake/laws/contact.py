@@ -22,9 +22,10 @@ The laws use the frames of `terrain`. On flat ground these are the axes of the w
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
+from pydantic import Field
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import (
@@ -40,6 +41,8 @@ from tetra_drake.kernels.lanes import (
 )
 from tetra_drake.laws import friction, kinematics, terrain
 from tetra_drake.laws.vectors import cross, difference, put_vector, sum_of, vector_at
+from tetra_drake.settings.quantities import DampingPerLength, Stiffness
+from tetra_drake.settings.section import Section, Varied
 
 CONTACT, MODE, STICK_POINT, HEADING, ORIENTATION, MODE_COLUMNS = 0, 1, 3, 6, 8, 12
 """Columns of the table `modes`, and their number: contact (0 or 1), friction mode (along t1, t2),
@@ -48,6 +51,16 @@ stick point (x, y, z) in m, heading (along t1, t2), orientation (inverse quatern
 FRICTION_1, FRICTION_2, NORMAL, GROUND_FORCE_COLUMNS = range(4)
 """Columns of the table `ground_forces` (contacts, 3), and their number: friction along t1 and t2,
 normal force (N)."""
+
+
+class GroundSection(Section):
+    """The normal force (Table 1)."""
+
+    stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    """Normal force per penetration of a node."""
+    damping: Annotated[DampingPerLength, Varied()] = Field(ge=0)
+    """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
+    speed v: e = 1 - alpha v (Eq. 2)."""
 
 
 class NormalForce(NamedTuple):

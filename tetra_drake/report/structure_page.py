@@ -15,6 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed, rounded
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.laws.terrain import Flat
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.robot import BEARS, Robot, overlaps, undisturbed_structure
@@ -23,7 +24,6 @@ from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
-from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.settings.refusals import no_such
 from tetra_drake.visualization.replay import save_replay
 

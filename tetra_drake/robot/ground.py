@@ -6,13 +6,12 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws import terrain
-from tetra_drake.laws.contact import Ground, NormalForce
+from tetra_drake.laws.contact import Ground, GroundSection, NormalForce
 from tetra_drake.laws.friction import FrictionKind
 from tetra_drake.laws.kinematics import NODE_COLUMNS, P_WN
+from tetra_drake.laws.terrain import Grid, Relief
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.common_sections import GroundSection
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Grid, Relief
 from tetra_drake.settings.units import INCH
 
 STEP_AHEAD = 1.0 * INCH

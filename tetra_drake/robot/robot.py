@@ -22,6 +22,7 @@ from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Bodies, Model
 from tetra_drake.laws.oscillator import Network, steered_input
+from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.elastic_struts import axial_forces, elastic_struts, with_elongations
 from tetra_drake.robot.equilibrium import Equilibrium, Unactuated, find_equilibrium
 from tetra_drake.robot.gait import Gait, check_gait
@@ -31,7 +32,6 @@ from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.common_sections import CpgSection
 from tetra_drake.scenario.metrics import looks_for_distance
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat
 
 AMPLITUDE = 0.5
 """Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""

@@ -12,9 +12,9 @@ from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tetra_drake.settings.quantities import DampingPerLength, Force, Speed, Stiffness, Time
+from tetra_drake.settings.quantities import Force, Speed, Time
 from tetra_drake.settings.refusals import refuse
-from tetra_drake.settings.section import Section, Varied
+from tetra_drake.settings.section import Section
 
 Value = TypeVar("Value")
 
@@ -30,16 +30,6 @@ class Gains(Section):
     length: float = 0.0
     load: float = 0.0
     pitch: float = 0.0
-
-
-class GroundSection(Section):
-    """The normal force (Table 1)."""
-
-    stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    """Normal force per penetration of a node."""
-    damping: Annotated[DampingPerLength, Varied()] = Field(ge=0)
-    """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
-    speed v: e = 1 - alpha v (Eq. 2)."""
 
 
 class CpgSection(Section):

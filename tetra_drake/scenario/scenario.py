@@ -17,14 +17,15 @@ from tetra_drake.files import read_text
 from tetra_drake.formatting import Table, heading_html
 from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
+from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
+from tetra_drake.laws.terrain import Flat, Terrain
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
     CpgSection,
     Disturbances,
     EvolutionSection,
     GaitBounds,
-    GroundSection,
     SimulationSection,
     separate,
 )
@@ -33,7 +34,6 @@ from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_structure import Robot
 from tetra_drake.scenario.structure_files import with_structure
-from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import UnitsByName
 from tetra_drake.settings.refusals import TAG, hint, refuse
