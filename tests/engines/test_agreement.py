@@ -18,12 +18,12 @@ from helpers.converged import CONVERGED, shortly
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat, Incline, Obstacles, Rough, Steps
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import WALKING_SEED, Gains, Gait, seeded_gait
-from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS

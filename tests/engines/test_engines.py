@@ -12,13 +12,13 @@ from helpers.converged import shortly
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, StepBudgetExceeded
+from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough, Steps
 from tetra_drake.results.measures import path_of_centre
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import make_structure
-from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH

@@ -14,17 +14,34 @@ shifts the signal to one side. Feedback with equal signs excites or calms both n
 The input of a sense must be smooth within a step of an integrator. Contact with the ground jumps;
 normal forces do not.
 
-To add a pathway: name it, with its gain, in scenario.common_sections, and add its part to sense().
+To add a pathway: name it in Pathway and Gains, in the same order, and add its part to sense().
 A constant of the robot is a field of Senses, which robot.robot fills in.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.laws import cable, contact
+from tetra_drake.settings.section import Section
+
+Pathway = Literal["length", "load", "pitch"]
+"""A signal that can be fed back to the oscillators; as described above."""
+
+PATHWAYS: tuple[str, ...] = get_args(Pathway)
+
+LENGTH, LOAD, PITCH = range(len(PATHWAYS))
+"""Indices of the pathways in tables of gains."""
+
+
+class Gains(Section):
+    """Gain of each pathway of feedback in a gait, in units of the input u0."""
+
+    length: float = 0.0
+    load: float = 0.0
+    pitch: float = 0.0
 
 
 class Senses(NamedTuple):
@@ -59,7 +76,7 @@ def sense(
 ) -> None:
     """Writes the feedback of each neuron (2m,), from the state of the bodies and its forces.
 
-    `gains` are in the order of common_sections.Gains. `cable_forces` and `ground_forces` are the
+    `gains` are in the order of PATHWAYS. `cable_forces` and `ground_forces` are the
     tables of `cable` and `contact`.
     """
     for i in range(feedback.size):
@@ -75,8 +92,8 @@ def sense(
                 load += ground_forces[c, contact.NORMAL]
         q = 7 * body
         pitch = 2.0 * (state[q + 1] * state[q + 3] - state[q] * state[q + 2])
-        differs = gains[0] * feedback[2 * k]
-        differs += gains[2] * pitch
-        same = gains[1] * (senses.per_load[0] * load)
+        differs = gains[LENGTH] * feedback[2 * k]
+        differs += gains[PITCH] * pitch
+        same = gains[LOAD] * (senses.per_load[0] * load)
         feedback[2 * k] = same + differs
         feedback[2 * k + 1] = same - differs

@@ -12,19 +12,57 @@ y_extensor - y_flexor.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field, model_validator
 
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, select
+from tetra_drake.laws.feedback import Pathway
+from tetra_drake.settings.quantities import Force, Time
+from tetra_drake.settings.refusals import refuse
+from tetra_drake.settings.section import Section
 
 Array = np.ndarray
 
 U, V, U_RATE, V_RATE, Y, U_START, V_START, U_SUM, V_SUM, NEURON_COLUMNS = range(10)
 """Columns of the table `neurons` (2n, 9), and their number: inner state u, self-inhibition v, their
 rates (1/s), output y, u and v at the beginning of a step, sums of their rates."""
+
+
+class CpgSection(Section):
+    """The Matsuoka oscillators (Table 4) and how their signal reaches the cables."""
+
+    self_inhibition_weight: float = Field(ge=0)
+    """Weight beta of the self-inhibition v."""
+    external_input: float
+    """Tonic input u0 of all neurons."""
+    initial_state: Annotated[list[float], Field(min_length=3, max_length=3)]
+    """Initial values: u of every neuron, v of the extensors, v of the flexors."""
+    partner_weight: float = Field(ge=0)
+    """Weight of the inhibition between extensor and flexor of an oscillator."""
+    gain: Force
+    """Force per unit of y_extensor - y_flexor."""
+    start_up: Time = Field(ge=0)
+    """Time until which the cables are not actuated."""
+    signals: Literal["listing", "live"]
+    """`listing`: forward Euler beforehand, as in the thesis's listing. `live`: the network is
+    integrated with the robot. Feedback needs `live`."""
+    listing_step: Time = Field(ge=1e-6)
+    """Time step of signals that are computed beforehand."""
+    reach: int | None = Field(default=None, ge=0)
+    """Oscillators at most this far apart inhibit each other (see Blueprint.distances); all if not
+    given."""
+    feedback: list[Pathway] = Field(default=[])
+    """Pathways of feedback; their gains are parameters of the gait."""
+
+    @model_validator(mode="after")
+    def _check(self) -> CpgSection:
+        if self.feedback and self.signals != "live":
+            refuse("signals", f"found '{self.signals}', expected 'live' for feedback")
+        return self
 
 
 class Network(NamedTuple):

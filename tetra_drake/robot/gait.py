@@ -14,8 +14,8 @@ from pydantic import Field
 from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import Table, heading_html
+from tetra_drake.laws.feedback import Gains
 from tetra_drake.robot.weights import KINDS, Weights
-from tetra_drake.scenario.common_sections import Gains
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section

@@ -21,7 +21,7 @@ from tetra_drake.laws.feedback import Senses
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Bodies, Model
-from tetra_drake.laws.oscillator import Network, steered_input
+from tetra_drake.laws.oscillator import CpgSection, Network, steered_input
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.elastic_struts import axial_forces, elastic_struts, with_elongations
 from tetra_drake.robot.equilibrium import Equilibrium, Unactuated, find_equilibrium
@@ -29,7 +29,6 @@ from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import START_DEPTH, make_ground
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions, turn_with_slope
 from tetra_drake.robot.weights import Weights
-from tetra_drake.scenario.common_sections import CpgSection
 from tetra_drake.scenario.metrics import looks_for_distance
 from tetra_drake.scenario.scenario import Scenario
 

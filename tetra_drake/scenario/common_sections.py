@@ -8,61 +8,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Literal, TypeVar, get_args
+from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tetra_drake.settings.quantities import Force, Speed, Time
+from tetra_drake.settings.quantities import Speed, Time
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
 
 Value = TypeVar("Value")
-
-Pathway = Literal["length", "load", "pitch"]
-"""A signal that can be fed back to the oscillators; see laws.feedback."""
-
-PATHWAYS: tuple[str, ...] = get_args(Pathway)
-
-
-class Gains(Section):
-    """Gain of each pathway of feedback in a gait, in units of the input u0."""
-
-    length: float = 0.0
-    load: float = 0.0
-    pitch: float = 0.0
-
-
-class CpgSection(Section):
-    """The Matsuoka oscillators (Table 4) and how their signal reaches the cables."""
-
-    self_inhibition_weight: float = Field(ge=0)
-    """Weight beta of the self-inhibition v."""
-    external_input: float
-    """Tonic input u0 of all neurons."""
-    initial_state: Annotated[list[float], Field(min_length=3, max_length=3)]
-    """Initial values: u of every neuron, v of the extensors, v of the flexors."""
-    partner_weight: float = Field(ge=0)
-    """Weight of the inhibition between extensor and flexor of an oscillator."""
-    gain: Force
-    """Force per unit of y_extensor - y_flexor."""
-    start_up: Time = Field(ge=0)
-    """Time until which the cables are not actuated."""
-    signals: Literal["listing", "live"]
-    """`listing`: forward Euler beforehand, as in the thesis's listing. `live`: the network is
-    integrated with the robot. Feedback needs `live`."""
-    listing_step: Time = Field(ge=1e-6)
-    """Time step of signals that are computed beforehand."""
-    reach: int | None = Field(default=None, ge=0)
-    """Oscillators at most this far apart inhibit each other (see Blueprint.distances); all if not
-    given."""
-    feedback: list[Pathway] = Field(default=[])
-    """Pathways of feedback; their gains are parameters of the gait."""
-
-    @model_validator(mode="after")
-    def _check(self) -> CpgSection:
-        if self.feedback and self.signals != "live":
-            refuse("signals", f"found '{self.signals}', expected 'live' for feedback")
-        return self
 
 
 class GaitBounds(Section):

@@ -19,10 +19,10 @@ from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
+from tetra_drake.laws.oscillator import CpgSection
 from tetra_drake.laws.terrain import Flat, Terrain
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
-    CpgSection,
     Disturbances,
     EvolutionSection,
     GaitBounds,

@@ -50,7 +50,7 @@ class CableNetwork(LeafSystem):
     | tensions          | (cables,)      | N      | tension of each cable                    |
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (cables,)      | m/s    | rate of each cable's length              |
-    | cable_forces      | (7 cables,)    | SI     | table of laws.cable, row by row       |
+    | cable_forces      | (7 cables,)    | SI     | table of laws.cable, row by row          |
     | ends              | (6 cables,)    | m      | positions of the two ends, by cable      |
     | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 

@@ -19,8 +19,8 @@ class Feedback(LeafSystem):
     | port          | shape         | unit | meaning                                               |
     |---------------|---------------|------|-------------------------------------------------------|
     | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
-    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables   |
-    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground |
+    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables      |
+    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground    |
     | feedback      | (2m,)         | 1    | f of Eq. 7 for the neurons of m oscillators           |
     """
 

@@ -47,7 +47,7 @@ class GroundContact(LeafSystem):
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
     |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
-    | ground_forces     | (3 m,)  | N      | table of laws.contact, row by row              |
+    | ground_forces     | (3 m,)  | N      | table of laws.contact, row by row                 |
 
     On flat ground t1 and t2 are x and y; otherwise see `laws.terrain`; `laws.friction`
     explains modes.

@@ -26,13 +26,14 @@ from tetra_drake.errors import (
 )
 from tetra_drake.laws.actuator import TensionMotor, Winch
 from tetra_drake.laws.capsules import HuntCrossley
+from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.common_sections import PATHWAYS, Disturbances
+from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
