@@ -83,7 +83,7 @@ class Constants(NamedTuple):
     """Side of each neuron (2n,) for n oscillators: 1 left, -1 right, 0 neither."""
     external_input: Table
     gains: Table
-    """Feedback gains, in the order of common_sections.Gains."""
+    """Feedback gains, in the order of feedback.PATHWAYS."""
     gain: Table
     """Force (N) per unit of an oscillator's output."""
     period: Table
