@@ -12,10 +12,9 @@ from tetra_drake.laws.friction import (
     ResetConstants,
     Slide,
     TangentSlide,
-    begins_to_stick,
     coulomb_damping,
     coulomb_force,
-    kept_deflection,
+    friction_force,
     next_coulomb_mode,
     next_reset_mode,
     reset_force,
@@ -69,25 +68,29 @@ def test_friction_is_proportional_to_the_load_where_a_load_is_given():
 )
 def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
     moving = slide(v=(0.0, velocity), x=(0.0, deflection), mode=(STICK, mode))
-    assert next_reset_mode(moving, RESET) == (STICK, after)
+    assert next_reset_mode(moving, RESET).mode == (STICK, after)
 
 
 def test_a_joint_law_breaks_free_along_both_tangents_and_holds_each_deflection():
     moving = slide(v=(0.01, -0.01), x=(P0, -0.25 * P0))
-    assert next_reset_mode(moving, RESET) == (1.0, STICK)
-    assert next_reset_mode(moving, RESET._replace(joint=1.0)) == (1.0, -0.25)
+    assert next_reset_mode(moving, RESET).mode == (1.0, STICK)
+    assert next_reset_mode(moving, RESET._replace(joint=1.0)).mode == (1.0, -0.25)
     inward = slide(v=(0.01, 0.01), x=(P0, -0.25 * P0))
-    assert next_reset_mode(inward, RESET._replace(joint=1.0)) == (1.0, STICK)
+    assert next_reset_mode(inward, RESET._replace(joint=1.0)).mode == (1.0, STICK)
 
 
 def test_the_deflection_starts_again_at_the_range_or_is_kept_at_a_reversal():
     at_range, reversed_slip = slide(v=(0.01, 0.0), x=(P0, 0.0)), slide(v=(-0.01, 0.0), mode=(1, 0))
-    restarts = FrictionLaw.of(RESET._replace(restarts=1.0))
-    assert next_reset_mode(at_range, RESET._replace(restarts=1.0)) == (STICK, STICK)
-    assert begins_to_stick(at_range, (STICK, STICK), restarts) == (True, False)
+    due = next_reset_mode(at_range, RESET._replace(restarts=1.0))
+    assert due.mode == (STICK, STICK) and due.begins == (True, False)
     for law, kept in ((RESET, 0.0), (RESET._replace(kept=1.0), P0)):
-        assert begins_to_stick(reversed_slip, (STICK, STICK), FrictionLaw.of(law)) == (True, False)
-        assert kept_deflection((1.0, STICK), FrictionLaw.of(law)) == (kept, 0.0)
+        due = next_reset_mode(reversed_slip, law)
+        assert due.begins == (True, False) and due.bend == (kept, 0.0)
+
+
+def test_an_unknown_law_is_refused():
+    with pytest.raises(ValueError, match="unknown law"):
+        friction_force(FrictionLaw(2, np.array(RESET)), slide())
 
 
 # Coulomb friction.
@@ -135,7 +138,7 @@ def test_slow_slip_is_viscous_and_forgets_the_bristle():
 )
 def test_breaks_free_beyond_the_static_limit_and_sticks_below_the_kinetic_one(v, x, before, after):
     with np.errstate(invalid="ignore"):  # a pull of 0 has no direction, and none is chosen
-        mode = next_coulomb_mode(slide(v=v, x=x, mode=before), LAW)
+        mode = next_coulomb_mode(slide(v=v, x=x, mode=before), LAW).mode
     assert mode == pytest.approx(after, abs=1e-15)
 
 

@@ -218,7 +218,8 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
     """Updates `modes` for the nodes of a state. Returns True in lanes where a mode changed.
 
     A node that lands sticks where it lands. A node that sticks again does so at its present
-    position; this is the reset of the reset integrator, unless the deflection is kept.
+    position; this is the reset of the reset integrator, unless the deflection is kept. The stick
+    point of a node in the air follows it.
     """
     changed = False
     for i in range(ground.contacts.size):
@@ -226,19 +227,19 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         if not any_lane(touched | touches):
             continue
         slide, _ = sliding(state, nodes, modes, ground, frames, i)
-        before = slide.t1.mode, slide.t2.mode
-        after = friction.next_mode(slide, touched & touches, ground.friction)
-        lands = touches & not_(touched)
+        due = friction.next_mode(ground.friction, slide)
+        stays, lands = touched & touches, touches & not_(touched)
+        after_1 = select(stays, due.mode[0], friction.STICK)
+        after_2 = select(stays, due.mode[1], friction.STICK)
         if any_lane(lands):
             set_heading(state, ground, frames, i, lands, modes)
-        begins_1, begins_2 = friction.begins_to_stick(slide, after, ground.friction)
-        sticks_here = lands | begins_1, lands | begins_2
-        bend = friction.kept_deflection(before, ground.friction)
-        move_stick_point(state, nodes, ground, frames, i, sticks_here, bend, slide, modes)
+        moves = due.begins[0] | not_(stays), due.begins[1] | not_(stays)
+        bend = select(stays, due.bend[0], 0.0), select(stays, due.bend[1], 0.0)
+        move_stick_point(state, nodes, ground, frames, i, moves, bend, slide, modes)
         modes[i, CONTACT] = select(touches, 1.0, 0.0)
-        modes[i, MODE], modes[i, MODE + 1] = after
+        modes[i, MODE], modes[i, MODE + 1] = after_1, after_2
         changed = changed | (touched ^ touches)
-        changed = changed | (after[0] != before[0]) | (after[1] != before[1])
+        changed = changed | (after_1 != slide.t1.mode) | (after_2 != slide.t2.mode)
     return changed
 
 

@@ -163,7 +163,7 @@ def add_ground_forces(
                 put_vector((0.0, 0.0, 0.0), i, contact.FRICTION_1, parts)
             continue
         slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
-        f_1, f_2 = friction_force(slide, ground.friction)
+        f_1, f_2 = friction_force(ground.friction, slide)
         f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
         if write_parts:
             put_vector((f_1, f_2, slide.normal), i, contact.FRICTION_1, parts)

@@ -30,16 +30,17 @@ friction. A node that sticks may creep, because its bristle bends. Modes are con
 of an integrator, so forces are smooth there. Modes change at the end of a step. With a law without
 stiction, nodes always stick.
 
-Both laws have the same functions of a Slide: force, damping, stuck, next mode, margin, and time to
-the next change. The functions in the last section choose the law of the ground. A further law needs
-constants, these functions, and a branch in each function of the last section.
+Both laws have the same functions of a Slide: force, damping, next mode, margin, and time to the
+next change. by_law() chooses between them. A further law needs settings, constants, these
+functions, and its line in by_law().
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -71,6 +72,8 @@ from tetra_drake.settings.units import INCH, POUND_FORCE
 
 STICK = 0.0
 """Friction mode of a node that sticks."""
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 Pair = tuple[Real, Real]
 """Components along the tangents t1 and t2."""
@@ -139,6 +142,16 @@ class Slide(NamedTuple):
     """Direction of the node's body at touchdown, a unit vector."""
     normal: Real
     """Normal force in N."""
+
+
+class NextMode(NamedTuple):
+    """Friction mode of a node at the end of a step, if it stays on the ground."""
+
+    mode: Pair
+    begins: tuple[Truth, Truth]
+    """For each tangent, True if the node begins to stick along it."""
+    bend: Pair
+    """Deflection (m) along each tangent with which it begins to stick."""
 
 
 @inlined
@@ -271,15 +284,17 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
 
 
 @inlined
-def next_reset_mode(slide: Slide, law: ResetConstants) -> Pair:
+def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
     """Next mode along each tangent; see next_tangent_mode()."""
-    slips = law.restarts == 0.0
-    breaks_1, breaks_2 = at_range(slide.t1, law) & slips, at_range(slide.t2, law) & slips
-    is_joint = law.joint != 0.0
-    return (
-        next_tangent_mode(slide.t1, breaks_1, breaks_2 & is_joint, law),
-        next_tangent_mode(slide.t2, breaks_2, breaks_1 & is_joint, law),
-    )
+    slips, is_joint = law.restarts == 0.0, law.joint != 0.0
+    ends_1, ends_2 = at_range(slide.t1, law), at_range(slide.t2, law)
+    mode_1 = next_tangent_mode(slide.t1, ends_1 & slips, ends_2 & slips & is_joint, law)
+    mode_2 = next_tangent_mode(slide.t2, ends_2 & slips, ends_1 & slips & is_joint, law)
+    begins_1 = (mode_1 == STICK) & ((slide.t1.mode != STICK) | ends_1)
+    begins_2 = (mode_2 == STICK) & ((slide.t2.mode != STICK) | ends_2)
+    kept = law.kept * law.stiction_range
+    bend = kept * slide.t1.mode, kept * slide.t2.mode
+    return NextMode((mode_1, mode_2), (begins_1, begins_2), bend)
 
 
 @inlined
@@ -323,7 +338,7 @@ def tangent_margin(slide: TangentSlide, law: ResetConstants) -> float:
 
 @inlined
 def time_to_reset_change(
-    slide: Slide, acceleration: Pair, law: ResetConstants, horizon: Real
+    slide: Slide, acceleration: Pair, normal_rate: Real, horizon: Real, law: ResetConstants
 ) -> Real:
     """Time (s) to the next mode change of the reset integrator along either tangent."""
     return minimum(
@@ -498,7 +513,7 @@ def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Re
 
 
 @inlined
-def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> Pair:
+def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
     """Next mode of Coulomb friction. A node breaks free beyond the static limit if it moves
     outward. It sticks again when the bristle's damping alone can hold it."""
     bristle = bristle_force(slide, law)
@@ -509,10 +524,10 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> Pair:
     # several.
     square_1, square_2 = select(breaks, u_1 * u_1, 1.0), select(breaks, u_2 * u_2, 0.0)
     length = math.sqrt(square_1 + square_2)
-    return (
-        select(breaks, u_1 / length, select(beyond, slide.t1.mode, STICK)),
-        select(breaks, u_2 / length, select(beyond, slide.t2.mode, STICK)),
-    )
+    mode_1 = select(breaks, u_1 / length, select(beyond, slide.t1.mode, STICK))
+    mode_2 = select(breaks, u_2 / length, select(beyond, slide.t2.mode, STICK))
+    begins = coulomb_sticks((mode_1, mode_2)) & not_(bristle.stuck)
+    return NextMode((mode_1, mode_2), (begins, begins), (0.0 * u_1, 0.0 * u_2))
 
 
 @inlined
@@ -527,7 +542,7 @@ def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
 
 @inlined
 def time_to_coulomb_change(
-    slide: Slide, acceleration: Pair, normal_rate: Real, law: CoulombConstants, horizon: Real
+    slide: Slide, acceleration: Pair, normal_rate: Real, horizon: Real, law: CoulombConstants
 ) -> Real:
     """Time (s) until the bristle's force crosses the limit, at its present rate."""
     bristle = bristle_force(slide, law)
@@ -564,91 +579,38 @@ class FrictionLaw(NamedTuple):
         return cls(LAWS.index(type(constants)), np.array(constants))
 
 
-@inlined
-def friction_force(slide: Slide, friction: FrictionLaw) -> Pair:
-    """Friction (N) along both tangents on a node that touches the ground."""
-    if friction.kind == COULOMB:
-        return coulomb_force(slide, named(CoulombConstants, friction.constants))
-    return reset_force(slide, named(ResetConstants, friction.constants))
+def by_law(reset: F, coulomb: F) -> F:
+    """Function of a FrictionLaw and other arguments, which calls the function of the law with these
+    arguments and the law's constants."""
+
+    @inlined
+    def call(friction: FrictionLaw, *more: Any) -> Any:
+        if friction.kind == COULOMB:
+            return coulomb(*more, named(CoulombConstants, friction.constants))
+        if friction.kind == RESET_INTEGRATOR:
+            return reset(*more, named(ResetConstants, friction.constants))
+        raise ValueError("unknown law of friction")
+
+    return cast(F, call)
 
 
-@inlined
-def friction_damping(slide: Slide, time: Real, friction: FrictionLaw) -> tuple[Real, Real, Real]:
-    """Stiff part of -(time d/dv + time² d/dx) of the friction: components 11, 12 and 22. `time` is
-    in s."""
-    if friction.kind == COULOMB:
-        return coulomb_damping(slide, time, named(CoulombConstants, friction.constants))
-    return reset_damping(slide, time, named(ResetConstants, friction.constants))
+friction_force = by_law(reset_force, coulomb_force)
+"""Friction (N) along both tangents on a node that touches the ground; arguments: slide."""
 
+friction_damping = by_law(reset_damping, coulomb_damping)
+"""Stiff part of -(time d/dv + time² d/dx) of the friction: components 11, 12 and 22; arguments:
+slide, time (s)."""
 
-@inlined
-def stuck_along(mode: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
-    """For each tangent, True if a mode sticks along it."""
-    if friction.kind == COULOMB:
-        stuck = coulomb_sticks(mode)
-        return stuck, stuck
-    return mode[0] == STICK, mode[1] == STICK
+next_mode = by_law(next_reset_mode, next_coulomb_mode)
+"""NextMode of a node that stays on the ground; arguments: slide."""
 
+friction_margin = by_law(reset_margin, coulomb_margin)
+"""Mode margin of a node on the ground: positive until its friction mode changes, zero at the
+change. Only the sign has a meaning. Arguments: slide."""
 
-@inlined
-def begins_to_stick(slide: Slide, after: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
-    """For each tangent, True if a node begins to stick along it, in the mode `after`."""
-    stuck_1, stuck_2 = stuck_along((slide.t1.mode, slide.t2.mode), friction)
-    sticks_1, sticks_2 = stuck_along(after, friction)
-    begins_1, begins_2 = sticks_1 & not_(stuck_1), sticks_2 & not_(stuck_2)
-    if friction.kind == COULOMB:
-        return begins_1, begins_2
-    law = named(ResetConstants, friction.constants)
-    restarts = law.restarts != 0.0
-    return (
-        begins_1 | (at_range(slide.t1, law) & restarts),
-        begins_2 | (at_range(slide.t2, law) & restarts),
-    )
-
-
-@inlined
-def kept_deflection(before: Pair, friction: FrictionLaw) -> Pair:
-    """Deflection (m) along each tangent with which a node of the mode `before` sticks again."""
-    if friction.kind == COULOMB:
-        return 0.0 * before[0], 0.0 * before[1]
-    law = named(ResetConstants, friction.constants)
-    kept = law.kept * law.stiction_range
-    return kept * before[0], kept * before[1]
-
-
-@inlined
-def next_mode(slide: Slide, stays: Truth, friction: FrictionLaw) -> Pair:
-    """Next mode of a node that `stays` on the ground; STICK for other nodes."""
-    if friction.kind == COULOMB:
-        after_1, after_2 = next_coulomb_mode(slide, named(CoulombConstants, friction.constants))
-    else:
-        after_1, after_2 = next_reset_mode(slide, named(ResetConstants, friction.constants))
-    return select(stays, after_1, STICK), select(stays, after_2, STICK)
-
-
-@inlined
-def friction_margin(slide: Slide, friction: FrictionLaw) -> float:
-    """Mode margin of a node on the ground: positive until its friction mode changes, zero at the
-    change. Only the sign has a meaning."""
-    if friction.kind == COULOMB:
-        return coulomb_margin(slide, named(CoulombConstants, friction.constants))
-    return reset_margin(slide, named(ResetConstants, friction.constants))
-
-
-@inlined
-def time_to_friction_change(
-    slide: Slide, acceleration: Pair, normal_rate: Real, friction: FrictionLaw, horizon: Real
-) -> Real:
-    """Time (s) to the next change of the friction mode of a node, at most `horizon`.
-
-    `acceleration` is along the tangents. `normal_rate` (N/s) is the rate of the normal force.
-    """
-    if friction.kind == COULOMB:
-        law = named(CoulombConstants, friction.constants)
-        return time_to_coulomb_change(slide, acceleration, normal_rate, law, horizon)
-    return time_to_reset_change(
-        slide, acceleration, named(ResetConstants, friction.constants), horizon
-    )
+time_to_friction_change = by_law(time_to_reset_change, time_to_coulomb_change)
+"""Time (s) to the next change of the friction mode of a node, at most a horizon; arguments: slide,
+acceleration along the tangents, rate of the normal force (N/s), horizon (s)."""
 
 
 Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]

@@ -45,7 +45,7 @@ def mode_margin(parts: Parts, state: Array, modes: Array) -> float:
             continue
         margin = min(margin, -distance)
         slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
-        margin = min(margin, friction.friction_margin(slide, ground.friction))
+        margin = min(margin, friction.friction_margin(ground.friction, slide))
     return margin
 
 
@@ -73,7 +73,7 @@ def time_to_mode_change(
             continue
         rate = law.damping * (v_n * v_n + distance * a_n) - law.stiffness * v_n
         rate = select(slide.normal > 0.0, rate, 0.0)
-        change = friction.time_to_friction_change(slide, (a_1, a_2), rate, ground.friction, horizon)
+        change = friction.time_to_friction_change(ground.friction, slide, (a_1, a_2), rate, horizon)
         time = minimum(time, select(touches, change, horizon))
     return time
 

@@ -281,7 +281,7 @@ def add_contact(
     touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
     depth = -contact.gap(nodes, ground, frames, i)
     slide, _ = contact.sliding(state, nodes, modes, ground, frames, i)
-    k_1, k_12, k_2 = friction_damping(slide, time, ground.friction)
+    k_1, k_12, k_2 = friction_damping(ground.friction, slide, time)
     k_1, k_2 = select(touches, k_1, 0.0), select(touches, k_2, 0.0)
     k_12 = select(touches, k_12, 0.0)
     presses = touches & (forces.ground_forces[i, contact.NORMAL] > 0.0)
