@@ -29,5 +29,5 @@ def test_unknown_readings_and_damaged_records_are_refused(tmp_path):
     damaged.write_text('{"thesis": [{"best_in": 1}]}', encoding="utf-8")
     with pytest.raises(InputError, match="initial_best_in"):
         readings.load_record(damaged)
-    with pytest.raises(InputError, match="gain-3.*gain-1"):
+    with pytest.raises(InputError, match=r"gain-3.*gain-1"):
         readings.main(["gain-3"])
