@@ -101,14 +101,19 @@ READINGS = {
     "range-at-once": Reading("0 where it breaks free, signals at once", _AT_RANGE | _AT_ONCE),
 }
 
+_THREE = {"evolution.trials": 3}
+
 FUTURE = {
     "constant-tau": Reading(
-        "τ_A = 0.2 s", {"gait_bounds.tau_a_min": "0.2 s", "gait_bounds.tau_a_max": "0.2 s"}
+        "τ_A = 0.2 s",
+        _THREE | {"gait_bounds.tau_a_min": "0.2 s", "gait_bounds.tau_a_max": "0.2 s"},
     ),
-    "free-tau-b": Reading("τ_B by itself", {"gait_bounds.independent_tau_b": True}),
-    "smooth": Reading("fitness with a cost of signal rates", {"objective.signal_rate": "-5 s/lbf"}),
+    "free-tau-b": Reading("τ_B by itself", _THREE | {"gait_bounds.independent_tau_b": True}),
+    "smooth": Reading(
+        "fitness with a cost of signal rates", _THREE | {"objective.signal_rate": "-5 s/lbf"}
+    ),
 }
-"""Variations that chapter 4 of the thesis proposes."""
+"""Variations that chapter 4 of the thesis proposes, three trials each."""
 
 ALL = READINGS | FUTURE
 

@@ -20,7 +20,7 @@ from analyse import load_analysis
 from claims import claims, load_motion
 from record import load_times
 from settle import difference_of_means, numbers
-from tables import best_gait
+from tables import aspect, best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
 from thinning import last_population
 
@@ -46,6 +46,8 @@ import settling_node  # noqa: E402
 import single_oscillator  # noqa: E402
 import sliding_tetrahedron  # noqa: E402
 
+ROW = 810
+"""Width of two pictures beside each other, in pixels."""
 STEADY = 5.0
 """Time (s) from which on frequencies are measured."""
 DRAWS = 2000
@@ -173,6 +175,12 @@ def ground_numbers() -> dict[str, str]:
     }
 
 
+def widths(*pictures: str) -> list[int]:
+    """Widths (pixels) of pictures beside each other, so that they have one height."""
+    shapes = [aspect(PAGE.parent / picture) for picture in pictures]
+    return [round(ROW * shape / sum(shapes)) for shape in shapes]
+
+
 def reached(name: str) -> str:
     """Distance of the best gait of a run."""
     return best_gait(name, load_analysis(HERE / name)).text("compiled", 1)
@@ -206,6 +214,7 @@ def page(run: Run) -> str:
         setting=setting,
         reached=reached,
         apart=apart,
+        widths=widths,
         number=fixed,
         ranking=readings.ranking(record).markdown(),
         without_slip=without_slip(run),
@@ -218,8 +227,8 @@ def page(run: Run) -> str:
 def main() -> None:
     """Writes the page and the figures."""
     run = load_run(HERE / "thesis")
-    write_whole(PAGE, page(run) + "\n")
     save_figures(run, FIGURES)
+    write_whole(PAGE, page(run) + "\n")
 
 
 if __name__ == "__main__":
