@@ -37,6 +37,10 @@ HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "readings.json"
 SCRATCH = Path("out/readings")
 
+COARSE = "!Compiled {tolerance: 1e-2 m/s, max_step: 100 ms}"
+FIXED = "!Compiled {tolerance: 1000 m/s}"
+"""An engine that accepts every step of max_step."""
+
 _ONE_LBF = {"cpg.gain": "1 lbf"}
 _AT_RANGE = {
     "friction.reset": "range",
@@ -80,10 +84,9 @@ READINGS = {
     "second-sample": Reading("dx₁ from the second sample, as in the listing", _SECOND_SAMPLE),
     "tau": Reading("mutation never reaches τ_A, as in the listing", _OTHER_TAU, "thesis-listing"),
     "crossover": Reading("crossover 80 %", {"optimizer.crossover_probability": 0.8}),
-    "coarse": Reading(
-        "coarse variable steps", {"engine": "!Compiled {tolerance: 1e-2 m/s, max_step: 100 ms}"}
-    ),
-    "fixed": Reading("fixed steps of 3 ms", {"engine": "!Compiled {tolerance: 1000 m/s}"}),
+    "coarse": Reading("coarse variable steps", {"engine": COARSE}),
+    "fixed": Reading("fixed steps of 3 ms", {"engine": FIXED}),
+    "exact": Reading("signals without the error of 0.5 ms steps", {"cpg.signals": "live"}),
     "stop-never": Reading("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
     "early": Reading(
         "the stop counts from iteration 100", run="stop-never", stop={"stop_after": 100}

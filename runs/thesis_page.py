@@ -48,6 +48,7 @@ import sliding_tetrahedron  # noqa: E402
 
 ROW = 810
 """Width of two pictures beside each other, in pixels."""
+FINE = "!Compiled {tolerance: 1e-5 m/s, max_step: 1 ms}"
 STEADY = 5.0
 """Time (s) from which on frequencies are measured."""
 DRAWS = 2000
@@ -175,6 +176,18 @@ def ground_numbers() -> dict[str, str]:
     }
 
 
+def motion_error(run: Run, engine: str) -> str:
+    """Greatest error (in) of a node's place in the first 5 s, on an engine beside a fine one, over
+    the best gaits of a run."""
+    scenario = run.scenario.with_changes({"simulation.duration": "5 s", "engine": FINE})
+    errors = []
+    for gait in run.gaits():
+        fine = simulate(scenario, gait, record=True).trajectory.p_WN
+        rough = scenario.with_changes({"engine": engine})
+        errors.append(float(abs(simulate(rough, gait, record=True).trajectory.p_WN - fine).max()))
+    return over_trials(pandas.Series(errors) / INCH)
+
+
 def widths(*pictures: str) -> list[int]:
     """Widths (pixels) of pictures beside each other, so that they have one height."""
     shapes = [aspect(PAGE.parent / picture) for picture in pictures]
@@ -218,6 +231,7 @@ def page(run: Run) -> str:
         number=fixed,
         ranking=readings.ranking(record).markdown(),
         without_slip=without_slip(run),
+        errors=[motion_error(run, engine) for engine in (readings.COARSE, readings.FIXED)],
         trials=tables,
         read={name: readings.results(trials) for name, trials in tables.items()},
         claims=claims(load_motion()).markdown(),
