@@ -88,7 +88,7 @@ class ResetIntegrator(FrictionKind):
     """Share a_c that is added to the bristle's force while a node sticks."""
     proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """Friction divided by deflection and by velocity, sigma_0."""
-    stiffness: Annotated[Stiffness, Varied()] = Field(default=0.0, ge=0)
+    stiffness: Stiffness = Field(default=0.0, ge=0)
     """Stiffness of the bristle: friction divided by deflection, as sigma_0 in Olsson's model."""
     reset: Literal["reversal", "range", "never"] = "reversal"
     """Where the deflection becomes 0: at `reversal` of the velocity; or at the stiction `range`,
