@@ -101,7 +101,6 @@ READINGS = {
         _AT_RANGE | _SECOND_SAMPLE | _OTHER_TAU,
     ),
     "range-gain-1": Reading("0 where it breaks free, gain 1", _AT_RANGE | _ONE_LBF),
-    "range-at-once": Reading("0 where it breaks free, signals at once", _AT_RANGE | _AT_ONCE),
 }
 
 _THREE = {"evolution.trials": 3}
