@@ -86,7 +86,6 @@ READINGS = {
     "crossover": Reading("crossover 80 %", {"optimizer.crossover_probability": 0.8}),
     "coarse": Reading("coarse variable steps", {"engine": COARSE}),
     "fixed": Reading("fixed steps of 3 ms", {"engine": FIXED}),
-    "exact": Reading("signals without the error of 0.5 ms steps", {"cpg.signals": "live"}),
     "stop-never": Reading("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
     "early": Reading(
         "the stop counts from iteration 100", run="stop-never", stop={"stop_after": 100}
