@@ -230,8 +230,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
     template = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True).from_string(
         read_text(TEMPLATE, "template")
     )
-    record = readings.load_record(readings.RECORD)
-    tables = readings.tables_of(record)
+    tables = readings.tables_of(readings.load_record(readings.RECORD))
     return template.render(
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
@@ -240,7 +239,7 @@ def page(run: Run, simulated: Mapping[str, Any]) -> str:
         apart=apart,
         widths=widths,
         number=fixed,
-        ranking=readings.ranking(record).markdown(),
+        readings=readings,
         **simulated,
         trials=tables,
         read={name: readings.results(trials) for name, trials in tables.items()},
