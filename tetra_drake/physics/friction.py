@@ -124,8 +124,11 @@ class ResetConstants(NamedTuple):
 @inlined
 def reset_force(slide: Slide, law: ResetConstants) -> Pair:
     """Friction (N) of the reset integrator (Eq. 3-5)."""
+    force_1, force_2 = tangent_force(slide.t1, law), tangent_force(slide.t2, law)
+    if not any_lane(law.per_load > 0.0):
+        return force_1, force_2
     factor = load_factor(slide, law)
-    return factor * tangent_force(slide.t1, law), factor * tangent_force(slide.t2, law)
+    return factor * force_1, factor * force_2
 
 
 @inlined
@@ -161,10 +164,14 @@ def next_reset_mode(slide: Slide, law: ResetConstants) -> Pair:
     """Next mode along each tangent; see next_tangent_mode()."""
     slips = law.restarts == 0.0
     breaks_1, breaks_2 = at_range(slide.t1, law) & slips, at_range(slide.t2, law) & slips
-    is_joint = law.joint != 0.0
+    share_1 = share_2 = 0.0 * law.joint
+    if any_lane(law.joint != 0.0):  # deflections that are held along the other tangent
+        per_range = law.joint / law.stiction_range
+        share_1 = select(breaks_2, per_range * slide.t1.deflection, 0.0)
+        share_2 = select(breaks_1, per_range * slide.t2.deflection, 0.0)
     return (
-        next_tangent_mode(slide.t1, breaks_1, breaks_2 & is_joint, law),
-        next_tangent_mode(slide.t2, breaks_2, breaks_1 & is_joint, law),
+        next_tangent_mode(slide.t1, breaks_1, share_1),
+        next_tangent_mode(slide.t2, breaks_2, share_2),
     )
 
 
@@ -177,15 +184,11 @@ def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
 
 
 @inlined
-def next_tangent_mode(
-    slide: TangentSlide, breaks: Truth, pulled: Truth, law: ResetConstants
-) -> Real:
+def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
     """Next mode along one tangent. A node that `breaks` free slips in the direction of its
-    velocity. A node that is `pulled` free by the other tangent keeps its deflection, if it moves
-    outward. A node sticks again when its velocity changes sign."""
-    direction = select(slide.velocity > 0.0, 1.0, -1.0)
-    share = select(pulled, slide.deflection / law.stiction_range, STICK)
-    from_stick = select(breaks, direction, share)
+    velocity. The other tangent may free it with a `share` of the stiction range as deflection. A
+    node sticks again when its velocity changes sign."""
+    from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
     mode = select(slide.mode == STICK, from_stick, slide.mode)
     return select(mode * slide.velocity > 0.0, mode, STICK)
 
@@ -423,6 +426,8 @@ def begins_to_stick(slide: Slide, after: Pair, friction: FrictionLaw) -> tuple[T
         return begins_1, begins_2
     law = named(ResetConstants, friction.constants)
     restarts = law.restarts != 0.0
+    if not any_lane(restarts):
+        return begins_1, begins_2
     return (
         begins_1 | (at_range(slide.t1, law) & restarts),
         begins_2 | (at_range(slide.t2, law) & restarts),
