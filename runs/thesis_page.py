@@ -8,7 +8,9 @@ thesis.md.jinja.
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +22,14 @@ from analyse import load_analysis
 from claims import claims, load_motion
 from record import load_times
 from settle import difference_of_means, numbers
-from tables import best_gait
+from tables import aspect, best_gait
 from thesis_figures import EVOLVED, mean_fitness, save_figures
 from thinning import last_population
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.files import read_text, write_whole
+from tetra_drake.files import read_json, read_text, write_whole
 from tetra_drake.formatting import fixed, ranged, rounded
 from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.robot import Robot
@@ -38,6 +40,7 @@ from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
 
 HERE = Path(__file__).parent
 PAGE, FIGURES = HERE / "thesis/THESIS.md", HERE / "thesis/redrawn"
+NUMBERS = HERE / "thesis/simulated.json"
 TEMPLATE = HERE / "thesis.md.jinja"
 
 sys.path.append(str(HERE.parent / "diagrams"))
@@ -46,6 +49,9 @@ import settling_node  # noqa: E402
 import single_oscillator  # noqa: E402
 import sliding_tetrahedron  # noqa: E402
 
+ROW = 810
+"""Width of two pictures beside each other, in pixels."""
+FINE = "!Compiled {tolerance: 1e-5 m/s, max_step: 1 ms}"
 STEADY = 5.0
 """Time (s) from which on frequencies are measured."""
 DRAWS = 2000
@@ -173,6 +179,24 @@ def ground_numbers() -> dict[str, str]:
     }
 
 
+def motion_error(run: Run, engine: str) -> str:
+    """Greatest error (in) of a node's place in the first 5 s, on an engine beside a fine one, over
+    the best gaits of a run."""
+    scenario = run.scenario.with_changes({"simulation.duration": "5 s", "engine": FINE})
+    errors = []
+    for gait in run.gaits():
+        fine = simulate(scenario, gait, record=True).trajectory.p_WN
+        rough = scenario.with_changes({"engine": engine})
+        errors.append(float(abs(simulate(rough, gait, record=True).trajectory.p_WN - fine).max()))
+    return over_trials(pandas.Series(errors) / INCH)
+
+
+def widths(*pictures: str) -> list[int]:
+    """Widths (pixels) of pictures beside each other, so that they have one height."""
+    shapes = [aspect(PAGE.parent / picture) for picture in pictures]
+    return [round(ROW * shape / sum(shapes)) for shape in shapes]
+
+
 def reached(name: str) -> str:
     """Distance of the best gait of a run."""
     return best_gait(name, load_analysis(HERE / name)).text("compiled", 1)
@@ -192,23 +216,31 @@ def without_slip(run: Run) -> str:
     return over_trials(pandas.Series(walks))
 
 
-def page(run: Run) -> str:
-    """Text of the page."""
+def simulated_numbers(run: Run) -> dict[str, Any]:
+    """The numbers of the page that need simulations, whose last digits depend on the processor."""
+    return {
+        "ground": ground_numbers(),
+        "without_slip": without_slip(run),
+        "errors": [motion_error(run, engine) for engine in (readings.COARSE, readings.FIXED)],
+    }
+
+
+def page(run: Run, simulated: Mapping[str, Any]) -> str:
+    """Text of the page, with simulated_numbers()."""
     template = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True).from_string(
         read_text(TEMPLATE, "template")
     )
-    record = readings.load_record(readings.RECORD)
-    tables = readings.tables_of(record)
+    tables = readings.tables_of(readings.load_record(readings.RECORD))
     return template.render(
         ours=trials_numbers(run),
         listing=trials_numbers(load_run(HERE / "thesis-listing")),
-        ground=ground_numbers(),
         setting=setting,
         reached=reached,
         apart=apart,
+        widths=widths,
         number=fixed,
-        ranking=readings.ranking(record).markdown(),
-        without_slip=without_slip(run),
+        readings=readings,
+        **simulated,
         trials=tables,
         read={name: readings.results(trials) for name, trials in tables.items()},
         claims=claims(load_motion()).markdown(),
@@ -218,8 +250,9 @@ def page(run: Run) -> str:
 def main() -> None:
     """Writes the page and the figures."""
     run = load_run(HERE / "thesis")
-    write_whole(PAGE, page(run) + "\n")
     save_figures(run, FIGURES)
+    write_whole(NUMBERS, json.dumps(simulated_numbers(run), indent=1) + "\n")
+    write_whole(PAGE, page(run, read_json(NUMBERS, "numbers")) + "\n")
 
 
 if __name__ == "__main__":

@@ -190,7 +190,7 @@ class ResetIntegrator(FrictionKind):
     """Share a_c that is added to the bristle's force while a node sticks."""
     proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """Friction divided by deflection and by velocity, sigma_0."""
-    stiffness: Annotated[Stiffness, Varied()] = Field(default=0.0, ge=0)
+    stiffness: Stiffness = Field(default=0.0, ge=0)
     """Stiffness of the bristle: friction divided by deflection, as sigma_0 in Olsson's model."""
     reset: Literal["reversal", "range", "never"] = "reversal"
     """Where the deflection becomes 0: at `reversal` of the velocity; or at the stiction `range`,
@@ -251,8 +251,11 @@ class ResetConstants(NamedTuple):
 @inlined
 def reset_force(slide: Slide, law: ResetConstants) -> Pair:
     """Friction (N) of the reset integrator (Eq. 3-5)."""
+    force_1, force_2 = tangent_force(slide.t1, law), tangent_force(slide.t2, law)
+    if not any_lane(law.per_load > 0.0):
+        return force_1, force_2
     factor = load_factor(slide, law)
-    return factor * tangent_force(slide.t1, law), factor * tangent_force(slide.t2, law)
+    return factor * force_1, factor * force_2
 
 
 @inlined
@@ -286,10 +289,16 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
 @inlined
 def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
     """Next mode along each tangent; see next_tangent_mode()."""
-    slips, is_joint = law.restarts == 0.0, law.joint != 0.0
+    slips = law.restarts == 0.0
     ends_1, ends_2 = at_range(slide.t1, law), at_range(slide.t2, law)
-    mode_1 = next_tangent_mode(slide.t1, ends_1 & slips, ends_2 & slips & is_joint, law)
-    mode_2 = next_tangent_mode(slide.t2, ends_2 & slips, ends_1 & slips & is_joint, law)
+    breaks_1, breaks_2 = ends_1 & slips, ends_2 & slips
+    share_1 = share_2 = 0.0 * law.joint
+    if any_lane(law.joint != 0.0):  # deflections that are held along the other tangent
+        per_range = law.joint / law.stiction_range
+        share_1 = select(breaks_2, per_range * slide.t1.deflection, 0.0)
+        share_2 = select(breaks_1, per_range * slide.t2.deflection, 0.0)
+    mode_1 = next_tangent_mode(slide.t1, breaks_1, share_1)
+    mode_2 = next_tangent_mode(slide.t2, breaks_2, share_2)
     begins_1 = (mode_1 == STICK) & ((slide.t1.mode != STICK) | ends_1)
     begins_2 = (mode_2 == STICK) & ((slide.t2.mode != STICK) | ends_2)
     kept = law.kept * law.stiction_range
@@ -306,15 +315,11 @@ def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
 
 
 @inlined
-def next_tangent_mode(
-    slide: TangentSlide, breaks: Truth, pulled: Truth, law: ResetConstants
-) -> Real:
+def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
     """Next mode along one tangent. A node that `breaks` free slips in the direction of its
-    velocity. A node that is `pulled` free by the other tangent keeps its deflection, if it moves
-    outward. A node sticks again when its velocity changes sign."""
-    direction = select(slide.velocity > 0.0, 1.0, -1.0)
-    share = select(pulled, slide.deflection / law.stiction_range, STICK)
-    from_stick = select(breaks, direction, share)
+    velocity. The other tangent may free it with a `share` of the stiction range as deflection. A
+    node sticks again when its velocity changes sign."""
+    from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
     mode = select(slide.mode == STICK, from_stick, slide.mode)
     return select(mode * slide.velocity > 0.0, mode, STICK)
 
