@@ -219,7 +219,7 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
 
     A node that lands sticks where it lands. A node that sticks again does so at its present
     position; this is the reset of the reset integrator, unless the deflection is kept. The stick
-    point of a node in the air follows it.
+    point of a node in the air is where it has left the ground.
     """
     changed = False
     for i in range(ground.contacts.size):
@@ -233,12 +233,14 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         after_2 = select(stays, due.mode[1], friction.STICK)
         if any_lane(lands):
             set_heading(state, ground, frames, i, lands, modes)
-        moves = due.begins[0] | not_(stays), due.begins[1] | not_(stays)
+        arrives_or_leaves = touched ^ touches
+        moves_1 = (due.begins[0] & stays) | arrives_or_leaves
+        moves_2 = (due.begins[1] & stays) | arrives_or_leaves
         bend = select(stays, due.bend[0], 0.0), select(stays, due.bend[1], 0.0)
-        move_stick_point(state, nodes, ground, frames, i, moves, bend, slide, modes)
+        move_stick_point(state, nodes, ground, frames, i, (moves_1, moves_2), bend, slide, modes)
         modes[i, CONTACT] = select(touches, 1.0, 0.0)
         modes[i, MODE], modes[i, MODE + 1] = after_1, after_2
-        changed = changed | (touched ^ touches)
+        changed = changed | arrives_or_leaves
         changed = changed | (after_1 != slide.t1.mode) | (after_2 != slide.t2.mode)
     return changed
 
