@@ -66,9 +66,11 @@ class Reading:
     about: str
     changes: Mapping[str, Any] = field(default_factory=dict)
     run: str = ""
-    """Name of the recorded run, or of the reading whose trials count; "" for a run of its own."""
+    """Name of the recorded run of this reading, if there is one."""
+    trials_of: str = ""
+    """Name of another reading, whose trials end earlier in this one."""
     stop: Mapping[str, Any] = field(default_factory=dict)
-    """Settings of SteadyState that end the trials of `run` earlier."""
+    """Settings of SteadyState that end them."""
 
 
 READINGS = {
@@ -88,9 +90,11 @@ READINGS = {
     "fixed": Reading("fixed steps of 3 ms", {"engine": FIXED}),
     "stop-never": Reading("2000 iterations in every trial", {"optimizer.stop_rise": 0.0}),
     "early": Reading(
-        "the stop counts from iteration 100", run="stop-never", stop={"stop_after": 100}
+        "the stop counts from iteration 100", trials_of="stop-never", stop={"stop_after": 100}
     ),
-    "steep": Reading("the stop needs a rise of 0.3", run="stop-never", stop={"stop_rise": 0.3}),
+    "steep": Reading(
+        "the stop needs a rise of 0.3", trials_of="stop-never", stop={"stop_rise": 0.3}
+    ),
     "listing": Reading(
         "gain 1, τ_A and dx₁ as in the listing", _ONE_LBF | _SECOND_SAMPLE | _OTHER_TAU
     ),
@@ -99,7 +103,6 @@ READINGS = {
         "0 where it breaks free, τ_A and dx₁ as in the listing",
         _AT_RANGE | _SECOND_SAMPLE | _OTHER_TAU,
     ),
-    "range-gain-1": Reading("0 where it breaks free, gain 1", _AT_RANGE | _ONE_LBF),
 }
 
 _THREE = {"evolution.trials": 3}
@@ -119,20 +122,18 @@ FUTURE = {
 ALL = READINGS | FUTURE
 
 
-def trials_of(name: str) -> Run:
+def run_of(name: str) -> Run:
     """The run of a reading, evolved as far as it is not yet."""
     reading = ALL[name]
-    if reading.run in ALL and reading.run != name:
-        return trials_of(reading.run)
+    if reading.trials_of:
+        return run_of(reading.trials_of)
     if reading.run:
         return load_run(HERE / reading.run)
-    base = load_scenario("thesis").on_engine("compiled")
-    scenario, out = base.with_changes({"name": f"reading-{name}"} | dict(reading.changes)), SCRATCH
-    resume = (out / name / MANIFEST).exists()
+    out, base = SCRATCH / name, load_scenario("thesis").on_engine("compiled")
     return evolve(
-        scenario,
-        out / name,
-        resume=resume,
+        base.with_changes({"name": f"reading-{name}"} | dict(reading.changes)),
+        out,
+        resume=(out / MANIFEST).exists(),
         reevaluate=False,
         report=False,
         progress=Display(sys.stdout),
@@ -171,7 +172,7 @@ def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
 
 def numbers(name: str) -> list[dict[str, float]]:
     """Numbers of the trials of a reading."""
-    run = trials_of(name)
+    run = run_of(name)
     settings = SteadyState(**dict(run.scenario.optimizer) | dict(ALL[name].stop))
     trials = range(run.scenario.evolution.trials)
     rows = [numbers_of(run, trial, settings) for trial in trials]

@@ -195,8 +195,8 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
 
 def make_folder(made: Path, shown: Path) -> None:
     """Thins a run into the folder `shown`, in place of its old trials and exported files."""
-    for old in (*shown.glob("trial_*"), shown / EXPORTED):
-        shutil.rmtree(old, ignore_errors=True)
+    for old in (*shown.glob("trial_*"), *shown.glob(EXPORTED)):
+        shutil.rmtree(old)
     thin(made, shown)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas
 from matplotlib.figure import Figure
 from PIL import Image
+from readings import THESIS
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run
@@ -48,7 +49,7 @@ TURN = -0.09
 """Angle (rad) by which Figure 13 turns the robot."""
 COLOURS = 40
 """Number of colours of a picture's file."""
-INITIAL, EVOLVED = 6.6, 14.34
+INITIAL, EVOLVED = THESIS["initial"], THESIS["evolved"]
 """Distances (in) of the thesis's best initial gait and of its best evolved gait."""
 
 

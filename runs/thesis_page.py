@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import jinja2
 import numpy as np
 import pandas
 import readings
+import xarray
 from analyse import load_analysis
 from claims import claims, load_motion
 from record import load_times
@@ -179,16 +180,21 @@ def ground_numbers() -> dict[str, str]:
     }
 
 
-def motion_error(run: Run, engine: str) -> str:
-    """Greatest error (in) of a node's place in the first 5 s, on an engine beside a fine one, over
-    the best gaits of a run."""
-    scenario = run.scenario.with_changes({"simulation.duration": "5 s", "engine": FINE})
-    errors = []
-    for gait in run.gaits():
-        fine = simulate(scenario, gait, record=True).trajectory.p_WN
-        rough = scenario.with_changes({"engine": engine})
-        errors.append(float(abs(simulate(rough, gait, record=True).trajectory.p_WN - fine).max()))
-    return over_trials(pandas.Series(errors) / INCH)
+def motions(run: Run, engine: str) -> list[xarray.DataArray]:
+    """Places p_WN (m) of the nodes in the first 5 s, for the best gaits of a run on an engine."""
+    scenario = run.scenario.with_changes({"simulation.duration": "5 s", "engine": engine})
+    return [simulate(scenario, gait, record=True).trajectory.p_WN for gait in run.gaits()]
+
+
+def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
+    """Greatest error (in) of a node's place on each engine beside a fine one, over the best gaits
+    of a run."""
+    exact, texts = motions(run, FINE), []
+    for engine in engines:
+        pairs = zip(motions(run, engine), exact, strict=True)
+        errors = [float(abs(rough - fine).max()) / INCH for rough, fine in pairs]
+        texts.append(over_trials(pandas.Series(errors)))
+    return texts
 
 
 def widths(*pictures: str) -> list[int]:
@@ -221,7 +227,7 @@ def simulated_numbers(run: Run) -> dict[str, Any]:
     return {
         "ground": ground_numbers(),
         "without_slip": without_slip(run),
-        "errors": [motion_error(run, engine) for engine in (readings.COARSE, readings.FIXED)],
+        "errors": motion_errors(run, [readings.COARSE, readings.FIXED]),
     }
 
 
