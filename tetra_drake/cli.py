@@ -160,7 +160,7 @@ def _simulate(
 
     Example: tetra-drake simulate --scenario coulomb --seed 3 --out out
     """
-    from tetra_drake.engines.interface import check_can_be_watched, engine_of
+    from tetra_drake.engines.engine import check_can_be_watched, engine_of
     from tetra_drake.engines.simulate import simulate
     from tetra_drake.prototype.command_file import load_command, scenario_beside
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder

@@ -18,8 +18,8 @@ from helpers.quantities import with_unit
 from helpers.states import body_velocities
 from scipy.linalg import expm
 
+from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.gait_simulation import GaitSimulation
-from tetra_drake.engines.interface import engine_of
 from tetra_drake.laws.actuator import Actuation, TensionMotor, Winch
 from tetra_drake.laws.cable import PASSIVE
 from tetra_drake.laws.inertia import XX

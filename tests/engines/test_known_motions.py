@@ -29,8 +29,8 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.gait_simulation import GaitSimulation
-from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine, processor_lanes
+from tetra_drake.engines.lanes.lane_engine import LaneEngine, processor_lanes
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError

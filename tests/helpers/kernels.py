@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Solver, implicit_matrix
-from tetra_drake.engines.compiled.rosenbrock import Step, take_step
+from tetra_drake.engines.lanes.dynamics import Solver, implicit_matrix
+from tetra_drake.engines.lanes.ros2 import Step, take_step
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Real, Table

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine
-from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.lanes.lane_engine import LaneEngine
+from tetra_drake.engines.lanes.prepared import Prepared
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait

@@ -1,7 +1,7 @@
 """Functions of lanes, lane by lane and bit for bit as of plain numbers, and what is refused.
 
 That operators and all that kernels use are right in every lane is tested in
-engines/compiled/test_many.py."""
+engines/lanes/test_many.py."""
 
 import itertools
 import math

@@ -17,8 +17,8 @@ import pandas
 from pydantic import AfterValidator, Field
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.engines.engine import Outcome
 from tetra_drake.engines.gait_simulation import Driver
-from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import MOST_BYTES, read_bytes, read_text

@@ -2,10 +2,10 @@
 
 ENGINES = {
     "drake": "tetra_drake.engines.drake",
-    "compiled": "tetra_drake.engines.compiled.engine",
+    "compiled": "tetra_drake.engines.lanes.engine",
     "mujoco": "tetra_drake.engines.mujoco",
 }
-"""Module of each engine, by name. A module has an `ENGINE`; see engines.interface.
+"""Module of each engine, by name. A module has an `ENGINE`; see engines.engine.
 
 The name is the engine's kind in a scenario, in lower case.
 """

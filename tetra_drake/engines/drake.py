@@ -9,8 +9,8 @@ import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram
 
+from tetra_drake.engines.engine import Engine
 from tetra_drake.engines.gait_simulation import GaitSimulation
-from tetra_drake.engines.interface import Engine
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_of, frame_of
 from tetra_drake.engines.stepper import SerialStepper

@@ -29,8 +29,8 @@ from typing import Any
 
 import numpy as np
 
+from tetra_drake.engines.engine import Engine, Outcome
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
-from tetra_drake.engines.interface import Engine, Outcome
 from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_mjcf
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.stepper import SerialStepper

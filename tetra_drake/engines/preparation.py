@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numba.core import event
 
-from tetra_drake.engines.interface import engine_of
+from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.mujoco import pull_cables
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces

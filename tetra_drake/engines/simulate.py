@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+from tetra_drake.engines.engine import Outcome, check_can_be_watched, engine_of
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation, Viewer
-from tetra_drake.engines.interface import Outcome, check_can_be_watched, engine_of
 from tetra_drake.engines.simulation import Controller, simulate_controlled
 from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.machine import threads_for

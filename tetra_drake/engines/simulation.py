@@ -13,8 +13,8 @@ from typing import Any, NoReturn, TypeGuard
 import numpy as np
 import numpy.typing as npt
 
+from tetra_drake.engines.engine import check_can_be_watched, engine_of
 from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, Viewer
-from tetra_drake.engines.interface import check_can_be_watched, engine_of
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole

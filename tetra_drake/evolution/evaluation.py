@@ -33,7 +33,7 @@ from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
 from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
-    from tetra_drake.engines.compiled.lane_pool import LanePool
+    from tetra_drake.engines.lanes.lane_pool import LanePool
 
 Objective = Callable[[SimulationResult], float]
 """Function of a result that evolution maximises; -inf or NaN is a failure. A function that reads

@@ -31,7 +31,7 @@ from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Task
 
 if TYPE_CHECKING:
-    from tetra_drake.engines.compiled.lane_pool import LanePool
+    from tetra_drake.engines.lanes.lane_pool import LanePool
     from tetra_drake.evolution.evaluation import GaitEvaluation
 
 MakeExecutor = Callable[[int], Executor]
@@ -69,7 +69,7 @@ def evaluator_of(
     If the evaluation cannot be sent to worker processes, gaits are evaluated in this process, and
     `warn` gets the reason.
     """
-    from tetra_drake.engines.interface import engine_of
+    from tetra_drake.engines.engine import engine_of
 
     scenario, workers = evaluate.scenario, workers or available_cores()
     engine = engine_of(scenario)

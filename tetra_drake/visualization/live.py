@@ -36,7 +36,7 @@ _POLLING_PERIOD = 0.1  # s, while no browser is connected
 class LiveView:
     """Viewer that shows a simulation in Meshcat, not faster than real time.
 
-    See engines.interface.Viewer. The simulation waits until a browser is connected.
+    See engines.engine.Viewer. The simulation waits until a browser is connected.
     """
 
     def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:

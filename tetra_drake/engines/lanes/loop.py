@@ -17,9 +17,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.block_sparse import BLOCK
-from tetra_drake.engines.compiled.dynamics import Solver, accelerate
-from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
+from tetra_drake.engines.lanes.dynamics import Solver, accelerate
+from tetra_drake.engines.lanes.ros2 import Step, larger, take_step
+from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import (
     Real,

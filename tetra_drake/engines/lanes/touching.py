@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from tetra_drake.engines.compiled.block_sparse import Schedule, solve
+from tetra_drake.engines.lanes.sparse import Schedule, solve
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, Truth, any_lane, named, select
 from tetra_drake.laws import capsules, contact
@@ -113,7 +113,7 @@ def product(vectors: Table, k: int, x: Table) -> Real:
 
 @inlined
 def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Table) -> None:
-    """Solves the factorised system with the contacts of `touching`; see block_sparse.solve()."""
+    """Solves the factorised system with the contacts of `touching`; see sparse.solve()."""
     solve(blocks, schedule, x)
     for k in range(touching.count[0]):
         scale = touching.factor[k] * product(touching.along, k, x)

@@ -36,9 +36,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from tetra_drake.engines.compiled import dynamics
-from tetra_drake.engines.compiled.block_sparse import BLOCK, factorise
-from tetra_drake.engines.compiled.touching import (
+from tetra_drake.engines.lanes import dynamics
+from tetra_drake.engines.lanes.sparse import BLOCK, factorise
+from tetra_drake.engines.lanes.touching import (
     Touching,
     add_touching,
     solve_touching,
@@ -73,7 +73,7 @@ class Step(NamedTuple):
     mean_rate: Annotated[Table, "6 * bodies"]
     """Mean rate of the positions, 3/2 q1 + 1/2 q2."""
     blocks: Annotated[Table, "blocks", BLOCK, BLOCK]
-    """Implicit matrix; see block_sparse."""
+    """Implicit matrix; see sparse."""
     touching: Touching
     """Contacts of struts in the implicit matrix."""
     lines: Annotated[Table, dynamics.CABLES_AT_ONCE, dynamics.LINE_COLUMNS]

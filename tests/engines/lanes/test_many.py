@@ -12,10 +12,10 @@ import pytest
 import xarray
 from helpers.anchored import HUNG, scenario_of
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine
-from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.lanes.lane_engine import LaneEngine
+from tetra_drake.engines.lanes.lane_pool import LanePool
+from tetra_drake.engines.lanes.prepared import Prepared
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
     Diverged,

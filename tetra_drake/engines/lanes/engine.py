@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tetra_drake.engines.compiled.lane_engine import BODY_STEPS, LaneEngine
-from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.compiled.lane_stepper import LaneStepper
-from tetra_drake.engines.compiled.prepared import Prepared
+from tetra_drake.engines.engine import Engine, Outcome, outcome_of
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
-from tetra_drake.engines.interface import Engine, Outcome, outcome_of
+from tetra_drake.engines.lanes.lane_engine import BODY_STEPS, LaneEngine
+from tetra_drake.engines.lanes.lane_pool import LanePool
+from tetra_drake.engines.lanes.lane_stepper import LaneStepper
+from tetra_drake.engines.lanes.prepared import Prepared
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait

@@ -8,10 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from tetra_drake.engines.compiled import loop
-from tetra_drake.engines.compiled.lane_engine import LaneEngine
-from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import GaitSimulation
+from tetra_drake.engines.lanes import loop
+from tetra_drake.engines.lanes.lane_engine import LaneEngine
+from tetra_drake.engines.lanes.prepared import Prepared
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.kernels import Stepper
 
-from tetra_drake.engines.compiled.rosenbrock import larger
+from tetra_drake.engines.lanes.ros2 import larger
 from tetra_drake.laws.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions

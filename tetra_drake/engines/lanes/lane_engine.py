@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.compiled import loop
-from tetra_drake.engines.compiled.lane_tables import in_lanes, numbers_of, views
-from tetra_drake.engines.compiled.places import LAST, NEXT, ROUND, Memory, Places, advance
-from tetra_drake.engines.compiled.prepared import Prepared
+from tetra_drake.engines.lanes import loop
+from tetra_drake.engines.lanes.places import LAST, NEXT, ROUND, Memory, Places, advance
+from tetra_drake.engines.lanes.prepared import Prepared
+from tetra_drake.engines.lanes.tables import in_lanes, numbers_of, views
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import machine_code

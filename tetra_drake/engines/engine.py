@@ -17,7 +17,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
-    from tetra_drake.engines.compiled.lane_pool import LanePool
+    from tetra_drake.engines.lanes.lane_pool import LanePool
 
 _BRIEF = 0.01
 """Duration (s) of a simulation whose only purpose is to compile the kernels."""

@@ -13,8 +13,8 @@ import functools
 import math
 from typing import Annotated, NamedTuple, TypeAlias
 
-from tetra_drake.engines.compiled import loop
-from tetra_drake.engines.compiled.loop import Constants, LaneState, Log
+from tetra_drake.engines.lanes import loop
+from tetra_drake.engines.lanes.loop import Constants, LaneState, Log
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Table, any_lane, by_lane, floor, select
 from tetra_drake.kernels.packed import Packed, unpacked

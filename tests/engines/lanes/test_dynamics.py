@@ -6,8 +6,8 @@ from helpers.anchored import scenario_of
 from helpers.kernels import Stepper
 from helpers.states import disturbed, mass_matrix
 
-from tetra_drake.engines.compiled.block_sparse import BLOCK
-from tetra_drake.engines.compiled.dynamics import accelerate
+from tetra_drake.engines.lanes.dynamics import accelerate
+from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.forces import Forces

@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.engines.compiled.block_sparse import BLOCK, Schedule
+from tetra_drake.engines.lanes.sparse import BLOCK, Schedule
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, any_lane, named, select
 from tetra_drake.laws import contact, inertia
@@ -117,7 +117,7 @@ def implicit_matrix(
     """Writes the implicit matrix: mass matrix + time * damping matrix + time² * stiffness of
     contacts and anchors.
 
-    `blocks` has the form of block_sparse; `time` is in s. The damping of cables, normal forces and
+    `blocks` has the form of sparse; `time` is in s. The damping of cables, normal forces and
     stiction makes the equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
     """
     for body in range(robot.bodies.mass.size):

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Solver
-from tetra_drake.engines.compiled.lane_tables import shared
-from tetra_drake.engines.compiled.loop import Constants, LaneState
 from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation
+from tetra_drake.engines.lanes.dynamics import Solver
+from tetra_drake.engines.lanes.loop import Constants, LaneState
+from tetra_drake.engines.lanes.tables import shared
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.laws.actuator import DRIVE, Limits
 from tetra_drake.laws.forces import sizes_of

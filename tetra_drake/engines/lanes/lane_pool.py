@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine, processor_lanes
-from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
+from tetra_drake.engines.lanes.lane_engine import LaneEngine, processor_lanes
+from tetra_drake.engines.lanes.prepared import Prepared
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command

@@ -27,7 +27,7 @@ def test_lanes_walk_as_single_gaits_do_on_other_processors(tmp_path, name, featu
         pytest.skip(f"this processor lacks {missing}")
     own = {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ",".join(f"+{f}" for f in features)}
     environment = os.environ | own | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    modules = [TESTS / "kernels/test_lanes.py", TESTS / "engines/compiled/test_many.py"]
+    modules = [TESTS / "kernels/test_lanes.py", TESTS / "engines/lanes/test_many.py"]
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *map(str, modules)]
     done = subprocess.run(
         command, env=environment, cwd=TESTS.parent, capture_output=True, text=True
