@@ -17,14 +17,12 @@ import pandas
 from pydantic import AfterValidator, Field
 
 from tetra_drake.analysis.equilibrium import study_equilibrium
-from tetra_drake.engines.engine import Outcome
-from tetra_drake.engines.gait_simulation import Driver
-from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import MOST_BYTES, read_bytes, read_text
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.prototype.command_file import TIME, column_numbers, load_command, table_cells
-from tetra_drake.robot.command import Command
+from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot

@@ -2,7 +2,7 @@
 
 ENGINES = {
     "drake": "tetra_drake.engines.drake",
-    "compiled": "tetra_drake.engines.lanes.engine",
+    "compiled": "tetra_drake.engines.lanes.batch",
     "mujoco": "tetra_drake.engines.mujoco",
 }
 """Module of each engine, by name. A module has an `ENGINE`; see engines.engine.

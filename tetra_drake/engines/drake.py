@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import bisect
+import functools
 import weakref
+from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
-from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import (
+    InitializeParams,
+    IntegratorBase,
+    ResetIntegratorFromFlags,
+    Simulator,
+)
 from pydrake.systems.framework import Context, Diagram
 
+from tetra_drake.engines.batch import LoneRobot, SerialBatch, Viewer
 from tetra_drake.engines.engine import Engine
-from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_of, frame_of
-from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
+from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
+from tetra_drake.robot.driven import MARK_DECIMALS, DrivenByGait, DrivenRobot
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.speed_limit import speed_limit
@@ -48,46 +58,60 @@ FINEST, COARSEST = 2e-5, 5e-3
 
 
 class DrakeEngine(Engine):
-    """Engine that simulates the Drake diagram, one gait at a time."""
+    """Engine that simulates the Drake diagram, one robot at a time."""
 
-    can_be_watched = True
+    can_be_watched, has_threads = True, False
 
-    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
-        walk, changes = _DiagramWalk(simulation), simulation.changes
-        for mark in simulation.marks.tolist():
-            walk.advance_to(mark)
-            if mark in changes:
-                walk.hold(changes[mark])
-        return walk.result()
+    def start(
+        self,
+        robots: Sequence[DrivenRobot],
+        *,
+        places: int | None = None,
+        record: bool = False,
+        viewer: Viewer | None = None,
+        threads: int = 1,
+    ) -> SerialBatch:
+        start = functools.partial(_DiagramRobot, record=record, viewer=viewer)
+        return SerialBatch(start, robots, places or len(robots))
 
-    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> SerialStepper:
-        return SerialStepper(_DiagramWalk, first.robot.structure, count=count)
 
+class _DiagramRobot(LoneRobot):
+    """A robot in a diagram of its own. Given signals are held by a system in place of a network."""
 
-class _DiagramWalk:
-    """Simulation of a robot's diagram. A command, or actions, are signals that are held."""
-
-    def __init__(self, simulation: GaitSimulation) -> None:
-        robot, engine = simulation.robot, simulation.robot.scenario.settings_of(Drake)
-        held = HeldSignals(robot) if len(robot.commanded) else None
-        self._diagram = diagram = MakeTensegrityDiagram(
-            robot, simulation.gait, steering=simulation.steering, controller=held
-        )
-        self._simulation, self._engine = simulation, engine
+    def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
+        self._driven, self._record, self._viewer = driven, record, viewer
+        robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
+        if isinstance(driven, DrivenByGait):
+            diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
+        else:
+            diagram = MakeTensegrityDiagram(robot, None, controller=HeldSignals(robot))
+        self._diagram, self._engine = diagram, engine
         self._simulator = MakeSimulator(diagram, robot, engine)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
-        self._drives_at, self._observer = drives_of(diagram), Observer(robot)
+        self._drives_at, self._observer = drives_of(diagram), Observer(driven)
         self._work = _Work(self._simulator.get_integrator())
         self._aimer = _StepAimer(diagram, self._simulator, engine, self._work)
-        times = motion_times(robot.scenario.simulation, record=simulation.record)
+        times = motion_times(robot.scenario.simulation, record=record)
         self._sampler = Sampler(diagram, times, max_step=engine.max_step)
-        self._wall_time, self._speed_limit = 0.0, speed_limit(robot)
+        self.wall_time, self._speed_limit = 0.0, speed_limit(driven)
+        self._marks, self._changes = driven.marks.tolist(), driven.changes
+        self._held, self._change_end = robot.first_signals, 0.0
         # A bound method in place of the lambda would keep the diagram alive for ever.
         this = weakref.proxy(self)
         self._simulator.set_monitor(lambda context: this._after_step(context))
 
     def advance_to(self, time: float) -> None:
-        """Simulates to a time (s). Raises Diverged or StepBudgetExceeded."""
+        passed = bisect.bisect_right(self._marks, time)
+        stops = {*self._marks[:passed], time}
+        del self._marks[:passed]
+        if self._simulator.get_context().get_time() < self._change_end < time:
+            stops.add(self._change_end)
+        for stop in sorted(stops):
+            self._simulate_to(stop)
+            if stop in self._changes:
+                self.hold(self._changes[stop])
+
+    def _simulate_to(self, time: float) -> None:
         started = perf_counter()
         try:
             self._simulator.AdvanceTo(time)
@@ -98,35 +122,63 @@ class _DiagramWalk:
             now, reason = self._simulator.get_context().get_time(), str(error).strip()
             raise Diverged(time=now, reason=reason.splitlines()[0]) from error
         finally:
-            self._wall_time += perf_counter() - started
+            self.wall_time += perf_counter() - started
 
     def hold(self, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N of a robot with a command, from now on."""
-        held = self._diagram.GetSubsystemByName("controller")
-        held.Hold(held.GetMyMutableContextFromRoot(self._simulator.get_mutable_context()), signals)
+        context = self._simulator.get_mutable_context()
+        if (signals != self._held).any():
+            end = context.get_time() + self._driven.robot.scenario.cpg.listing_step
+            self._change_end = round(end, MARK_DECIMALS)
+        self._held = signals.copy()
+        holder = self._diagram.GetSubsystemByName("controller")
+        holder.Hold(holder.GetMyMutableContextFromRoot(context), signals)
 
     def readings(self) -> Readings:
-        """The readings of a robot with a command now."""
-        held = self._diagram.GetSubsystemByName("controller")
-        return held.Read(held.GetMyContextFromRoot(self._simulator.get_context()))
+        context = self._simulator.get_context()
+
+        def table(system: str, port: str, columns: int) -> np.ndarray:
+            source = self._diagram.GetSubsystemByName(system)
+            numbers = source.GetOutputPort(port).Eval(source.GetMyContextFromRoot(context))
+            return np.reshape(numbers, (-1, columns))
+
+        return Readings.of(
+            self._driven.robot.structure,
+            time=context.get_time(),
+            state=self._state.Eval(context),
+            cable_forces=table("cables", "cable_forces", CABLE_FORCE_COLUMNS),
+            ground_forces=table("ground", "ground_forces", GROUND_FORCE_COLUMNS),
+        )
+
+    def copied(self) -> _DiagramRobot:
+        copy = _DiagramRobot(self._driven, record=self._record, viewer=self._viewer)
+        context = copy._simulator.get_mutable_context()
+        context.SetTimeStateAndParametersFrom(self._simulator.get_context())
+        parameters = InitializeParams()
+        parameters.suppress_initialization_events = True
+        copy._simulator.Initialize(parameters)
+        copy._marks, copy._change_end = self._marks.copy(), self._change_end
+        copy._held, copy.wall_time = self._held, self.wall_time
+        copy._work.follow(self._work)
+        copy._aimer.follow(self._aimer)
+        copy._sampler.follow(self._sampler)
+        copy._observer.follow(self._observer)
+        return copy
 
     def result(self) -> SimulationResult:
-        """The result, at the end."""
         accuracy = self._simulator.get_integrator().get_target_accuracy()
         return make_result(
-            self._simulation.robot,
-            self._simulation.gait,
+            self._driven,
             self._sampler.motion(),
             totals=self._observer.totals(),
             work=self._work.total(self._engine.scheme, accuracy),
-            wall_time=self._wall_time,
-            record=self._simulation.record,
+            wall_time=self.wall_time,
+            record=self._record,
         )
 
     def _after_step(self, context: Context) -> None:
         # Nothing here may change the simulation, whether it is recorded or watched or not.
         check_time()
-        robot, viewer = self._simulation.robot, self._simulation.viewer
+        robot, viewer = self._driven.robot, self._viewer
         bodies, now = self._state.Eval(context), context.get_time()
         velocities = bodies[7 * len(robot.structure.bodies) :]
         self._check(now, velocities)
@@ -134,7 +186,7 @@ class _DiagramWalk:
         self._sampler.after_step(context)
         drives = self._drives_at(context)
         self._observer.add(now, bodies, self._signals.Eval(context), drives)
-        begins = now == robot.scenario.cpg.start_up and self._diagram.HasSubsystemNamed("cpg")
+        begins = now == self._driven.start_up and self._diagram.HasSubsystemNamed("cpg")
         if begins:  # the event is after this step
             cpg = self._diagram.GetSubsystemByName("cpg")
             begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
@@ -146,7 +198,7 @@ class _DiagramWalk:
         """Raises Diverged, if a body is beyond the speed limit, or StepBudgetExceeded."""
         speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
         used = self._work.derivative_evaluations()
-        budget = self._simulation.robot.scenario.simulation.max_evaluations
+        budget = self._driven.robot.scenario.simulation.max_evaluations
         if not speed <= self._speed_limit:
             raise Diverged.too_fast(time=now, limit=self._speed_limit)
         if used > budget:
@@ -205,6 +257,10 @@ class _Work:
         earlier = self._before.derivative_evaluations
         return earlier + self._integrator.get_num_derivative_evaluations()
 
+    def follow(self, other: _Work) -> None:
+        """Continues another counter."""
+        self._before = other.total()
+
     def keep(self) -> None:
         """Adds the integrator's work so far to the counter. Call it before the integrator is
         initialised again."""
@@ -251,6 +307,13 @@ class _StepAimer:
         self._last_velocities = self._acceleration = np.zeros(size)
         self._longest = settings.max_step
         self._jacobian_is_old = False
+
+    def follow(self, other: _StepAimer) -> None:
+        """Continues another aimer of the same robot."""
+        self._last_time, self._last_velocities = other._last_time, other._last_velocities
+        self._acceleration, self._longest = other._acceleration, other._longest
+        self._jacobian_is_old = other._jacobian_is_old
+        self._integrator.set_maximum_step_size(other._integrator.get_maximum_step_size())
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the length of the next step. Call it after each step."""

@@ -4,79 +4,76 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Sequence
+from typing import ClassVar
 
 from tetra_drake.engines import ENGINES
-from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
-from tetra_drake.engines.stepper import Stepper
+from tetra_drake.engines.batch import Batch, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.command import driven_robot
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
-
-if TYPE_CHECKING:
-    from tetra_drake.engines.lanes.lane_pool import LanePool
 
 _BRIEF = 0.01
 """Duration (s) of a simulation whose only purpose is to compile the kernels."""
 
-Outcome = SimulationResult | SimulationFailure
-"""Result of a simulation, or its failure: Diverged or StepBudgetExceeded."""
-
 
 class Engine:
-    """Base class of engines. A subclass must implement simulate() and stepper(); the other methods
-    have defaults.
-
-    simulate() must call time_limit.check_time() often, which raises TimeBudgetExceeded.
-    """
+    """Base class of engines. A subclass must implement start(); the other methods have defaults."""
 
     can_be_watched: ClassVar[bool] = False
-    """True if simulate() accepts a viewer."""
-    lane_pool: type[LanePool] | None = None
-    """Pool class for simulating gaits side by side in lanes; None if the engine has no lanes."""
+    """True if start() accepts a viewer."""
+    lanes: ClassVar[int] = 1
+    """Number of robots that one thread simulates side by side."""
+    has_threads: ClassVar[bool] = True
+    """True if batches in several threads are faster than one."""
 
     def check(self, scenario: Scenario) -> None:
         """Raises InputError if the engine cannot simulate the scenario."""
 
     def prepare(self, scenario: Scenario) -> None:
-        """Compiles the kernels that simulate() needs, by a very short simulation."""
+        """Compiles the kernels that a simulation needs, by a very short one."""
         brief = max(_BRIEF, scenario.cpg.listing_step)
         if brief < scenario.simulation.duration:
             times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
             changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
             scenario = scenario.with_changes(changes)
         with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
-            self.simulate(GaitSimulation(Robot.of(scenario), seeded_gait(scenario), record=True))
+            self.simulate(driven_robot(scenario, seeded_gait(scenario)), record=True)
 
-    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
-        """Simulates a gait. Raises the same errors as engines.simulate.simulate()."""
+    def start(
+        self,
+        robots: Sequence[DrivenRobot],
+        *,
+        places: int | None = None,
+        record: bool = False,
+        viewer: Viewer | None = None,
+        threads: int = 1,
+    ) -> Batch:
+        """A batch with robots at their start.
+
+        Args:
+            robots: at least one robot; all have the same structure and kinds of laws.
+            places: number of places, one for each robot by default.
+            record: records the trajectories, for the results.
+            viewer: observer that shows the robots, if the engine can be watched.
+            threads: number of threads among which the places are divided, if the engine can.
+
+        Raises:
+            InputError: if the engine cannot simulate a robot.
+            SimulationFailure: if a robot fails before its first step.
+        """
         raise NotImplementedError
 
-    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> Stepper:
-        """A stepper for `count` robots like the first one."""
-        raise NotImplementedError
-
-    def simulate_many(
-        self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
-    ) -> list[Outcome]:
-        """Simulates many gaits or commands, each on its scenario. This default simulates one after
-        another."""
-        return [self.outcome(*simulation, record=record) for simulation in simulations]
-
-    def outcome(self, scenario: Scenario, driver: Driver, *, record: bool) -> Outcome:
-        """Simulates one gait or command. Returns its result or its failure."""
-        return outcome_of(lambda: self.simulate(GaitSimulation.of(scenario, driver, record=record)))
-
-
-def outcome_of(simulate: Callable[[], SimulationResult]) -> Outcome:
-    """The result of a simulation, or its failure."""
-    try:
-        return simulate()
-    except SimulationFailure as failure:
-        return failure
+    def simulate(
+        self, robot: DrivenRobot, *, record: bool = False, viewer: Viewer | None = None
+    ) -> SimulationResult:
+        """Simulates a robot to its end. Raises the same errors as engines.simulate.simulate()."""
+        batch = self.start([robot], record=record, viewer=viewer)
+        batch.advance()
+        return batch.result(0)
 
 
 def engine_of(scenario: Scenario) -> Engine:

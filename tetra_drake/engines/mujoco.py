@@ -21,19 +21,18 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.engine import Engine, Outcome
-from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
+from tetra_drake.engines.batch import LoneRobot, SerialBatch, Viewer
+from tetra_drake.engines.engine import Engine
 from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_mjcf
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.stepper import SerialStepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.kernels.compiling import compiled
@@ -44,6 +43,7 @@ from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.laws.forces import Forces, Parts, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.equilibrium import (
     Unactuated,
     force_at_rest,
@@ -53,7 +53,6 @@ from tetra_drake.robot.equilibrium import (
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
@@ -80,23 +79,18 @@ class MujocoEngine(Engine):
             raise InputError(scenario.name, "cpg.feedback", problem)
         check_mjcf(scenario)
 
-    def simulate(self, simulation: GaitSimulation) -> SimulationResult:
-        robot, gait, steering = simulation.robot, simulation.gait, simulation.steering
-        self.check(robot.scenario)
-        walk = _MujocoWalk(simulation)
-        walk.run(signals_at(robot, gait, walk.times_of_steps(0, walk.steps), steering=steering))
-        walk.signals[:] = signals_at(robot, gait, walk.times, steering=steering)
-        return walk.result()
-
-    def stepper(self, first: GaitSimulation, *, count: int, threads: int) -> SerialStepper:
-        self.check(first.robot.scenario)
-        return SerialStepper(_MujocoWalk, first.robot.structure, count=count)
-
-    def simulate_many(
-        self, simulations: Sequence[tuple[Scenario, Driver]], *, record: bool, threads: int
-    ) -> list[Outcome]:
-        with ThreadPoolExecutor(threads) as pool:
-            return list(pool.map(lambda each: self.outcome(*each, record=record), simulations))
+    def start(
+        self,
+        robots: Sequence[DrivenRobot],
+        *,
+        places: int | None = None,
+        record: bool = False,
+        viewer: Viewer | None = None,
+        threads: int = 1,
+    ) -> SerialBatch:
+        self.check(robots[0].robot.scenario)
+        start = functools.partial(_MujocoRobot, record=record)
+        return SerialBatch(start, robots, places or len(robots))
 
 
 def is_stable(robot: Robot, step: float) -> bool:
@@ -130,7 +124,7 @@ def installed() -> bool:
 class _Simulator:
     """MuJoCo's model of a robot, and its simulation."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, driven: DrivenRobot) -> None:
         import mujoco
 
         if mujoco.get_mju_user_warning() is None:
@@ -138,7 +132,8 @@ class _Simulator:
             # The handler is not restored, because other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
-        self._robot = robot
+        robot = driven.robot
+        self._robot, self._start_up = robot, driven.start_up
         self.pulled = is_pulled(robot)
         """True if the law of the other engines computes the tensions at each step."""
         self._touches = robot.model.strut_contact.acts
@@ -153,12 +148,12 @@ class _Simulator:
             raise InputError(robot.scenario.name, "robot", problem) from error
         self._data = mujoco.MjData(self._model)
         self._step = robot.scenario.settings_of(Mujoco).step
-        self._speed_limit = speed_limit(robot)
+        self._speed_limit = speed_limit(driven)
         names = [robot.structure.node_names[node] for node in robot.structure.contacts]
         self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(names)}
         self._contacts = [self._model.site(name).id for name in names]
-        driven = robot.structure.cables["signal"]
-        self._motors = driven[driven != PASSIVE]  # index of each motor's signal
+        of_cables = robot.structure.cables["signal"]
+        self._motors = of_cables[of_cables != PASSIVE]  # index of each motor's signal
 
     def start(self) -> Array:
         """MuJoCo's state at the start."""
@@ -211,7 +206,7 @@ class _Simulator:
     ) -> None:
         """Passes states to an observer, with their signals and drives: every _OBSERVED-th one, and
         the state at the end of the start-up. They are after step `first` and the following ones."""
-        begins = round(self._robot.scenario.cpg.start_up / self._step)
+        begins = round(self._start_up / self._step)
         observed = np.arange(first + 1, first + len(states) + 1)
         rows = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
         if not rows.size:
@@ -273,24 +268,24 @@ class _Simulator:
         return (axes @ forces[:, :, None])[:, :, 0]
 
 
-class _MujocoWalk:
-    """Simulation of a robot in MuJoCo, in stretches."""
+class _MujocoRobot(LoneRobot):
+    """A robot in MuJoCo, which is simulated in stretches."""
 
-    def __init__(self, simulation: GaitSimulation) -> None:
+    def __init__(self, driven: DrivenRobot, *, record: bool) -> None:
         """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
         long."""
-        self._simulation, robot = simulation, simulation.robot
+        self._driven, self._record, robot = driven, record, driven.robot
         settings, self.step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
         self.steps = max(1, round(settings.duration / self.step))
         if self.steps > settings.max_evaluations:
             reason = f"{self.steps} steps exceed the budget of {settings.max_evaluations}"
             raise StepBudgetExceeded(time=0.0, reason=reason)
-        self.times = motion_times(settings, record=simulation.record)
+        self.times = motion_times(settings, record=record)
         """Times (s) of the samples."""
         self.signals = np.zeros((len(self.times), robot.structure.signals))
         """Signals (times, m) in N of the samples."""
         self._steps_kept = np.rint(self.times / self.step).astype(int)
-        self._simulator, self._observer = _Simulator(robot), Observer(robot)
+        self._simulator, self._observer = _Simulator(driven), Observer(driven)
         if not is_stable(robot, self.step):
             reason = f"engine.step, {self.step:g} s, is too long for the robot's springs or dampers"
             raise Diverged(time=0.0, reason=reason)
@@ -298,26 +293,36 @@ class _MujocoWalk:
         self._kept = np.tile(self._state, (len(self.times), 1))
         self._drives = robot.starting_drives()
         self._drives_kept = np.tile(self._drives, (len(self.times), 1))
-        self._done, self._wall_time = 0, 0.0
-        self._change = robot.scenario.cpg.listing_step
-        self._before = self._held = robot.commanded[0] if len(robot.commanded) else self.signals[0]
+        self._done, self.wall_time = 0, 0.0
+        self._before = self._held = robot.first_signals
+        self._is_held = False
         self._began = self._paused = 0.0
 
-    def times_of_steps(self, first: int, last: int) -> Array:
-        """Times (s) from the beginning of step `first` to the beginning of step `last`."""
-        return self.step * np.arange(first, last + 1)
+    def copied(self) -> _MujocoRobot:
+        copy = _MujocoRobot(self._driven, record=self._record)
+        observer = copy._observer
+        observer.follow(self._observer)
+        own = {name: value.copy() for name, value in vars(self).items() if isinstance(value, Array)}
+        copy.__dict__.update(vars(self) | own | {"_observer": observer})
+        return copy
 
     def hold(self, signals: Array) -> None:
-        """Sets the signals (m,) in N, from now on."""
         self._before, self._held, self._began = self._held, signals.copy(), self._paused
+        self._is_held = True
 
     def advance_to(self, time: float) -> None:
         """Simulates the steps that begin before a time (s). Raises Diverged."""
         last = min(self.steps, math.ceil(time / self.step - 1e-6))
-        since = self.times_of_steps(self._done, last) - self._began
-        left = 1.0 - np.clip(since / self._change, 0.0, 1.0)[:, np.newaxis]
         self._paused = time
-        self.run(self._held - left * (self._held - self._before))
+        self.run(self._signals_at(self.step * np.arange(self._done, last + 1)))
+
+    def _signals_at(self, times: Array) -> Array:
+        """Signals (times, m) in N at times (s) after the latest pause."""
+        if not self._is_held:
+            return self._driven.signals_at(times)
+        change = self._driven.robot.scenario.cpg.listing_step
+        left = 1.0 - np.clip((times - self._began) / change, 0.0, 1.0)[:, np.newaxis]
+        return self._held - left * (self._held - self._before)
 
     def run(self, signals: Array) -> None:
         """Simulates steps with signals (steps + 1, m) in N at their beginnings and at the end of
@@ -346,41 +351,39 @@ class _MujocoWalk:
                 simulator.observe(self._observer, states, after, drives, first=done)
                 simulator.check(states, done)
                 self._done += len(states)
-        self._wall_time += time.perf_counter() - started
+        self.wall_time += time.perf_counter() - started
 
     def readings(self) -> Readings:
-        """The readings of the robot now."""
-        now, signals = np.array([self.step * self._done]), self._held
-        last = (self._state[np.newaxis], signals[np.newaxis], self._drives[np.newaxis])
-        moment = self._simulator.motion(now, *last)
+        now = np.array([self.step * self._done])
+        signals = self._signals_at(now)
+        moment = self._simulator.motion(
+            now, self._state[np.newaxis], signals, self._drives[np.newaxis]
+        )
         assert moment.ground_forces is not None
         return readings_at(
-            self._simulation.robot,
+            self._driven.robot,
             time=float(now[0]),
             state=moment.states[0],
             modes=moment.modes[0],
-            signals=signals,
+            signals=signals[0],
             drives=self._drives,
             ground_forces=moment.ground_forces[0],
         )
 
     def result(self) -> SimulationResult:
-        """The result, at the end."""
-        robot, totals = self._simulation.robot, self._observer.totals()
-        scheme = integrator_of(robot, pulled=self._simulator.pulled)
+        robot = self._driven.robot
         return make_result(
-            robot,
-            self._simulation.gait,
+            self._driven,
             self._simulator.motion(self.times, self._kept, self.signals, self._drives_kept),
-            totals=totals,
+            totals=self._observer.totals(),
             work=IntegratorWork(
-                scheme=scheme,
+                scheme=integrator_of(robot, pulled=self._simulator.pulled),
                 accuracy=self.step,
                 steps=self.steps,
                 derivative_evaluations=self.steps,
             ),
-            wall_time=self._wall_time,
-            record=self._simulation.record,
+            wall_time=self.wall_time,
+            record=self._record,
         )
 
 

@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from tetra_drake.kernels.allocation import write_tables
 from tetra_drake.kernels.compiling import compiled, machine_code
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.kernels.packed import Packed, unpacked
@@ -14,8 +15,7 @@ from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.tally import Tally, observe, update_clearance
-from tetra_drake.results.metrics import steady_start
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.driven import DrivenRobot
 
 Parts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
 """A robot, its tally, and the memory for its forces."""
@@ -28,9 +28,10 @@ class Observer:
     simulation.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, driven: DrivenRobot) -> None:
+        robot = driven.robot
         model, signals = robot.model, robot.structure.signals
-        self._tally = Tally.of(model, signals=signals, begins=steady_start(robot.scenario))
+        self._tally = Tally.of(model, signals=signals, begins=driven.steady_start)
         self._parts = Packed((model, self._tally, Forces.of(model)))
         state, drives = robot.structure.initial_state, robot.starting_drives()
         self._observe = machine_code(
@@ -40,6 +41,10 @@ class Observer:
     def add(self, time: float, state: np.ndarray, signals: np.ndarray, drives: np.ndarray) -> None:
         """Adds the state (13 bodies,), signals (m,) in N, and drives at a time (s)."""
         self._observe(self._parts, time, state, signals, drives)
+
+    def follow(self, other: Observer) -> None:
+        """Continues the tally of another observer."""
+        write_tables(self._tally, other._tally)
 
     def totals(self) -> Tally:
         """The tally of all added states."""

@@ -51,6 +51,10 @@ class Sampler:
         self._samples: list[Sample] = []
         self._latest: Sample | None = None
 
+    def follow(self, other: Sampler) -> None:
+        """Continues the samples of another sampler."""
+        self._samples, self._latest = other._samples.copy(), other._latest
+
     def after_step(self, context: Context) -> None:
         """Takes the samples within the step that has just ended."""
         due = self._times[len(self._samples) :]

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
+from concurrent.futures import Future
 
-from tetra_drake.engines.engine import Outcome, check_can_be_watched, engine_of
-from tetra_drake.engines.gait_simulation import Driver, GaitSimulation, Viewer
+from tetra_drake.engines.batch import Viewer
+from tetra_drake.engines.engine import check_can_be_watched, engine_of
+from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulation import Controller, simulate_controlled
 from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import Command
+from tetra_drake.robot.command import Command, Driver, driven_robot
 from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
+
+Outcome = SimulationResult | SimulationFailure
+"""Result of a simulation, or its failure: Diverged or StepBudgetExceeded."""
 
 
 def simulate(
@@ -61,7 +65,6 @@ def simulate(
         steering = constant_steering(steering)
     if viewer is not None:
         check_can_be_watched(scenario)
-    engine = engine_of(scenario)
     if controller is not None:
         if gait is not None or command is not None or steering is not None:
             raise InputError("simulate", "controller", "excludes a gait, a command, and steering")
@@ -73,11 +76,8 @@ def simulate(
     given = gait if command is None else command
     if given is None:
         raise InputError("simulate", "gait", "is needed, or a command, or a controller")
-    driver = _driver(given, scenario)
-    result = engine.simulate(
-        GaitSimulation.of(scenario, driver, record=record, viewer=viewer, steering=steering)
-    )
-    return dataclasses.replace(result, scenario=scenario)  # a command's has no network
+    robot = driven_robot(scenario, _driver(given, scenario), steering=steering)
+    return engine_of(scenario).simulate(robot, record=record, viewer=viewer)
 
 
 def simulate_many(
@@ -121,26 +121,26 @@ def simulate_many(
         problem = f"found {len(scenarios)}, expected one, or one for each of {len(gaits)} gaits"
         raise InputError("simulate_many", "scenario", problem)
     threads = min(threads_for(workers, source="simulate_many"), max(1, len(gaits)))
-    pairs = [(each, _driver(gait, each)) for each, gait in zip(scenarios, gaits, strict=True)]
-    engines = {engine_of(scenario) for scenario in scenarios}
-    if len(engines) == 1:
-        outcomes = engines.pop().simulate_many(pairs, record=record, threads=threads)
-    else:
-        outcomes = [engine_of(pair[0]).outcome(*pair, record=record) for pair in pairs]
-    return [_told(outcome, *pair) for outcome, pair in zip(outcomes, pairs, strict=True)]
+    if not all(engine_of(each).has_threads for each in scenarios):
+        threads = 1
+    drivers = [_driver(gait, each) for gait, each in zip(gaits, scenarios, strict=True)]
+    with SimulationQueue(threads, record=record) as queue:
+        results = queue.submit(zip(scenarios, drivers, strict=True))
+        return [*map(_outcome, results, scenarios, drivers)]
 
 
 def _driver(given: GivenGait | Command, scenario: Scenario) -> Driver:
     return given if isinstance(given, Command) else given_gait(given, scenario)
 
 
-def _told(outcome: Outcome, scenario: Scenario, driver: Driver) -> Outcome:
-    """An outcome that tells what was simulated."""
-    if isinstance(outcome, SimulationFailure):
-        outcome.scenario, outcome.name = scenario, driver.name
-        outcome.gait = None if isinstance(driver, Command) else driver
-        return outcome
-    return dataclasses.replace(outcome, scenario=scenario)  # a command's has no network
+def _outcome(result: Future[SimulationResult], scenario: Scenario, driver: Driver) -> Outcome:
+    """The result of a simulation, or its failure, which tells what was simulated."""
+    try:
+        return result.result()
+    except SimulationFailure as failure:
+        failure.scenario, failure.name = scenario, driver.name
+        failure.gait = None if isinstance(driver, Command) else driver
+        return failure
 
 
 def check_scenario(scenario: Scenario) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import math
 import numbers
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -13,16 +12,15 @@ from typing import Any, NoReturn, TypeGuard
 import numpy as np
 import numpy.typing as npt
 
+from tetra_drake.engines.batch import Batch, Viewer
 from tetra_drake.engines.engine import check_can_be_watched, engine_of
-from tetra_drake.engines.gait_simulation import MARK_DECIMALS, GaitSimulation, Viewer
-from tetra_drake.engines.stepper import Stepper
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import controlled_robot
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.driven import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
@@ -97,18 +95,13 @@ class Simulation:
         self._listing_steps = _listing_steps(control_period, scenario)
         self.control_period = self._listing_steps * scenario.cpg.listing_step
         """Time (s) between actions."""
-        self._gait = Gait(name=name, weights=(), tau_a=1.0, tau_b=1.0)
-        self._record, self._viewer = record, viewer
+        self._name, self._record, self._viewer = name, record, viewer
         self._robots = [self.robot] * count
-        self._stepper = self._new_stepper()
+        self._batch = self._new_batch()
         self._owner, self._is_whole = threading.RLock(), True
         shape = count, self.robot.driven.size
         self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
-        self._signals = np.empty(shape)
         self._steps = np.zeros(count, dtype=int)
-        self.failures: list[SimulationFailure | None] = [None] * count
-        """Failure of each robot (N,): Diverged or StepBudgetExceeded; None if there is none. Its
-        readings are the last ones, and its actions have no effect, until it is reset."""
         self.rest: np.ndarray = np.empty(shape)
         """Actions (N, actions) with which the robots start; they rest."""
         self.reset()
@@ -119,10 +112,16 @@ class Simulation:
         return len(self._robots)
 
     @property
+    def failures(self) -> list[SimulationFailure | None]:
+        """Failure of each robot (N,): Diverged or StepBudgetExceeded; None if there is none. Its
+        readings are the last ones, and its actions have no effect, until it is reset."""
+        return self._batch.failures
+
+    @property
     def state(self) -> Readings:
         """The readings of all robots now."""
         with self._used("state"):
-            return self._stepper.readings.copied()
+            return self._batch.readings.copied()
 
     @property
     def ended(self) -> np.ndarray:
@@ -152,7 +151,7 @@ class Simulation:
         with self._used("reset", is_whole=is_whole):
             robots = self._drawn(seed, places)
             if not self._is_whole:
-                self._stepper = self._new_stepper()
+                self._batch = self._new_batch()
             self._is_whole = False
             for place, robot in zip(places, robots, strict=True):
                 self._put(place, robot)
@@ -180,17 +179,12 @@ class Simulation:
             goes[self._places(indices)] = True
             goes &= [failure is None for failure in self.failures]
             signals = np.where(goes[:, np.newaxis], self._to_signals(actions, goes), 0.0)
-            marks = self._marks(goes, changed=(signals != self._signals).any(axis=1))
+            until = self._ends_of_period(goes)
             for place in np.flatnonzero(goes & (self._steps == 0)).tolist():
-                first = signals[place : place + 1].copy()
-                begun = dataclasses.replace(self._robots[place], commanded=first)
-                self._stepper.begin(place, self._gait_simulation(begun))
+                self._begin(place, signals[place].copy())
             self._is_whole = False
-            self._stepper.advance(signals, marks)
-            self._signals[goes] = signals[goes]
+            self._batch.advance(until, signals)
             self._steps[goes] += 1
-            for place in np.flatnonzero(goes & self._stepper.failed()).tolist():
-                self.failures[place] = self._stepper.failure(place)
             self._is_whole = True
             return self.state
 
@@ -199,11 +193,11 @@ class Simulation:
         InputError if it has not ended."""
         (place,) = self._places([place])
         if not self.ended[place]:
-            time = float(self._stepper.readings.time[place])
+            time = float(self._batch.readings.time[place])
             problem = f"robot {place} is at {time:g} s; its result exists at the end"
             raise InputError("Simulation", "result", problem)
         with self._used("result"):
-            return dataclasses.replace(self._stepper.result(place), scenario=self.scenario)
+            return self._batch.result(place)
 
     def __reduce__(self) -> NoReturn:
         problem = "cannot be copied or pickled: make another one from the same arguments"
@@ -224,10 +218,27 @@ class Simulation:
         finally:
             self._owner.release()
 
-    def _new_stepper(self) -> Stepper:
-        """A stepper of the scenario's engine for all robots."""
-        first = self._gait_simulation(self.robot)
-        return engine_of(self.scenario).stepper(first, count=self.count, threads=self._threads)
+    def _new_batch(self) -> Batch:
+        """A batch of the scenario's engine for all robots."""
+        first, engine = self._driven(self.robot), engine_of(self.scenario)
+        return engine.start(
+            [first],
+            places=self.count,
+            record=self._record,
+            viewer=self._viewer,
+            threads=self._threads,
+        )
+
+    def _driven(self, robot: Robot) -> DrivenRobot:
+        samples = robot.first_signals[np.newaxis]
+        return DrivenRobot(robot=robot, name=self._name, samples=samples)
+
+    def _begin(self, place: int, signals: np.ndarray) -> None:
+        """Lets a robot start with the signals (m,) in N of its first action."""
+        robot = dataclasses.replace(self._robots[place], first_signals=signals)
+        if not self._batch.begin(place, self._driven(robot)):
+            problem = "a disturbed robot has other kinds of laws, or more heights of its terrain"
+            raise InputError(self.scenario.name, "disturbances", problem)
 
     def _drawn(self, seed: int | Sequence[int] | None, places: list[int]) -> list[Robot]:
         """Some robots, with draws of the scenario's disturbances if there is a seed."""
@@ -252,10 +263,7 @@ class Simulation:
         self.rest[place] = robot.scenario.actuation.commands(cables)
         self._robots[place], self.failures[place], self._steps[place] = robot, None, 0
         first = self._first_readings if robot is self.robot else first_readings(robot)
-        self._stepper.readings.put(place, first)
-
-    def _gait_simulation(self, robot: Robot) -> GaitSimulation:
-        return GaitSimulation(robot, self._gait, record=self._record, viewer=self._viewer)
+        self._batch.readings.put(place, first)
 
     def _to_signals(self, actions: npt.ArrayLike, goes: np.ndarray) -> np.ndarray:
         """Signals (N, m) in N of actions. Actions of robots that do not go may be anything."""
@@ -273,22 +281,14 @@ class Simulation:
         times = (step * (self._listing_steps * steps)).round(MARK_DECIMALS)
         return np.where(times > duration - 0.5 * step, duration, times)
 
-    def _marks(self, goes: np.ndarray, *, changed: np.ndarray) -> np.ndarray:
-        """Times (N, marks) in s at which steps must end in the next control period: the same as for
-        a command. Raises InputError if a robot that goes has reached the end."""
-        simulation, starts = self.scenario.simulation, self._steps == 0
-        now, until = self._time_after(self._steps), self._time_after(self._steps + 1)
-        if (late := goes & (now >= simulation.duration)).any():
-            problem = f"robot {late.argmax()} has reached the end at {simulation.duration:g} s"
+    def _ends_of_period(self, goes: np.ndarray) -> np.ndarray:
+        """Times (N,) in s at which the next control period ends; 0 for robots that do not go.
+        Raises InputError if a robot that goes has reached the end."""
+        duration = self.scenario.simulation.duration
+        if (late := goes & (self._time_after(self._steps) >= duration)).any():
+            problem = f"robot {late.argmax()} has reached the end at {duration:g} s"
             raise InputError("Simulation", "step", f"{problem}; reset it")
-        change_ends = (now + self.scenario.cpg.listing_step).round(MARK_DECIMALS)
-        is_change = changed & ~starts & (change_ends < until)
-        change_ends = np.where(is_change, change_ends, math.inf)
-        steady = np.full(self.count, simulation.settling_time).round(MARK_DECIMALS)
-        is_within = (now < steady) & (steady < until) & (steady != change_ends)
-        start, steady = np.where(starts, 0.0, math.inf), np.where(is_within, steady, math.inf)
-        marks = np.sort(np.stack([start, change_ends, steady, until], axis=1), axis=1)
-        return np.where(goes[:, np.newaxis], marks, math.inf)
+        return np.where(goes, self._time_after(self._steps + 1), 0.0)
 
     def _places(self, indices: Sequence[int] | np.ndarray | None) -> list[int]:
         """The places of robots. Raises InputError for an index that is none."""

@@ -33,7 +33,7 @@ from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
 from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
-    from tetra_drake.engines.lanes.lane_pool import LanePool
+    from tetra_drake.engines.queue import SimulationQueue
 
 Objective = Callable[[SimulationResult], float]
 """Function of a result that evolution maximises; -inf or NaN is a failure. A function that reads
@@ -66,11 +66,11 @@ class GaitEvaluation:
         wall_time = time.perf_counter() - started
         return dataclasses.replace(self._combined(task, draws), wall_time=wall_time)
 
-    def in_lanes(self, task: Task, lanes: LanePool) -> Future[Evaluation]:
+    def on_queue(self, task: Task, queue: SimulationQueue) -> Future[Evaluation]:
         """Future of the evaluation of a vector. All draws are simulated side by side."""
         simulations, ended = self._simulations(task), itertools.count(1)
         time_budget = self.scenario.evolution.time_budget
-        results = lanes.submit(simulations, record=self._records, time_budget=time_budget)
+        results = queue.submit(simulations, time_budget=time_budget)
         evaluated = Future[Evaluation]()
 
         def end(_: object) -> None:
@@ -93,7 +93,7 @@ class GaitEvaluation:
         return GaitEvaluation, (self.scenario, self.objective)  # without the caches
 
     @property
-    def _records(self) -> bool:
+    def records(self) -> bool:
         """True if the objective needs the trajectory of each simulation."""
         return bool(getattr(self.objective, "needs_trajectory", False))
 
@@ -144,7 +144,7 @@ class GaitEvaluation:
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
         with time_limit(self.scenario.evolution.time_budget):
-            return simulate(scenario=scenario, gait=gait, record=self._records)
+            return simulate(scenario=scenario, gait=gait, record=self.records)
 
     def _fitness(self, result: SimulationResult) -> float:
         if self.objective is None:

@@ -31,7 +31,6 @@ from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Task
 
 if TYPE_CHECKING:
-    from tetra_drake.engines.lanes.lane_pool import LanePool
     from tetra_drake.evolution.evaluation import GaitEvaluation
 
 MakeExecutor = Callable[[int], Executor]
@@ -73,9 +72,8 @@ def evaluator_of(
 
     scenario, workers = evaluate.scenario, workers or available_cores()
     engine = engine_of(scenario)
-    lane_pool = engine.lane_pool
-    if executor is None and lane_pool is not None:
-        return InLanes(evaluate, lane_pool(workers))
+    if executor is None and engine.lanes > 1:
+        return InLanes(evaluate, workers)
     engine.prepare(scenario)
     if executor is not None:
         return OnExecutor(evaluate, executor, workers)
@@ -86,17 +84,20 @@ def evaluator_of(
 
 
 class InLanes(contextlib.AbstractContextManager["InLanes"]):
-    """Evaluates gaits in the lanes of the compiled engine."""
+    """Evaluates gaits in the lanes of the compiled engine, in several threads."""
 
-    def __init__(self, evaluate: GaitEvaluation, lanes: LanePool) -> None:
-        self._evaluate, self._lanes = evaluate, lanes
+    def __init__(self, evaluate: GaitEvaluation, workers: int) -> None:
+        from tetra_drake.engines.queue import SimulationQueue
+
+        self._evaluate = evaluate
+        self._queue = SimulationQueue(workers, record=evaluate.records)
 
     def __exit__(self, *error: object) -> None:
-        self._lanes.__exit__(*error)
+        self._queue.__exit__(*error)
 
     def submit(self, task: Task) -> Future[Evaluation]:
         """See Evaluator.submit()."""
-        return self._evaluate.in_lanes(task, self._lanes)
+        return self._evaluate.on_queue(task, self._queue)
 
 
 class InProcesses(contextlib.AbstractContextManager["InProcesses"]):

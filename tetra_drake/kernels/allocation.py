@@ -39,6 +39,15 @@ def allocate(kind: type[Record], sizes: Mapping[str, int]) -> Record:
     return kind(*fields)
 
 
+def write_tables(to: Record, source: Record) -> None:
+    """Writes the numbers of a NamedTuple of tables to another one of the same sizes."""
+    for ours, theirs in zip(to, source, strict=True):
+        if isinstance(ours, tuple):
+            write_tables(ours, theirs)
+        else:
+            ours[...] = theirs
+
+
 @dataclass(frozen=True)
 class _Table:
     """Table that an annotation defines."""

@@ -19,6 +19,7 @@ from tetra_drake.laws.tally import Tally
 from tetra_drake.machine import versions
 from tetra_drake.results.metrics import compute_fitness, compute_metrics, headline
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.path import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
@@ -153,8 +154,7 @@ def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
 
 
 def make_result(
-    robot: Robot,
-    gait: Gait,
+    driven: DrivenRobot,
     motion: Motion,
     *,
     totals: Tally,
@@ -167,6 +167,7 @@ def make_result(
     `motion` has the times of motion_times(). `totals` is the tally of the whole simulation.
     `wall_time` is in s.
     """
+    robot = driven.robot
     simulation, structure = robot.scenario.simulation, robot.structure
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
@@ -187,8 +188,8 @@ def make_result(
     return SimulationResult(
         scenario=robot.scenario,
         robot=robot,
-        name=gait.name,
-        gait=None if len(robot.commanded) else gait,
+        name=driven.name,
+        gait=driven.gait,
         metrics=metrics,
         fitness=compute_fitness(metrics, robot.scenario.objective),
         duration=simulation.duration,

@@ -1,4 +1,4 @@
-"""Commands for actuators: samples for each driven cable, in place of a network's signals."""
+"""Robots without a network: commands for actuators, and what controllers start from."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
+from tetra_drake.robot.driven import DrivenByGait, DrivenRobot
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, make_structure
+from tetra_drake.robot.robot import Robot, SteeringSignal, make_structure
 from tetra_drake.scenario.scenario import Scenario
-
-_NONE_COUPLED = -1
-"""Reach (see robot.weights) with which no oscillator inhibits another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,47 +29,47 @@ class Command:
     samples: np.ndarray
     """Setpoints (samples, driven cables). The kind of actuators defines the quantity; SI units."""
 
-    @property
-    def gait(self) -> Gait:
-        """A gait with the command's name. Its network has no effect."""
-        return Gait(name=self.name, weights=(), tau_a=1.0, tau_b=1.0)
+
+Driver = Gait | Command
+"""What drives the actuators of a simulation without a controller."""
 
 
-def commanded_robot(scenario: Scenario, command: Command) -> Robot:
-    """The robot of a scenario, driven by a command in place of a network.
-
-    Raises InputError if the command has another number of cables.
-    """
+def driven_robot(
+    scenario: Scenario, driver: Driver, *, steering: SteeringSignal | None = None
+) -> DrivenRobot:
+    """The robot of a scenario, driven by a gait or a command. Raises InputError if the command has
+    another number of cables."""
+    if isinstance(driver, Gait):
+        return DrivenByGait.of(Robot.of(scenario), driver, steering=steering)
     robot = robot_without_network(scenario)
     driven = robot.driven
-    if command.samples.shape[1:] != driven.shape:
-        problem = f"is of shape {command.samples.shape}, expected {driven.size} driven cables"
-        raise InputError(f"command {command.name}", "samples", problem)
-    held = held_samples(command, scenario.cpg.listing_step, scenario.simulation.duration)
+    if driver.samples.shape[1:] != driven.shape:
+        problem = f"is of shape {driver.samples.shape}, expected {driven.size} driven cables"
+        raise InputError(f"command {driver.name}", "samples", problem)
+    held = held_samples(driver, scenario.cpg.listing_step, scenario.simulation.duration)
     signals = scenario.actuation.signals(held, CableLaw.of(robot.structure.cables[driven]))
-    return dataclasses.replace(robot, commanded=signals)
+    robot = dataclasses.replace(robot, first_signals=signals[0])
+    return DrivenRobot(robot=robot, name=driver.name, samples=signals)
 
 
 def controlled_robot(scenario: Scenario) -> Robot:
-    """The robot of a scenario, with one signal for each driven cable. Its command is a single
-    sample, with which the actuators do at the start what they would do without a network."""
+    """The robot of a scenario, with one signal for each driven cable. Its first signals let the
+    actuators do at the start what they would do without a network."""
     robot, actuation = robot_without_network(scenario), scenario.actuation
     setpoints = actuation.commands(Robot.of(scenario).starting_cables())
     law = CableLaw.of(robot.structure.cables[robot.driven])
-    return dataclasses.replace(robot, commanded=actuation.signals(setpoints, law)[np.newaxis])
+    return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
 
 
 def robot_without_network(scenario: Scenario) -> Robot:
     """The robot of a scenario, with one signal for each driven cable.
 
-    It has no network, no start-up and no feedback. Actuators that imitate springs and dampers do
-    not do so here, because the command contains their effect.
+    Actuators that imitate springs and dampers do not do so here, because the command contains their
+    effect.
     """
     without_law = scenario.actuation.plays_cable
     structure = make_structure(scenario).with_oscillator_per_cable(without_law=without_law)
-    without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
-    cpg = scenario.cpg.model_copy(update=without_network | {"reach": _NONE_COUPLED})
-    return Robot.of(scenario.with_sections(cpg=cpg), structure)
+    return Robot.of(scenario, structure)
 
 
 def held_samples(command: Command, step: float, duration: float) -> np.ndarray:

@@ -93,14 +93,13 @@ class Readings(NamedTuple):
 
 
 def first_readings(robot: Robot) -> Readings:
-    """The readings of a robot at its start, where its actuators follow the first sample of its
-    command."""
+    """The readings of a robot at its start."""
     return readings_at(
         robot,
         time=0.0,
         state=robot.structure.initial_state,
         modes=robot.starting_modes,
-        signals=robot.commanded[0],
+        signals=robot.first_signals,
         drives=robot.starting_drives(),
     )
 

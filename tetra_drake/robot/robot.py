@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -61,9 +61,8 @@ class Robot:
     structure: Structure
     model: Model
     """Constants of bodies, cables and ground, in the form of the kernels."""
-    commanded: np.ndarray
-    """Signals (samples, m) in N of a command, at multiples of `cpg.listing_step` (see
-    robot.command). Without samples if a network makes the signals."""
+    first_signals: np.ndarray
+    """Signals (m,) in N at t = 0, which the actuators follow already."""
 
     @classmethod
     def of(cls, scenario: Scenario, structure: Structure | None = None) -> Self:
@@ -72,8 +71,8 @@ class Robot:
         Raises InputError if it would start in the ground or outside its terrain.
         """
         structure = structure or make_structure(scenario)
-        model, no_command = make_model(scenario, structure), np.zeros((0, structure.signals))
-        return cls(scenario, structure, model, commanded=no_command)
+        model = make_model(scenario, structure)
+        return cls(scenario, structure, model, first_signals=np.zeros(structure.signals))
 
     @property
     def driven(self) -> np.ndarray:
@@ -109,7 +108,11 @@ class Robot:
     @functools.cached_property
     def senses(self) -> Senses:
         """Constants of the oscillators' sensors. Raises InputError if there is no equilibrium."""
-        drivers, pathways = self.structure.drivers, self.scenario.cpg.feedback
+        return self.senses_of(self.scenario.cpg.feedback)
+
+    def senses_of(self, pathways: Collection[str]) -> Senses:
+        """As `senses`, for these pathways of feedback."""
+        drivers = self.structure.drivers
         groups = drivers - cable.PASSIVE
         sizes = np.bincount(groups)[groups]  # of each cable's group
         neutral = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))
@@ -231,8 +234,7 @@ class Robot:
         return self._at_start(self.structure.cables[self.driven])
 
     def _at_start(self, driven: np.ndarray) -> DrivenCables:
-        commanded = self.commanded[0] if len(self.commanded) else np.zeros(self.structure.signals)
-        law, signal = cable.CableLaw.of(driven), commanded[driven["signal"]]
+        law, signal = cable.CableLaw.of(driven), self.first_signals[driven["signal"]]
         return DrivenCables.at_rest(law, self._starting_lengths(driven), signal)
 
     def _starting_lengths(self, cables: np.ndarray) -> Any:

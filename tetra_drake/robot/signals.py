@@ -43,9 +43,7 @@ def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None)
 
 
 def sample_count(robot: Robot) -> int:
-    """Number of samples of a robot's command, or of raw_output() if there is no command."""
-    if len(robot.commanded):
-        return len(robot.commanded)
+    """Number of samples of raw_output()."""
     scenario = robot.scenario
     steps = scenario.simulation.duration / scenario.cpg.listing_step
     return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
@@ -54,11 +52,8 @@ def sample_count(robot: Robot) -> int:
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
     """Signals (samples, m) in N at multiples of `cpg.listing_step`, until after the duration.
 
-    Between samples the signals are linear. They are not set to zero before the start-up time. The
-    signals of a command do not depend on the gait.
+    Between samples the signals are linear. They are not set to zero before the start-up time.
     """
-    if len(robot.commanded):
-        return robot.commanded
     raw = raw_output(robot, gait, steering)
     return robot.scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
@@ -67,13 +62,16 @@ def signals_at(
     robot: Robot, gait: Gait, times: np.ndarray, *, steering: SteeringSignal | None = None
 ) -> np.ndarray:
     """Signals of the cables (times, m) in N at `times` (s); zero before the start-up time."""
-    samples, cpg = signal_samples(robot, gait, steering), robot.scenario.cpg
-    grid = cpg.listing_step * np.arange(len(samples))
-    signals = np.empty((len(times), samples.shape[1]))
-    for oscillator, column in enumerate(samples.T):
-        signals[:, oscillator] = np.interp(times, grid, column)
+    cpg = robot.scenario.cpg
+    signals = interpolated(signal_samples(robot, gait, steering), times, step=cpg.listing_step)
     signals[times < cpg.start_up - 1e-9] = 0.0
     return signals
+
+
+def interpolated(samples: np.ndarray, times: np.ndarray, *, step: float) -> np.ndarray:
+    """Values (times, m) at `times` (s) of samples (k, m) that are `step` (s) apart."""
+    grid = step * np.arange(len(samples))
+    return np.array([np.interp(times, grid, column) for column in samples.T]).T
 
 
 def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:

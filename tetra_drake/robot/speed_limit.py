@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from tetra_drake.laws.actuator import Limits
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.structure import node_positions
 
 LEAST_LIMIT = 10.16
 """Least default of the limit in m/s (400 in/s)."""
 
 
-def speed_limit(robot: Robot) -> float:
+def speed_limit(driven: DrivenRobot) -> float:
     """Speed limit of a robot's bodies in m/s: `simulation.max_speed`, by default a speed out of
     reach.
 
@@ -22,13 +22,14 @@ def speed_limit(robot: Robot) -> float:
     the lowest ground, of the cables at the start, and of a pull by each actuator over the length of
     its cable. To this speed is added what weight and loads give the robot where no ground stops it.
     """
+    robot = driven.robot
     scenario, structure = robot.scenario, robot.structure
     if scenario.simulation.max_speed is not None:
         return scenario.simulation.max_speed
     start, slope = node_positions(structure, structure.initial_state), scenario.terrain.plane_slope
     above = start[:, 2] - start[:, 0] * math.tan(slope or 0.0)
     fall = max(0.0, above.max() - (robot.ground.heights.min() if slope is None else 0.0))
-    speed = math.sqrt(2.0 * (robot.weight * fall + _cable_energy(robot, start)))
+    speed = math.sqrt(2.0 * (robot.weight * fall + _cable_energy(driven, start)))
     speed /= math.sqrt(structure.mass.min())
     downhill = math.sin(abs(slope or 0.0)) if structure.contacts.size else 1.0
     pushed = np.linalg.norm(structure.node_load, axis=1).sum() / structure.mass.sum()
@@ -36,11 +37,12 @@ def speed_limit(robot: Robot) -> float:
     return max(LEAST_LIMIT, float(speed + acceleration * scenario.simulation.duration))
 
 
-def _cable_energy(robot: Robot, p_WN: np.ndarray) -> float:
+def _cable_energy(driven: DrivenRobot, p_WN: np.ndarray) -> float:
     """Energy (J) of the cables at positions of the nodes, and work of a pull by each actuator.
 
     A pull is at most the force that stretches the cable by its whole length.
     """
+    robot = driven.robot
     cables, cpg = robot.structure.cables, robot.scenario.cpg
     length = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
     stretch = length - cables["free_length"]
@@ -48,6 +50,6 @@ def _cable_energy(robot: Robot, p_WN: np.ndarray) -> float:
         stretch = np.maximum(stretch, 0.0)
     pull = Limits(*robot.model.actuator.limits).max_force
     if math.isnan(pull):  # actuators without limits
-        pull = max(abs(cpg.gain * cpg.external_input), np.abs(robot.commanded).max(initial=0.0))
+        pull = max(abs(cpg.gain * cpg.external_input), np.abs(driven.samples).max(initial=0.0))
     pulls = np.minimum(pull, cables["stiffness"] * length) * length
     return float(0.5 * cables["stiffness"] @ stretch**2 + pulls[robot.driven].sum())

@@ -36,7 +36,7 @@ class HeldSignals(LeafSystem):
     The signals change as the actions of engines.simulation.Simulation do: linearly, within one
     `cpg.listing_step`. Only at t = 0 they are set at once. The discrete state is the signals before
     the change (m,) and after it (m,), and the time (s) of its beginning. At the start both are the
-    first sample of the robot's command. The output depends on state and time alone, so there is no
+    robot's first signals. The output depends on state and time alone, so there is no
     algebraic loop.
     """
 
@@ -48,9 +48,8 @@ class HeldSignals(LeafSystem):
         self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
         self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
         self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
-        first = robot.commanded[0] if len(robot.commanded) else np.zeros(signals)
         self._change = robot.scenario.cpg.listing_step
-        self.DeclareDiscreteState(np.concatenate([first, first, [0.0]]))
+        self.DeclareDiscreteState(np.concatenate([robot.first_signals, robot.first_signals, [0.0]]))
         tickets = {self.xd_ticket(), self.time_ticket()}
         self.DeclareVectorOutputPort("signals", signals, self._calc_signals, tickets)
 

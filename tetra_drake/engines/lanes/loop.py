@@ -43,7 +43,7 @@ from tetra_drake.laws.tally import Tally, observe
 Array = np.ndarray
 
 IDLE, RUNNING, DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(6)
-"""Status of a lane."""
+"""Status of a lane. DONE: it has reached its pause."""
 
 LEAST_STEP = 1e-9  # s
 SAFETY, SHRINK, GROW = 0.85, 0.2, 3.0
@@ -89,7 +89,8 @@ class Constants(NamedTuple):
     period: Table
     """Time (s) between samples of the listing's signals, or of the turns."""
     samples: Table
-    """Number of samples of the listing's signals. The last sample holds for ever."""
+    """Number of samples of the listing's signals, or of a command. The last sample holds for ever.
+    A controller gives further ones."""
     start_up: Table
     """Start-up time: signals act from then on."""
     tolerance: Table
@@ -140,6 +141,10 @@ class Log(NamedTuple):
     """Times (s) at which a step must end, ascending; infinite after the last."""
     passed: Annotated[Table, "places", int]
     """Number of marks that have passed."""
+    until: Annotated[Table, "places"]
+    """Times (s) at which simulations pause, at the latest their ends."""
+    change_ends: Annotated[Table, "places"]
+    """Times (s) at which changes of held signals end."""
     times: Annotated[Table, "places", "times"]
     """Times (s) of the samples, ascending; infinite after the last."""
     kept: Annotated[Table, "places", int]
@@ -391,7 +396,8 @@ def interpolate(
             signals[k, lane] = 0.0
         return
     position = time / by_lane(constants.period)[0, lane]
-    last = int(by_lane(constants.samples)[0, lane]) - 1
+    known = max(by_lane(constants.samples)[0, lane], by_lane(lanes.clock)[SAMPLES, lane])
+    last = int(known) - 1
     i = int(position)
     row, next_row = row_of(min(i, last), log), row_of(min(i + 1, last), log)
     place = log.place[lane]
@@ -416,9 +422,10 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
         if clock[STATUS, lane] != RUNNING or clock[TIME, lane] < clock[MARK, lane]:
             continue
         place = log.place[lane]
-        log.passed[place] += 1
-        clock[MARK, lane] = log.marks[place, log.passed[place]]
-        if clock[MARK, lane] == math.inf:
+        if clock[TIME, lane] >= log.marks[place, log.passed[place]]:
+            log.passed[place] += 1
+        clock[MARK, lane] = next_mark(log, place, clock[TIME, lane])
+        if clock[TIME, lane] >= log.until[place]:
             clock[STATUS, lane] = DONE
             done = True
         start_up = by_lane(constants.start_up)[0, lane]
@@ -430,6 +437,15 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
             force = by_lane(constants.gain)[0, lane] * by_lane(lanes.output)[k, lane]
             signals[k, lane] = clock[ACTIVE, lane] * force
     return done
+
+
+@inlined
+def next_mark(log: Log, place: int, time: float) -> float:
+    """Time (s) of the next mark of a simulation at a time (s): a pause is one, too."""
+    mark = min(log.marks[place, log.passed[place]], log.until[place])
+    if log.change_ends[place] > time:
+        mark = min(mark, log.change_ends[place])
+    return mark
 
 
 @merged

@@ -1,10 +1,7 @@
 """Robots in places: they take turns in the lanes of the simulation loop.
 
-A lane simulates a robot until its last mark, or its failure. Then the robot goes back to its place,
-and the lane takes the next one that waits. So no lane waits for the slowest.
-
-In control periods, the last mark is a pause. A robot that waits has the sample of a command for the
-next period, and its marks. When it pauses, its readings are written.
+A lane simulates a robot until its pause, or its failure. Then the robot goes back to its place, its
+readings are written, and the lane takes the next one that waits. So no lane waits for the slowest.
 """
 
 from __future__ import annotations
@@ -41,10 +38,10 @@ class Places(NamedTuple):
     waiting: Annotated[Table, "places", int]
     """Places of the robots that wait for a lane, in their order."""
     queue: Annotated[Table, 2, int]
-    signals: Annotated[Table, "paused", "signals"]
-    """Samples in N of a command, from the robot's time on. Empty without control periods."""
-    marks: Annotated[Table, "paused", 4]
-    """Times (s) at which a step must end until the next pause, ascending; infinite after it."""
+    signals: Annotated[Table, "places", "signals"]
+    """Signals in N that controllers hold."""
+    holds: Annotated[Table, "places", int]
+    """1 for a robot that gets new signals when it takes a lane, otherwise 0."""
 
 
 class Memory(NamedTuple):
@@ -62,7 +59,7 @@ is live."""
 @functools.partial(compiled, nogil=True)
 def advance(parts: Parts, rounds: int) -> None:
     """Simulates until a robot has ended and no robot waits, at most `rounds`. A robot has ended at
-    its last mark, or failed. The last round is cut short if no robot is left.
+    its pause, or failed. The last round is cut short if no robot is left.
 
     The robots that wait at first begin together with a round, so that their clearances are due
     together.
@@ -73,7 +70,7 @@ def advance(parts: Parts, rounds: int) -> None:
         ended = False
         for _ in range(ROUND):
             has_ended = loop.iterate(constants, lanes, log, live)
-            if has_ended and places.marks.shape[0] > 0:
+            if has_ended:
                 read_paused(lanes, log, readings)
             measure_clearance(constants, lanes)
             if has_ended:
@@ -113,28 +110,31 @@ def exchange(parts: Parts) -> None:
                 places.states[log.place[lane], i] = memory.states[i, lane]
             clock[loop.STATUS, lane] = loop.IDLE
         if queue[NEXT] < queue[LAST]:
-            take(lanes, log, memory, places, lane, places.waiting[queue[NEXT]])
+            place = places.waiting[queue[NEXT]]
             queue[NEXT] += 1
-            if places.marks.shape[0] > 0:
+            take(lanes, log, memory, places, lane, place)
+            if places.holds[place] == 1:
                 hold(constants, lanes, log, lane, places)
 
 
 @inlined
 def take(lanes: LaneState, log: Log, memory: Memory, places: Places, lane: int, place: int) -> None:
-    """Copies a robot from its place to a lane."""
+    """Copies a robot from its place to a lane, and lets it go on."""
+    clock, searched = by_lane(lanes.clock), by_lane(lanes.forces.near_struts.p_WN)
     log.place[lane] = place
     for i in range(places.states.shape[1]):
         memory.states[i, lane] = places.states[place, i]
     for i in range(places.constants.shape[1]):
         memory.constants[i, lane] = places.constants[place, i]
-    searched = by_lane(lanes.forces.near_struts.p_WN)
+    clock[loop.MARK, lane] = loop.next_mark(log, place, clock[loop.TIME, lane])
+    clock[loop.STATUS, lane] = loop.RUNNING
     for node in range(searched.shape[0]):
         searched[node, 0, lane] = math.inf  # so that near struts are searched
 
 
 @inlined
 def hold(constants: Constants, lanes: LaneState, log: Log, lane: int, places: Places) -> None:
-    """Appends the sample of the robot in a lane to its command, and sets its marks.
+    """Appends the new signals of the robot in a lane to its samples.
 
     The robot is at a multiple of the listing's step. The signals change within a step, which begins
     now; the signals of a whole command change in the same way.
@@ -145,12 +145,8 @@ def hold(constants: Constants, lanes: LaneState, log: Log, lane: int, places: Pl
         log.recent[place, loop.row_of(now - 1, log), k] = held[k, lane]
         log.recent[place, loop.row_of(now, log), k] = held[k, lane]
         log.recent[place, loop.row_of(now + 1, log), k] = places.signals[place, k]
-    by_lane(constants.samples)[0, lane] = clock[loop.SAMPLES, lane] = now + 2.0
-    for i in range(places.marks.shape[1]):
-        log.marks[place, i] = places.marks[place, i]
-    log.passed[place] = 0
-    clock[loop.MARK, lane] = places.marks[place, 0]
-    clock[loop.STATUS, lane] = loop.RUNNING
+    clock[loop.SAMPLES, lane] = now + 2.0
+    places.holds[place] = 0
 
 
 @inlined
