@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 
-from tetra_drake.errors import SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.readings import Readings
@@ -34,6 +34,13 @@ class Batch:
     """Readings of all robots at their last pause. At the start only the times are set."""
     failures: list[SimulationFailure | None]
     """Failure of the robot in each place; None if it has not failed."""
+
+    def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
+        """Puts robots in the first places. Raises InputError if one does not fit."""
+        for place, robot in enumerate(robots):
+            if not self.begin(place, robot):
+                problem = "a robot has another structure, kind of law, or size than the first"
+                raise InputError(robot.name, f"robot {place}", problem)
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
         """Puts a robot at its start. Returns False if its tables do not fit beside the others'.
@@ -116,8 +123,7 @@ class SerialBatch(Batch):
         self._start = start
         self._robots: list[LoneRobot | None] = [None] * places
         self._reached, self._ends = np.zeros(places), np.zeros(places)
-        for place, robot in enumerate(robots):
-            self.begin(place, robot)
+        self._begin_all(robots)
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
         self._robots[place] = self._start(robot)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import bisect
-import functools
 import weakref
-from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
@@ -17,7 +15,7 @@ from pydrake.systems.analysis import (
 )
 from pydrake.systems.framework import Context, Diagram
 
-from tetra_drake.engines.batch import LoneRobot, SerialBatch, Viewer
+from tetra_drake.engines.batch import LoneRobot, Viewer
 from tetra_drake.engines.engine import Engine
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_of, frame_of
@@ -62,17 +60,8 @@ class DrakeEngine(Engine):
 
     can_be_watched, has_threads = True, False
 
-    def start(
-        self,
-        robots: Sequence[DrivenRobot],
-        *,
-        places: int | None = None,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        threads: int = 1,
-    ) -> SerialBatch:
-        start = functools.partial(_DiagramRobot, record=record, viewer=viewer)
-        return SerialBatch(start, robots, places or len(robots))
+    def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
+        return _DiagramRobot(robot, record=record, viewer=viewer)
 
 
 class _DiagramRobot(LoneRobot):

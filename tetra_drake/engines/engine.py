@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from tetra_drake.engines import ENGINES
-from tetra_drake.engines.batch import Batch, Viewer
+from tetra_drake.engines.batch import Batch, LoneRobot, SerialBatch, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import driven_robot
@@ -21,7 +21,7 @@ _BRIEF = 0.01
 
 
 class Engine:
-    """Base class of engines. A subclass must implement start(); the other methods have defaults."""
+    """Base class of engines. A subclass must implement alone() or start()."""
 
     can_be_watched: ClassVar[bool] = False
     """True if start() accepts a viewer."""
@@ -65,6 +65,14 @@ class Engine:
             InputError: if the engine cannot simulate a robot.
             SimulationFailure: if a robot fails before its first step.
         """
+
+        def start(robot: DrivenRobot) -> LoneRobot:
+            return self.alone(robot, record=record, viewer=viewer)
+
+        return SerialBatch(start, robots, places or len(robots))
+
+    def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
+        """A robot at its start, which this engine simulates alone. Raises the errors of start()."""
         raise NotImplementedError
 
     def simulate(

@@ -21,15 +21,13 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
-import functools
 import math
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.batch import LoneRobot, SerialBatch, Viewer
+from tetra_drake.engines.batch import LoneRobot, Viewer
 from tetra_drake.engines.engine import Engine
 from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_mjcf
 from tetra_drake.engines.observer import Observer
@@ -79,18 +77,9 @@ class MujocoEngine(Engine):
             raise InputError(scenario.name, "cpg.feedback", problem)
         check_mjcf(scenario)
 
-    def start(
-        self,
-        robots: Sequence[DrivenRobot],
-        *,
-        places: int | None = None,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        threads: int = 1,
-    ) -> SerialBatch:
-        self.check(robots[0].robot.scenario)
-        start = functools.partial(_MujocoRobot, record=record)
-        return SerialBatch(start, robots, places or len(robots))
+    def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
+        self.check(robot.robot.scenario)
+        return _MujocoRobot(robot, record=record)
 
 
 def is_stable(robot: Robot, step: float) -> bool:

@@ -43,6 +43,11 @@ def views(values: Any, numbers: np.ndarray) -> Any:
     return view(values)
 
 
+def numbered(values: Any) -> Any:
+    """NamedTuples like `values`, with the index of each number in numbers_of() in its place."""
+    return views(values, np.arange(numbers_of(values).size, dtype=float))
+
+
 def in_lanes(values: Any, width: int) -> tuple[Any, np.ndarray]:
     """Tables in lanes for NamedTuples of arrays, and their memory (numbers, lanes). All lanes have
     the numbers of `values`. They share the arrays of indices."""
