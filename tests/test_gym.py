@@ -15,7 +15,7 @@ from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatist
 from helpers.actuations import FORCE, MOTOR, WINCH
 from helpers.converged import shortly
 
-from tetra_drake.engines.lanes.lane_engine import processor_lanes
+from tetra_drake.engines.lanes.batch import processor_lanes
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.evolution.run import load_run

@@ -30,11 +30,11 @@ from scipy.integrate import solve_ivp
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.engine import engine_of
-from tetra_drake.engines.gait_simulation import GaitSimulation
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces
+from tetra_drake.robot.driven import DrivenByGait
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
@@ -61,8 +61,8 @@ def trajectory_of(robot: Robot, engine: str):
     """That of a robot that starts at rest, on an engine."""
     changes = {"engine": ENGINES[engine], "friction.stiffness": "0 N/m"}
     robot = dataclasses.replace(robot, scenario=robot.scenario.with_changes(changes))
-    simulation = GaitSimulation(robot, seeded_gait(robot.scenario, 3), record=True)
-    return engine_of(robot.scenario).simulate(simulation).trajectory
+    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario, 3))
+    return engine_of(robot.scenario).simulate(walk, record=True).trajectory
 
 
 def on_a_spring(robot: Robot, times: np.ndarray) -> np.ndarray:

@@ -8,8 +8,8 @@ from helpers.converged import shortly
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.command import driven_robot
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -48,6 +48,11 @@ def test_a_robot_of_another_size_moves_as_its_model(engine):
     assert np.ptp(model, axis=0).max() > 0.005
 
 
+def limit_of(scenario: Scenario) -> float:
+    """The speed limit (m/s) of a robot with a seeded gait."""
+    return speed_limit(driven_robot(scenario, seeded_gait(scenario)))
+
+
 @pytest.mark.parametrize(
     ("changes", "reached"),
     [
@@ -58,7 +63,7 @@ def test_a_robot_of_another_size_moves_as_its_model(engine):
 )
 def test_the_speed_limit_is_beyond_what_weight_and_loads_can_give(changes, reached):
     prism = load_scenario("prism")
-    limit = speed_limit(Robot.of(prism.with_changes(changes)))
+    limit = limit_of(prism.with_changes(changes))
     assert reached < limit < 3.0 * reached
     given = prism.with_changes({"simulation.max_speed": "2 m/s"} | changes)
-    assert speed_limit(Robot.of(given)) == 2.0
+    assert limit_of(given) == 2.0

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from tetra_drake.engines.gait_simulation import GaitSimulation
-from tetra_drake.engines.lanes.lane_engine import LaneEngine
-from tetra_drake.engines.lanes.prepared import Prepared
+from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.driven import DrivenByGait
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
@@ -46,12 +45,10 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
 
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
     """Result and motion of a robot that walks by a seeded gait on the compiled engine."""
-    prepared = Prepared.of(GaitSimulation(robot, seeded_gait(robot.scenario, seed), record=True))
-    engine = LaneEngine(prepared)
-    engine.load(0, prepared)
-    while not engine.advance(100_000):
-        pass
-    return engine.result(0), engine.motion(0)
+    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario, seed))
+    batch = LaneBatch([walk], places=1, record=True, threads=1)
+    batch.advance()
+    return batch.result(0), batch.motion(0)
 
 
 def end_on_diagram(robot: Robot) -> np.ndarray:

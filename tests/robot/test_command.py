@@ -8,7 +8,7 @@ from tetra_drake.laws.cable import CableLaw
 from tetra_drake.prototype.command_file import command_columns
 from tetra_drake.robot.command import (
     Command,
-    commanded_robot,
+    driven_robot,
     held_samples,
     robot_without_network,
 )
@@ -36,12 +36,14 @@ def test_a_sample_is_held_for_ten_milliseconds_and_the_last_for_ever(step, befor
 
 
 def test_each_driven_cable_has_a_signal_of_its_own(scenario):
-    plain, robot = Robot.of(scenario), commanded_robot(scenario, counting())
+    plain, driven = Robot.of(scenario), driven_robot(scenario, counting())
+    robot = driven.robot
     assert robot.structure.cables["signal"][plain.driven].tolist() == list(range(8))
     names = np.array(plain.structure.cable_names)[plain.driven].tolist()
     assert list(robot.structure.oscillators) == names
     assert robot.structure.signals == 8
-    assert robot.commanded[0].tolist() == list(range(8)), "no start-up gate"
+    assert driven.samples[0].tolist() == list(range(8))
+    assert driven.start_up == 0.0
 
 
 def test_commands_have_the_order_of_the_oscillators_and_drives_that_of_the_cables():
@@ -61,14 +63,14 @@ def test_commands_have_the_order_of_the_oscillators_and_drives_that_of_the_cable
 
 def test_a_free_length_is_the_signal_that_shortens_the_cable_to_it(scenario):
     wound = scenario.with_changes(WINCH)
-    robot = commanded_robot(wound, counting())
+    robot = driven_robot(wound, counting()).robot
     law = robot.structure.cables[robot.driven]
-    lengths = law["free_length"] - robot.commanded[0] / law["stiffness"]
+    lengths = law["free_length"] - robot.first_signals / law["stiffness"]
     np.testing.assert_allclose(lengths, np.arange(8.0), atol=1e-12)
 
 
 def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenario):
-    robot = commanded_robot(scenario.with_changes(MOTOR), counting())
+    robot = driven_robot(scenario.with_changes(MOTOR), counting()).robot
     law = robot.structure.cables[robot.driven]
     assert not any(law[name].any() for name in CableLaw._fields)
     passive = np.delete(robot.structure.cables, robot.driven)
@@ -79,4 +81,4 @@ def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenari
 @pytest.mark.parametrize("cables", [7, 24])
 def test_a_command_for_other_cables_is_refused(scenario, cables, refused):
     with refused("command counting", "samples", "expected 8 driven cables"):
-        commanded_robot(scenario, counting(cables))
+        driven_robot(scenario, counting(cables))

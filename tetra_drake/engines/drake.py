@@ -140,17 +140,17 @@ class _DiagramRobot(LoneRobot):
 
     def copied(self) -> _DiagramRobot:
         copy = _DiagramRobot(self._driven, record=self._record, viewer=self._viewer)
-        context = copy._simulator.get_mutable_context()
-        context.SetTimeStateAndParametersFrom(self._simulator.get_context())
-        parameters = InitializeParams()
-        parameters.suppress_initialization_events = True
-        copy._simulator.Initialize(parameters)
         copy._marks, copy._change_end = self._marks.copy(), self._change_end
         copy._held, copy.wall_time = self._held, self.wall_time
         copy._work.follow(self._work)
         copy._aimer.follow(self._aimer)
         copy._sampler.follow(self._sampler)
         copy._observer.follow(self._observer)
+        context = copy._simulator.get_mutable_context()
+        context.SetTimeStateAndParametersFrom(self._simulator.get_context())
+        parameters = InitializeParams()
+        parameters.suppress_initialization_events = True
+        copy._simulator.Initialize(parameters)
         return copy
 
     def result(self) -> SimulationResult:
@@ -173,13 +173,14 @@ class _DiagramRobot(LoneRobot):
         self._check(now, velocities)
         self._aimer.aim(context, velocities)
         self._sampler.after_step(context)
-        drives = self._drives_at(context)
-        self._observer.add(now, bodies, self._signals.Eval(context), drives)
-        begins = now == self._driven.start_up and self._diagram.HasSubsystemNamed("cpg")
-        if begins:  # the event is after this step
+        signals, drives = [self._signals.Eval(context)], self._drives_at(context)
+        if now == self._driven.start_up and self._diagram.HasSubsystemNamed("cpg"):
+            # The event that lets signals act is after this step.
             cpg = self._diagram.GetSubsystemByName("cpg")
-            begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
-            self._observer.add(now, bodies, begun, drives)
+            signals.append(cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context)))
+        for each in signals:
+            moment = np.array([now]), bodies[np.newaxis], each[np.newaxis], drives[np.newaxis]
+            self._observer.add(*moment)
         if viewer is not None and viewer.wants(now):
             viewer.show(frame_of(robot, self._diagram, context))
 

@@ -60,7 +60,6 @@ Array = np.ndarray
 INSTALL = 'pip install "mujoco>=3.13"'
 
 _STRETCH = 5000  # steps between two checks of stability
-_OBSERVED = 16  # steps from one observation to the next; 1 ms with the default step
 
 
 class MujocoEngine(Engine):
@@ -122,7 +121,7 @@ class _Simulator:
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
         robot = driven.robot
-        self._robot, self._start_up = robot, driven.start_up
+        self._robot = robot
         self.pulled = is_pulled(robot)
         """True if the law of the other engines computes the tensions at each step."""
         self._touches = robot.model.strut_contact.acts
@@ -189,21 +188,6 @@ class _Simulator:
             return
         lengths, rates = data.ten_length, data.ten_velocity
         pull_cables(self._parts, lengths, rates, signals, step, drives, data.ctrl[: lengths.size])
-
-    def observe(
-        self, observer: Observer, states: Array, signals: Array, drives: Array, *, first: int
-    ) -> None:
-        """Passes states to an observer, with their signals and drives: every _OBSERVED-th one, and
-        the state at the end of the start-up. They are after step `first` and the following ones."""
-        begins = round(self._start_up / self._step)
-        observed = np.arange(first + 1, first + len(states) + 1)
-        rows = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
-        if not rows.size:
-            return
-        times = (self._step * observed[rows]).tolist()
-        bodies = self.body_states(states[rows])
-        for moment in zip(times, bodies, signals[rows], drives[rows], strict=True):
-            observer.add(*moment)
 
     def check(self, states: Array, first: int) -> None:
         """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
@@ -321,8 +305,8 @@ class _MujocoRobot(LoneRobot):
         started, simulator = time.perf_counter(), self._simulator
         if self._done == 0 and len(signals) > 1:
             self.signals[0] = signals[0]
-            start = simulator.body_states(self._kept[:1])[0]
-            self._observer.add(0.0, start, signals[0], self._drives)
+            start = simulator.body_states(self._kept[:1])
+            self._observer.add(np.zeros(1), start, signals[:1], self._drives[np.newaxis])
         with Rollout(nthread=0) as rollout:
             for first in range(0, len(signals) - 1, _STRETCH):
                 check_time()
@@ -337,7 +321,8 @@ class _MujocoRobot(LoneRobot):
                 rows = self._steps_kept[here] - done - 1
                 self._kept[here], self.signals[here] = states[rows], after[rows]
                 self._drives_kept[here] = drives[rows]
-                simulator.observe(self._observer, states, after, drives, first=done)
+                times = self.step * np.arange(done + 1, done + len(states) + 1)
+                self._observer.add(times, simulator.body_states(states), after, drives)
                 simulator.check(states, done)
                 self._done += len(states)
         self.wall_time += time.perf_counter() - started

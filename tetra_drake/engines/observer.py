@@ -17,6 +17,9 @@ from tetra_drake.laws.model import Model
 from tetra_drake.laws.tally import Tally, observe, update_clearance
 from tetra_drake.robot.driven import DrivenRobot
 
+CLEARED = 16
+"""Number of states from one computation of the clearance to the next, of states added at once."""
+
 Parts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
 """A robot, its tally, and the memory for its forces."""
 
@@ -34,13 +37,15 @@ class Observer:
         self._tally = Tally.of(model, signals=signals, begins=driven.steady_start)
         self._parts = Packed((model, self._tally, Forces.of(model)))
         state, drives = robot.structure.initial_state, robot.starting_drives()
-        self._observe = machine_code(
-            observe_state, self._parts, 0.0, state, np.zeros(signals), drives
-        )
+        one = np.zeros(1), state[np.newaxis], np.zeros((1, signals)), drives[np.newaxis]
+        self._observe = machine_code(observe_states, self._parts, *one)
 
-    def add(self, time: float, state: np.ndarray, signals: np.ndarray, drives: np.ndarray) -> None:
-        """Adds the state (13 bodies,), signals (m,) in N, and drives at a time (s)."""
-        self._observe(self._parts, time, state, signals, drives)
+    def add(
+        self, times: np.ndarray, states: np.ndarray, signals: np.ndarray, drives: np.ndarray
+    ) -> None:
+        """Adds states (k, 13 bodies), signals (k, m) in N, and drives (k, drives) at times (k,) in
+        s."""
+        self._observe(self._parts, times, states, signals, drives)
 
     def follow(self, other: Observer) -> None:
         """Continues the tally of another observer."""
@@ -52,18 +57,25 @@ class Observer:
 
 
 @compiled
-def observe_state(parts: Parts, time: float, state: Table, signals: Table, drives: Table) -> None:
-    """Adds a state (13 bodies,), signals (m,) and drives at a time (s) to the tally.
+def observe_states(
+    parts: Parts, times: Table, states: Table, signals: Table, drives: Table
+) -> None:
+    """Adds states (k, 13 bodies), signals (k, m) and drives (k, drives) at times (k,) in s to the
+    tally.
 
-    The tally does not depend on friction modes.
+    The tally does not depend on friction modes. The clearance is of each CLEARED-th state, and of
+    the last.
     """
     robot, tally, forces = unpacked(parts)
     modes = np.zeros((robot.ground.contacts.size, MODE_COLUMNS))
     generalized = np.empty(6 * robot.bodies.mass.size)
-    move_robot(robot, state, forces)
-    update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
-    for i in range(drives.size):
-        forces.drives[i, DRIVE] = drives[i]
-    compute_forces(robot, state, modes, signals, True, forces, generalized)
-    observe(tally, robot, time, signals, forces)
-    update_clearance(tally, robot, state, forces.nodes)
+    for k in range(times.size):
+        state = states[k]
+        move_robot(robot, state, forces)
+        update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
+        for i in range(drives.shape[1]):
+            forces.drives[i, DRIVE] = drives[k, i]
+        compute_forces(robot, state, modes, signals[k], True, forces, generalized)
+        observe(tally, robot, times[k], signals[k], forces)
+        if (k + 1) % CLEARED == 0 or k + 1 == times.size:
+            update_clearance(tally, robot, state, forces.nodes)

@@ -70,8 +70,10 @@ def signals_at(
 
 def interpolated(samples: np.ndarray, times: np.ndarray, *, step: float) -> np.ndarray:
     """Values (times, m) at `times` (s) of samples (k, m) that are `step` (s) apart."""
-    grid = step * np.arange(len(samples))
-    return np.array([np.interp(times, grid, column) for column in samples.T]).T
+    grid, values = step * np.arange(len(samples)), np.empty((len(times), samples.shape[1]))
+    for column, given in enumerate(samples.T):
+        values[:, column] = np.interp(times, grid, given)
+    return values
 
 
 def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:

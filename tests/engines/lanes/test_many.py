@@ -12,10 +12,9 @@ import pytest
 import xarray
 from helpers.anchored import HUNG, scenario_of
 
-from tetra_drake.engines.gait_simulation import GaitSimulation
-from tetra_drake.engines.lanes.lane_engine import LaneEngine
-from tetra_drake.engines.lanes.lane_pool import LanePool
+from tetra_drake.engines.lanes.batch import LaneBatch, processor_lanes
 from tetra_drake.engines.lanes.prepared import Prepared
+from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
     Diverged,
@@ -31,6 +30,7 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.driven import DrivenByGait
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.common_sections import Disturbances
@@ -79,28 +79,34 @@ def short(scenario: Scenario) -> Scenario:
 Ending = tuple[SimulationResult | SimulationFailure, Motion]
 
 
-def endings(walks: list[Prepared]) -> list[Ending]:
-    """Outcomes and motions in an engine whose lanes take the next gait when one has ended."""
-    widest = max(walks, key=lambda walk: walk.robot.ground.heights.size)
-    engine = LaneEngine(widest)
+def batch_of(first: DrivenByGait) -> LaneBatch:
+    """A batch of one thread for robots like the first one."""
+    return LaneBatch([first], places=processor_lanes(), record=True, threads=1)
+
+
+def endings(walks: list[DrivenByGait]) -> list[Ending]:
+    """Outcomes and motions in a batch whose places take the next gait when one has ended."""
+    batch = batch_of(max(walks, key=lambda walk: walk.robot.ground.heights.size))
+    batch.stop(0)
     waiting, found, in_place = list(enumerate(walks)), dict[int, Ending](), dict[int, int]()
     while waiting or in_place:
-        for place in engine.idle[: len(waiting)]:
+        for place in [i for i in range(processor_lanes()) if i not in in_place][: len(waiting)]:
             in_place[place], walk = waiting.pop(0)
-            engine.load(place, walk)
-        for place in engine.advance(1000):
+            assert batch.begin(place, walk)
+        batch.advance(briefly=True)
+        for place in filter(batch.ended, list(in_place)):
             try:
-                outcome = engine.result(place)
+                outcome = batch.result(place)
             except SimulationFailure as failure:
                 outcome = failure
-            found[in_place.pop(place)] = outcome, engine.motion(place)
-            engine.stop(place)
+            found[in_place.pop(place)] = outcome, batch.motion(place)
+            batch.stop(place)
     return [found[i] for i in range(len(walks))]
 
 
-def prepared(robot: Robot, seed: int = 0) -> Prepared:
-    """A seeded gait to be recorded."""
-    return Prepared.of(GaitSimulation(robot, seeded_gait(robot.scenario, seed), record=True))
+def walk_of(robot: Robot, seed: int = 0) -> DrivenByGait:
+    """A robot that walks by a seeded gait."""
+    return DrivenByGait.of(robot, seeded_gait(robot.scenario, seed))
 
 
 def same(a: Ending, b: Ending) -> bool:
@@ -118,7 +124,7 @@ def same(a: Ending, b: Ending) -> bool:
 def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, name):
     changes, expected = zip(*NEIGHBOURS[name], strict=True)
     robots = [Robot.of(short.with_changes(change)) for change in changes]
-    walks = [prepared(robots[i % len(robots)], i) for i in range(11)]
+    walks = [walk_of(robots[i % len(robots)], i) for i in range(11)]
     alone = [endings([walk])[0] for walk in walks]
     assert tuple(type(outcome) for outcome, _ in alone[: len(robots)]) == expected
     assert not any(same(one, other) for one, other in itertools.pairwise(alone))
@@ -172,24 +178,24 @@ def test_every_gait_may_have_a_scenario_of_its_own(short, workers):
     assert len({each.metrics.distance for each in alone}) == len(alone), "all of them differ"
 
 
-def test_robots_that_differ_in_numbers_alone_share_an_engine(short):
+def test_robots_that_differ_in_numbers_alone_share_a_batch(short):
     """Else disturbed robots would walk one after another. Where tables are indexed otherwise, a
-    robot needs an engine of its own."""
-    engine = LaneEngine(prepared(Robot.of(short)))
+    robot needs a batch of its own."""
+    batch = batch_of(walk_of(Robot.of(short)))
     stiff = {"robot.cables.outer_stiffness": "0.21 lbf/in", "robot.cables.damping": "0.04 lbf*s/in"}
     wide = {"robot.spacing": "3 in", "ground.stiffness": "20 lbf/in"}
     moved = {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}
     for change in (stiff, wide, moved):
-        assert engine.accepts(prepared(Robot.of(short.with_changes(change)))), change
+        assert batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
     sides = [["outer bottom_left"], ["outer bottom_right"]]
     others = {"tetrahedra": 3, "cables.slack": True, "contacts": "all", "actuation": sides}
     for change in ({f"robot.{key}": value} for key, value in others.items()):
-        assert not engine.accepts(prepared(Robot.of(short.with_changes(change)))), change
+        assert not batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
 
 
 def test_a_table_of_indices_that_somebody_adds_is_part_of_the_kind(short):
     """Else a kernel would take a robot whose indices lead elsewhere in its tables."""
-    walk = prepared(Robot.of(short))
+    walk = Prepared.of(walk_of(Robot.of(short)), record=False)
 
     class Added(NamedTuple):
         solver: object
@@ -209,41 +215,41 @@ def test_scenarios_and_gaits_have_to_fit(short):
     with pytest.raises(InputError) as caught:
         simulate_many(scenario=short.with_changes({"robot.tetrahedra": 3}), gaits=[gait])
     assert caught.value.key == "weights"
-    with LanePool(1) as pool:  # a gait that is refused leaves the lanes as they are
+    with SimulationQueue(1) as queue:  # a gait that is refused leaves the lanes as they are
         fit, misfit = (short, gait), (short, dataclasses.replace(gait, weights=(1.0,) * 4))
-        futures = pool.submit([fit, misfit, fit, misfit, misfit, fit])
+        futures = queue.submit([fit, misfit, fit, misfit, misfit, fit])
         assert [future.exception() is None for future in futures] == [1, 0, 1, 0, 0, 1]
     assert simulate_many(scenario=short, gaits=[]) == []
 
 
 def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
     gait, endless = seeded_gait(short), short.with_changes({"simulation.duration": "1 h"})
-    with LanePool(1) as pool:
+    with SimulationQueue(1) as queue:
         with pytest.raises(TimeBudgetExceeded):
-            pool.submit([(endless, gait)], time_budget=0.05)[0].result()
-        found = pool.submit([(short, gait)])[0].result()
+            queue.submit([(endless, gait)], time_budget=0.05)[0].result()
+        found = queue.submit([(short, gait)])[0].result()
     assert found.metrics == simulate(scenario=short, gait=gait).metrics
 
 
 def test_an_error_of_the_engine_reaches_those_who_wait(short, monkeypatch):
-    def fail(self, iterations):
+    def fail(self, **options):
         raise MemoryError
 
     gait = seeded_gait(short)
-    with LanePool(1) as pool:
+    with SimulationQueue(1) as queue:
         with monkeypatch.context() as patch:
-            patch.setattr(LaneEngine, "advance", fail)
-            futures = pool.submit([(short, gait)] * 12)
+            patch.setattr(LaneBatch, "advance", fail)
+            futures = queue.submit([(short, gait)] * 12)
             assert all(isinstance(future.exception(), MemoryError) for future in futures)
-        (future,) = pool.submit([(short, gait)])
+        (future,) = queue.submit([(short, gait)])
         assert future.result().metrics.distance != 0.0
 
 
-def test_the_end_of_a_pool_cancels_what_is_under_way(short):
+def test_the_end_of_a_queue_cancels_what_is_under_way(short):
     endless = short.with_changes({"simulation.duration": "1 h"})
     before = threading.active_count()
-    with LanePool(2) as pool:
-        futures = pool.submit([(endless, seeded_gait(endless))] * 40)
+    with SimulationQueue(2) as queue:
+        futures = queue.submit([(endless, seeded_gait(endless))] * 40)
         time.sleep(0.1)  # some are under way, some wait
     assert threading.active_count() == before
     assert all(isinstance(future.exception(), CancelledError) for future in futures)
