@@ -1,7 +1,9 @@
 """Tally of a simulation: sums and extremes over all steps, which metrics are computed from.
 
 A part of the tally is a NamedTuple of tables, with a kernel that adds a step to them. All engines
-call observe(), which calls these kernels. scenario.metrics computes metrics from the tables.
+call observe(), which calls these kernels, at every step. On MuJoCo, which has its own contact, the
+forces of the ground here are the law's at MuJoCo's states. scenario.metrics computes metrics from
+the tables.
 """
 
 from __future__ import annotations
