@@ -88,7 +88,7 @@ class LaneBatch(Batch):
         return self._places.states[:, loop.TIME]
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
-        prepared = self._first if robot is self._first.driven else self._first.begun_by(robot)
+        prepared = self._first if robot is self._first.driven else self._first.like(robot)
         if not self._accepts(prepared):
             return False
         self._load(place, prepared)
@@ -99,7 +99,7 @@ class LaneBatch(Batch):
         robot, and no more samples, marks, turns or heights."""
         log = self._log
         return (
-            prepared.kind == self._first.kind
+            self._first.fits(prepared)
             and len(prepared.times) < log.times.shape[1]
             and len(prepared.driven.marks) < log.marks.shape[1]
             and prepared.recent_signals <= log.recent.shape[1]

@@ -54,18 +54,39 @@ class Prepared:
             start=_start(driven, turns, solver),
         )
 
-    def begun_by(self, driven: DrivenRobot) -> Prepared:
-        """As Prepared.of(driven), in less time if a controller drives both robots, and they differ
-        by their first signals alone."""
-        robot, own = driven.robot, self.robot
-        is_same = robot.model is own.model and robot.scenario is own.scenario
-        controlled = driven.gait is None and len(driven.samples) == len(self.driven.samples) == 1
-        if not (is_same and controlled):
+    def like(self, driven: DrivenRobot) -> Prepared:
+        """As Prepared.of(driven), in less time if it is the same robot with another gait, or with
+        other first signals."""
+        if not self._is_alike(driven):
             return Prepared.of(driven, record=self.record)
-        start, drives = self.start, self.start.drives.copy()
-        drives[:, DRIVE] = robot.starting_drives()
-        start = start._replace(signals=robot.first_signals, drives=drives)
-        return dataclasses.replace(self, driven=driven, start=start)
+        turns, drives = driven.turns, self.start.drives.copy()
+        drives[:, DRIVE] = driven.robot.starting_drives()
+        return dataclasses.replace(
+            self,
+            driven=driven,
+            turns=turns,
+            constants=self.constants._replace(network=driven.network, gains=driven.gains),
+            start=self.start._replace(
+                signals=driven.robot.first_signals,
+                drives=drives,
+                tonic=driven.robot.tonic_input(turns)[0],
+            ),
+        )
+
+    def _is_alike(self, driven: DrivenRobot) -> bool:
+        """True if a robot differs from this one by its gait, or by its first signals alone."""
+        robot, own = driven.robot, self.robot
+        return (
+            type(driven) is type(self.driven)
+            and len(driven.samples) == len(self.driven.samples) <= 1
+            and robot.model is own.model
+            and robot.structure is own.structure
+            and robot.scenario is own.scenario
+        )
+
+    def fits(self, other: Prepared) -> bool:
+        """True if both can share lanes."""
+        return self._is_alike(other.driven) or other.kind == self.kind
 
     @property
     def robot(self) -> Robot:
