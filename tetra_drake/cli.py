@@ -16,7 +16,7 @@ from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, file_names, write_whole
 from tetra_drake.interrupts import heeding_interrupts
-from tetra_drake.options import BAD_INPUT, Command, Option, integer, number, quantity, size
+from tetra_drake.options import BAD_INPUT, CommandParser, Option, integer, number, quantity, size
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.settings.units import INCH, SYSTEMS, shown_in
 
@@ -60,16 +60,16 @@ def _drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def make_parser() -> Command:
+def make_parser() -> CommandParser:
     """The parser of all commands."""
-    parser = Command(
+    parser = CommandParser(
         prog="tetra-drake",
         description="Simulate a walking tensegrity robot, nested tetrahedra driven by a Matsuoka "
         "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    common = Command(add_help=False)
+    common = CommandParser(add_help=False)
     common.add_argument(
         "--units",
         choices=[*SYSTEMS],
@@ -108,15 +108,15 @@ Reach = Annotated[
 Width = Annotated[
     float, Option(metavar="LENGTH", type=quantity("m", "3.4 in", least="2 in", most="40 in"))
 ]
-Unit = Annotated[str, Option(metavar="UNIT")]
+UnitName = Annotated[str, Option(metavar="UNIT")]
 Size = Annotated[tuple[int, int], Option(metavar="WxH", type=size)]
 FontSize = Annotated[float, Option(metavar="X", type=number(2, 40))]
 FrameRate = Annotated[float, Option(metavar="X", type=number(0.01, 240))]
-Speed = Annotated[float, Option(metavar="X", type=number(0.001, 1000))]
+PlaybackSpeed = Annotated[float, Option(metavar="X", type=number(0.001, 1000))]
 View = Annotated[str, Option(choices=("free", "side", "front", "top"))]
 Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
 Labels = Annotated[list[str], Option(metavar="NAME", nargs="+")]
-Run = Annotated[Folder, Option(metavar="RUN")]
+RunFolder = Annotated[Folder, Option(metavar="RUN")]
 GaitOrRun = Annotated[Path, Option(metavar="GAIT|RUN", type=Path)]
 RunOrResult = Annotated[Path, Option(metavar="RUN_DIR|RESULT_DIR", type=Path)]
 ResultOrGait = Annotated[Path, Option(metavar="RESULT_DIR|GAIT|RUN_DIR", type=Path)]
@@ -130,7 +130,7 @@ _ENGINE = "the Drake diagram, the same laws compiled, or MuJoCo (default: the sc
 
 FitPath = Annotated[Path, Option(metavar="FIT", type=Path)]
 ScenarioName = Annotated[str, Option(_SCENARIO, metavar="NAME|FILE")]
-GaitFile = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
+GaitPath = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
 GaitSeed = Annotated[Seed, Option(_SEED, group="gait")]
 CommandFile = Annotated[File, Option(_COMMAND, group="gait")]
 EngineName = Annotated[str, Option(_ENGINE, choices=tuple(ENGINES))]
@@ -138,7 +138,7 @@ StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
 
 
 def _simulate(
-    gait: GaitFile | None = None,
+    gait: GaitPath | None = None,
     *,
     scenario: ScenarioName | None = None,
     seed: GaitSeed | None = None,
@@ -198,7 +198,7 @@ def _simulate(
 
 
 def _export(
-    gait: GaitFile | None = None,
+    gait: GaitPath | None = None,
     *,
     seed: GaitSeed | None = None,
     scenario: ScenarioName | None = None,
@@ -331,7 +331,7 @@ def _video(
     size: Size = (1920, 1080),
     fps: FrameRate = 30.0,
     view: View = "free",
-    speed: Speed = 1.0,
+    speed: PlaybackSpeed = 1.0,
     out: File,
 ) -> None:
     """Write a video of a gait, for talks.
@@ -434,7 +434,7 @@ def _robustness(
 
 
 def _compare(
-    runs: list[Run],
+    runs: list[RunFolder],
     *,
     labels: Labels | None = None,
     scenarios: bool = False,
@@ -530,7 +530,7 @@ def _fit(
 
 
 def _cpg(
-    gait: GaitFile | None = None,
+    gait: GaitPath | None = None,
     *,
     scenario: ScenarioName | None = None,
     seed: GaitSeed | None = None,
@@ -561,7 +561,7 @@ def _cpg(
 def _structure(
     source: StructureName,
     *,
-    unit: Unit | None = None,
+    unit: UnitName | None = None,
     out: File | None = None,
     mjcf: File | None = None,
     sdf: File | None = None,

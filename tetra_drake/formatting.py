@@ -90,7 +90,7 @@ _NARROW = 12  # letters; texts are not folded into narrower columns
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """A table of texts with headings."""
 
     headings: Sequence[str]

@@ -19,7 +19,7 @@ from tetra_drake.analysis.joined_keys import with_joined_changes
 from tetra_drake.analysis.measurements import FitFile, Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
-from tetra_drake.formatting import Say, Table, fixed, listed, rounded, silent
+from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.scenario import Scenario
@@ -129,13 +129,15 @@ class Fit:
         return [*self.warnings, *clocks]
 
     @property
-    def table(self) -> Table:
+    def table(self) -> TextTable:
         """Values and intervals."""
         rows = []
         for key, row in self.parameters.iterrows():
             value = _with_uncertainty(row["value"], row["high"] - row["value"])
             rows.append([str(key), value, rounded(row["start"]), row["unit"] or "1"])
-        return Table(["key", "value, 95 % interval", "start", "unit"], rows, text_columns=(0, 3))
+        return TextTable(
+            ["key", "value, 95 % interval", "start", "unit"], rows, text_columns=(0, 3)
+        )
 
 
 def _with_uncertainty(value: float, half: float) -> str:

@@ -32,7 +32,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.common_sections import different_keys
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import read_mapping
-from tetra_drake.settings.quantities import Force, Length, Time, Unit
+from tetra_drake.settings.quantities import ForceQuantity, Length, Time, Unit
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of
 from tetra_drake.settings.units import given_quantity
@@ -152,13 +152,13 @@ class Rest(Section):
     """Values of scenario keys in this case, such as loads."""
     positions: dict[str, Annotated[Length, _SIZE]] = Field(default={})
     """Coordinates by node and axis, such as "n3 z"."""
-    tensions: dict[str, Annotated[Force, _SIZE]] = Field(default={})
+    tensions: dict[str, Annotated[ForceQuantity, _SIZE]] = Field(default={})
     """Tensions by the names of the cables."""
     frequencies: list[Annotated[Frequency, _SIZE]] = Field(default=[])
     """Natural frequencies, the lowest one first."""
     position_uncertainty: Annotated[Length, _UNCERTAINTY] = 1e-3
     """Standard deviation of a coordinate."""
-    tension_uncertainty: Annotated[Force, _UNCERTAINTY] = 1.0
+    tension_uncertainty: Annotated[ForceQuantity, _UNCERTAINTY] = 1.0
     """Standard deviation of a tension."""
     frequency_uncertainty: Annotated[Frequency, _UNCERTAINTY] = 0.05
     """Standard deviation of a frequency."""

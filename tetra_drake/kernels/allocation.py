@@ -19,10 +19,10 @@ from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-Record = TypeVar("Record", bound=tuple)
+NamedTupleT = TypeVar("NamedTupleT", bound=tuple)
 
 
-def allocate(kind: type[Record], sizes: Mapping[str, int]) -> Record:
+def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
     """A NamedTuple of new tables.
 
     Args:

@@ -41,7 +41,7 @@ GROWTH = 2.0
 """Factor on the population at each restart (IPOP)."""
 
 
-class CmaEs(Generational[kinds.CmaEs]):
+class CmaEsOptimizer(Generational[kinds.CmaEs]):
     """Several searches by CMA-ES. Each runs for TRYOUT evaluations; then the best continues. If it
     stalls, too, a new search begins.
 

@@ -24,7 +24,7 @@ GAIN_MUTATION = 0.2
 
 
 @dataclass(eq=False)
-class SteadyState:
+class SteadyStateOptimizer:
     """The thesis's optimiser: a random population, then two children per iteration.
 
     Both children have the same parents and the same mutation. Both are made before either enters

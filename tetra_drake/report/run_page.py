@@ -17,7 +17,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.figures.style import AS_USUAL, Print
 from tetra_drake.files import check_folder, write_whole
-from tetra_drake.formatting import Table, listed, render, rounded
+from tetra_drake.formatting import TextTable, listed, render, rounded
 from tetra_drake.machine import versions
 from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.report.run_figures import (
@@ -183,7 +183,7 @@ def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str], units: U
     return ", ".join(terms)
 
 
-def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]], scenario: Scenario) -> Table:
+def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]], scenario: Scenario) -> TextTable:
     return metrics_table({names[0]: gait for names, gait in gaits}, scenario)
 
 

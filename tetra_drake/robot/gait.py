@@ -13,7 +13,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
-from tetra_drake.formatting import Table, heading_html
+from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.feedback import Gains
 from tetra_drake.robot.weights import KINDS, Weights
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -79,7 +79,7 @@ class Gait:
             row = [[texts.get(f"{i}->{onto} {kind}", "-") for kind in KINDS] for i in oscillators]
             rows.append([onto, *("/".join(pair).replace("-/-", "-") for pair in row)])
         lines.append(f"weights ({'/'.join(KINDS)}), a column for each oscillator they come from")
-        return "\n".join([*lines, Table(["onto", *oscillators], rows).text()])
+        return "\n".join([*lines, TextTable(["onto", *oscillators], rows).text()])
 
     def __repr__(self) -> str:
         return f"<Gait {self.name}>"
@@ -89,7 +89,7 @@ class Gait:
         rows += self._further
         least, most = min(self.weights, default=0.0), max(self.weights, default=0.0)
         rows.append([f"{len(self.weights)} weights", f"{least:.2f} to {most:.2f}"])
-        return heading_html(self.name) + Table(["parameter", "value"], rows, (0, 1)).html()
+        return heading_html(self.name) + TextTable(["parameter", "value"], rows, (0, 1)).html()
 
     @property
     def _further(self) -> list[list[str]]:

@@ -23,7 +23,7 @@ from pydrake.multibody.tree import (
 )
 
 from tetra_drake.laws import cable, kinematics
-from tetra_drake.laws.capsules import Search
+from tetra_drake.laws.capsules import StrutSearch
 from tetra_drake.laws.model import Couplings
 from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.laws.struts import Struts
@@ -106,13 +106,13 @@ class Structure(Blueprint):
         return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
 
     @property
-    def strut_search(self) -> Search:
+    def strut_search(self) -> StrutSearch:
         """Distances of the search for struts that may touch; zeros if there are no struts."""
         if not self.strut_radius.size:
-            return Search(0.0, drift=0.0, passage=0.0, lightest=self.mass.min())
+            return StrutSearch(0.0, drift=0.0, passage=0.0, lightest=self.mass.min())
         skin = SKIN * self.strut_table.length.min()
         near, passage = 2.0 * self.strut_radius.max() + skin, PASSAGE * self.strut_radius.min()
-        return Search(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
+        return StrutSearch(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
 
     @property
     def least_radius(self) -> float:

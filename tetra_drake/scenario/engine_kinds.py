@@ -73,5 +73,5 @@ class Mujoco(EngineSettings):
         return friction.cone_text
 
 
-Engine = Annotated[Drake | Compiled | Mujoco, Kinds()]
+EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds()]
 """Union of the kinds of engines. A mapping without a tag is of the first kind."""

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from pydantic.fields import FieldInfo
 
-from tetra_drake.formatting import Table
+from tetra_drake.formatting import TextTable
 from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.quantities import Unit, UnitsByName, unit_of
@@ -66,7 +66,7 @@ def keys_page() -> str:
 
 def _table_of_keys(rows: Sequence[Row]) -> str:
     cells = [(f"`{key}`", *rest) for key, *rest in rows]
-    return Table(["key", "value", "default", "what it is"], cells, range(4)).markdown()
+    return TextTable(["key", "value", "default", "what it is"], cells, range(4)).markdown()
 
 
 def _table_of_metrics() -> str:
@@ -75,7 +75,7 @@ def _table_of_metrics() -> str:
         limit = "at most" if metric.is_cost else "at least"
         rows.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", texts[name]))
     headings = ["metric", "unit", "`require`", "robots", "what it is"]
-    return Table(headings, rows, range(5)).markdown()
+    return TextTable(headings, rows, range(5)).markdown()
 
 
 def _rows(key: str, section: type[Section]) -> Iterator[Row]:

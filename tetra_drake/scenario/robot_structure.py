@@ -31,7 +31,7 @@ from tetra_drake.settings.quantities import (
     Acceleration,
     Damping,
     Density,
-    Force,
+    ForceQuantity,
     Length,
     Mass,
     Position,
@@ -134,7 +134,7 @@ class CableGroup(Section):
     """Tension per elongation."""
     free_length: Length | None = Field(default=None, ge=0)
     """Length without tension. A group has a free length or a tension."""
-    tension: Force | None = Field(default=None, ge=0)
+    tension: ForceQuantity | None = Field(default=None, ge=0)
     """Tension at the given coordinates of the nodes."""
 
     @pydantic.model_validator(mode="after")
@@ -199,7 +199,9 @@ class StructureFile(Section):
     masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload that cables hold."""
-    loads: dict[str, Annotated[list[Force], Field(min_length=3, max_length=3)]] = Field(default={})
+    loads: dict[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
+        default={}
+    )
     """Constant forces [x, y, z] on nodes, in the world frame."""
     anchors: dict[str, Annotated[str, pydantic.BeforeValidator(_check_axes)]] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
@@ -603,7 +605,7 @@ class StructureFile(Section):
                 oscillators[cable] = oscillator
 
 
-Robot = Annotated[Tetrahedra | StructureFile, Kinds()]
+RobotKind = Annotated[Tetrahedra | StructureFile, Kinds()]
 """Union of the kinds of robots. A mapping without a tag is of the first kind.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`

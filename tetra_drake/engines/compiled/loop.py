@@ -19,7 +19,7 @@ import numpy as np
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
-from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
+from tetra_drake.engines.compiled.rosenbrock import StepMemory, larger, take_step
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import (
     Real,
@@ -39,8 +39,6 @@ from tetra_drake.laws.kinematics import interpolate_state
 from tetra_drake.laws.mode_change import time_to_mode_change
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.tally import Tally, observe
-
-Array = np.ndarray
 
 IDLE, RUNNING, DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(6)
 """Status of a lane."""
@@ -116,7 +114,7 @@ class LaneState(NamedTuple):
     tonic: Annotated[Table, "2 * signals"]
     """Inputs of the neurons without feedback."""
     tally: Tally
-    step: Step
+    step: StepMemory
     scratch: Annotated[Table, SCRATCH_ROWS]
     """Numbers that are computed for all lanes and then read lane by lane."""
     forces: Forces
@@ -465,7 +463,7 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
 
 
 @inlined
-def column(table: Table, lane: int) -> Array:
+def column(table: Table, lane: int) -> np.ndarray:
     """Copy of one lane of a table (size, W)."""
     copy = np.empty(table.shape[0])
     for k in range(copy.size):
