@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import os
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from tetra_drake.formatting import TextTable, listed, render, rounded
 from tetra_drake.machine import versions
 from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.report.run_figures import (
+    DrawnFigure,
     ShownGaits,
     draw_run,
     draw_trajectory,
@@ -39,16 +41,6 @@ from tetra_drake.settings.units import Units
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites.csv"
 
-_PARTS = {
-    "gait_diagram": "gait",
-    "time_lapse": "gait",
-    "fitness_of_trials": "evolution",
-    "before_and_after": "evolution",
-    "initial_distances": "evolution",
-    "initial_fitness": "evolution",
-    "map_of_gaits": "evolution",
-}
-"""Parts of the report by names of figures; other figures are in the part "forces"."""
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
@@ -88,10 +80,10 @@ def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     shown = simulate_shown_gaits(load_run(directory))
-    captions = draw_run(shown, figures, printed)
+    drawn = draw_run(shown, figures, printed)
     _write_map(shown, directory)
     shown.best.result.save_replay(replay)
-    write_whole(report, render_report(shown, captions, folder=figures))
+    write_whole(report, render_report(shown, drawn, folder=figures))
     return [figures, replay, report]
 
 
@@ -117,8 +109,8 @@ def _map_files(names: Sequence[str], row: pandas.Series, shown: ShownGaits) -> t
     return path.with_suffix(".json"), page
 
 
-def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Path) -> str:
-    """The report as HTML. The figures are in `folder`; `captions` are by name of figure."""
+def render_report(shown: ShownGaits, figures: Sequence[DrawnFigure], *, folder: Path) -> str:
+    """The report as HTML, with figures that are files in `folder`."""
     run, scenario = shown.run, shown.run.scenario
     best_gait = trial_folder(Path(), shown.trial) / BEST_GAIT
     named = {"initially": shown.initial.recorded, "best": shown.best.recorded}
@@ -157,7 +149,7 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
         map_metrics=_metrics(on_map, scenario) if on_map else None,
         parameters=_parameters(gait),
         weights=_weight_matrices(gait),
-        pictures=_pictures(captions, folder),
+        pictures=_pictures(figures, folder),
         files={
             "scenario": SCENARIO,
             "replay": REPLAY,
@@ -222,12 +214,12 @@ def _weight_matrices(gait: Gait) -> list[WeightMatrix]:
     return matrices
 
 
-def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple[str, str, str]]]:
+def _pictures(figures: Sequence[DrawnFigure], folder: Path) -> dict[str, list[tuple[str, ...]]]:
     """The figures of each part of the report: image URL, file and caption."""
-    parts: dict[str, list[tuple[str, str, str]]] = {"gait": [], "evolution": [], "forces": []}
-    for name, caption in captions.items():
+    parts: dict[str, list[tuple[str, ...]]] = defaultdict(list)
+    for part, name, caption in figures:
         # Embedded directly, not as the URL of an image, the ids of two SVGs would clash.
         content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
         picture = f"data:image/svg+xml;base64,{content}", f"{FIGURES}/{name}.svg", caption
-        parts[_PARTS.get(name, "forces")].append(picture)
+        parts[part].append(picture)
     return parts
