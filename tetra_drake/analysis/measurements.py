@@ -21,7 +21,7 @@ from tetra_drake.engines.gait_simulation import Driver
 from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import MOST_BYTES, read_bytes, read_text
+from tetra_drake.files import read_bytes, read_text
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.prototype.command_file import TIME, column_numbers, load_command, table_cells
 from tetra_drake.robot.command import Command
@@ -211,7 +211,7 @@ def load_fit_file(path: str | Path) -> FitFile:
     """Reads the file of a fit. Paths in it are relative to it. Raises InputError, naming file and
     key, if it is wrong."""
     path = Path(path)
-    tree = read_mapping(path, "file of a fit", keys=[*keys_of(FitFile)], most=MOST_BYTES)
+    tree = read_mapping(path, "file of a fit", keys=keys_of(FitFile))
     given = FitFile.from_tree(tree, path)
     placed = []
     for measurement in given.measurements:

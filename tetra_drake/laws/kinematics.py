@@ -221,9 +221,7 @@ def add_force_at(nodes: Table, row: int, body: int, generalized_force: Table) ->
 
 
 @compiled
-def interpolate_state(
-    before: np.ndarray, after: np.ndarray, step: float, part: float
-) -> np.ndarray:
+def interpolate_state(before: Table, after: Table, step: float, part: float) -> Table:
     """State (13 bodies,) within a step of length `step` (s), at the share `part` (0 to 1) of it.
 
     Positions are cubic polynomials that fit positions and velocities at both ends. Velocities are

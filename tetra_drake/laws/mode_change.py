@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, any_lane, minimum, named, select
 from tetra_drake.kernels.packed import unpacked
@@ -26,7 +24,7 @@ def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
 
 
 @compiled
-def mode_margin(parts: Parts, state: np.ndarray, modes: np.ndarray) -> float:
+def mode_margin(parts: Parts, state: Table, modes: Table) -> float:
     """Mode margin of the robot: positive until the first mode changes, zero at the change.
 
     It is the least of the gaps of nodes in the air, the depths of nodes in the ground (m), and the
@@ -94,11 +92,7 @@ def foot_acceleration(
 
 @compiled
 def next_mode_change(
-    parts: Parts,
-    state: np.ndarray,
-    acceleration: np.ndarray,
-    modes: np.ndarray,
-    horizon: float,
+    parts: Parts, state: Table, acceleration: Table, modes: Table, horizon: float
 ) -> tuple[bool, float]:
     """Updates `modes` for a state. Returns whether a mode changed, and the predicted time (s) to
     the next change (see time_to_mode_change()).

@@ -185,12 +185,7 @@ def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table
 
 @compiled
 def network_output(
-    network: Network,
-    inputs: np.ndarray,
-    step: float,
-    listing: bool,
-    neurons: np.ndarray,
-    output: np.ndarray,
+    network: Network, inputs: Table, step: float, listing: bool, neurons: Table, output: Table
 ) -> None:
     """Writes the outputs (samples, n) of a network without lanes, one sample per step (s).
 
