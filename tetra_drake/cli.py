@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tetra_drake import __version__
-from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, file_names, write_whole
 from tetra_drake.interrupts import heeding_interrupts
@@ -126,14 +125,14 @@ _GAIT = "a gait file (JSON), or a folder written by `evolve` for its best gait"
 _SEED = "a random gait of this seed instead (default: one that walks)"
 _STRUCTURE = f"a structure file, one of {', '.join(shipped_structures())}, or a scenario"
 _COMMAND = "a file of actuator commands (CSV) instead, as `export` writes"
-_ENGINE = "the Drake diagram, the same laws compiled, or MuJoCo (default: the scenario's)"
+_ENGINE = "drake (the diagram), compiled (the same laws), or mujoco (default: the scenario's)"
 
 FitPath = Annotated[Path, Option(metavar="FIT", type=Path)]
 ScenarioName = Annotated[str, Option(_SCENARIO, metavar="NAME|FILE")]
 GaitPath = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
 GaitSeed = Annotated[Seed, Option(_SEED, group="gait")]
 CommandFile = Annotated[File, Option(_COMMAND, group="gait")]
-EngineName = Annotated[str, Option(_ENGINE, choices=tuple(ENGINES))]
+EngineName = Annotated[str, Option(_ENGINE, metavar="NAME")]
 StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
 
 

@@ -7,7 +7,6 @@ import importlib
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
-from tetra_drake.engines import ENGINES
 from tetra_drake.engines.gait_simulation import Driver, GaitSimulation
 from tetra_drake.engines.stepper import Stepper
 from tetra_drake.errors import InputError, SimulationFailure
@@ -81,7 +80,7 @@ def outcome_of(simulate: Callable[[], SimulationResult]) -> Outcome:
 
 def engine_of(scenario: Scenario) -> Engine:
     """The engine of a scenario. The engine's module is imported on demand."""
-    engine: Engine = importlib.import_module(ENGINES[scenario.engine_name]).ENGINE
+    engine: Engine = importlib.import_module(scenario.engine.module).ENGINE
     return engine
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import pandas
@@ -125,7 +124,9 @@ def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     page = page_of(figure, height_in=3.6)
     panel = page.subplots()
     ends = table.ffill().iloc[-1].sort_values(ascending=False)
-    looks = _looks(list(ends.index))
+    looks = {trial: line_style(series) for series, trial in enumerate(ends.index)}
+    if len(ends) >= _SEVERAL:
+        looks = {ends.index[0]: _FITTEST, ends.index[-1]: _LEAST_FIT}
     for trial in table:
         series = table[trial].dropna()
         # A dot at the end makes even a line of one point visible.
@@ -142,13 +143,6 @@ def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     legend_below(page, legend)
     set_title(page, f"{kind.capitalize()} fitness of each trial")
     return page
-
-
-def _looks(trials: Sequence[int]) -> dict[int, Any]:
-    """Line styles of the trials in the legend. `trials` begins with the fittest."""
-    if len(trials) < _SEVERAL:
-        return {trial: line_style(series) for series, trial in enumerate(trials)}
-    return {trials[0]: _FITTEST, trials[-1]: _LEAST_FIT}
 
 
 def _whole_iterations(run: Run) -> pandas.DataFrame:

@@ -67,7 +67,10 @@ def gait_diagram(
     structure, unit = result.robot.structure, result.scenario.units
     cycle = measures.last_step(result.trajectory)
     trajectory = shown_part(result.trajectory, time or _last_cycles(result.trajectory, cycle))
-    stands = _stance(trajectory, structure)
+    # Feet are the bottom nodes of tetrahedra, and all other nodes that touch the ground.
+    stands = ~measures.off_ground(trajectory)
+    are_feet = np.isin(structure.contacts, structure.markers)
+    stands = stands[:, stands.any("time").values | are_feet]
     feet, width = _rows_of_feet(stands), _NAMES * page_width(figure)
     names_of_feet = {folded(name, width): row for name, row in _named_rows(stands, feet).items()}
     height = max(feet.values(), default=0.0) * _rows_of_names(names_of_feet)
@@ -94,14 +97,6 @@ def _last_cycles(trajectory: xarray.Dataset, cycle: Span | None) -> Span:
         return end - _LAST_SHARE * (end - start), end
     start, end = cycle
     return max(float(trajectory.time[0]), end - _CYCLES * (end - start)), end
-
-
-def _stance(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
-    """True if a foot bears load (time, contact). Feet are the bottom nodes of tetrahedra, and all
-    other nodes that touch the ground."""
-    stands = ~measures.off_ground(trajectory)
-    are_feet = np.isin(structure.contacts, structure.markers)
-    return stands[:, stands.any("time").values | are_feet]
 
 
 def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:

@@ -6,7 +6,6 @@ import base64
 import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pandas
@@ -20,7 +19,7 @@ from tetra_drake.figures.style import AS_USUAL, Print
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import TextTable, listed, render, rounded
 from tetra_drake.machine import versions
-from tetra_drake.report.result_folder import RESULT, load_result
+from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.report.run_figures import (
     DrawnFigure,
     ShownGaits,
@@ -38,8 +37,8 @@ from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import Units
 
-REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
-ELITES, ELITES_CSV = "elites", "elites.csv"
+REPORT, FIGURES = "report.html", "figures"
+ELITES_FOLDER, ELITES_CSV = "elites", "elites.csv"
 
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
@@ -93,7 +92,7 @@ def _write_map(shown: ShownGaits, directory: Path) -> None:
     run = shown.run
     on_map = distinct_gaits(notable_gaits(run))
     if on_map:
-        write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
+        write_whole(directory / ELITES_FOLDER / ELITES_CSV, elites(run).to_csv(index=False))
     for names, row in on_map:
         trial, index = row["trial"], row["index"]
         gait_file, page = _map_files(names, row, shown)
@@ -104,7 +103,7 @@ def _write_map(shown: ShownGaits, directory: Path) -> None:
 
 def _map_files(names: Sequence[str], row: pandas.Series, shown: ShownGaits) -> tuple[Path, Path]:
     """Gait file and replay page of a notable gait of the map, relative to the run's folder."""
-    path = Path(ELITES) / names[0].replace(", ", "_").replace(" ", "_")
+    path = Path(ELITES_FOLDER) / names[0].replace(", ", "_").replace(" ", "_")
     page = Path(REPLAY) if gait_label(row) == shown.best.label else path.with_suffix(".html")
     return path.with_suffix(".json"), page
 
@@ -154,7 +153,7 @@ def render_report(shown: ShownGaits, figures: Sequence[DrawnFigure], *, folder: 
             "scenario": SCENARIO,
             "replay": REPLAY,
             "figures": FIGURES,
-            "elites": Path(ELITES) / ELITES_CSV,
+            "elites": Path(ELITES_FOLDER) / ELITES_CSV,
         },
     )
 
@@ -188,30 +187,18 @@ def _parameters(gait: Gait) -> str:
     return listed(texts)
 
 
-@dataclass(frozen=True)
-class WeightMatrix:
-    """The weights between all extensors, or between all flexors, for a heat map."""
-
-    kind: str
-    rows: list[list[float | None]]
-    """A row per oscillator with the weights from all oscillators; None where no weight is."""
-
-    @property
-    def largest(self) -> float:
-        """The largest weight; 1 if all weights are zero."""
-        return max((weight for row in self.rows for weight in row if weight), default=1.0)
-
-
-def _weight_matrices(gait: Gait) -> list[WeightMatrix]:
-    """The weights of a gait as matrices: extensors, flexors. Empty for a single oscillator."""
+def _weight_matrices(gait: Gait) -> dict[str, list[list[float | None]]]:
+    """The weights between all extensors, and between all flexors, as heat maps: a row per
+    oscillator with the weights from all oscillators, None where no weight is. Empty for a single
+    oscillator."""
     weights = dict(zip(gait.weight_names, gait.weights, strict=True))
     count = max((int(name.partition("->")[0]) for name in weights), default=0)
     numbers = range(1, count + 1)
-    matrices = []
-    for kind in KINDS if count else ():
-        rows = [[weights.get(f"{j}->{i} {kind}") for j in numbers] for i in numbers]
-        matrices.append(WeightMatrix(kind, rows))
-    return matrices
+    return {
+        kind: [[weights.get(f"{j}->{i} {kind}") for j in numbers] for i in numbers]
+        for kind in KINDS
+        if count
+    }
 
 
 def _pictures(figures: Sequence[DrawnFigure], folder: Path) -> dict[str, list[tuple[str, ...]]]:

@@ -201,7 +201,7 @@ class Scenario(Section):
         is on this engine or there is no name, otherwise with default settings."""
         if name in (None, self.engine_name):
             return self
-        return self.with_changes({"engine": f"!{str(name).capitalize()}"})
+        return self.with_changes({"engine": {TAG: str(name).capitalize()}})
 
     def with_sections(self, **sections: Any) -> Self:
         """A copy with other sections. They are not checked."""

@@ -90,7 +90,9 @@ class Section(BaseModel):
         fields, values = keys_of(cls), {}
         for name, value in tree.items():
             if name != TAG and name not in fields:
-                refuse(str(name), f"unknown key; {cls._advice(str(name))}")
+                named = [f"'{key}'" for key in dict.fromkeys(_keys_named(str(name), cls))]
+                advice = f"did you mean {' or '.join(named)}?" if named else hint(name, fields)
+                refuse(str(name), f"unknown key; {advice}")
             if name != TAG:
                 values[name] = _with_mappings(python_value(value), fields[name].annotation)
         return values
@@ -114,12 +116,6 @@ class Section(BaseModel):
     def _compared(self) -> Any:
         # The order counts: it numbers the bodies and oscillators of a structure.
         return _hashable(self.values())
-
-    @classmethod
-    def _advice(cls, name: str) -> str:
-        """Advice about an unknown key: the same name in a section, or a similar key."""
-        keys = [f"'{key}'" for key in dict.fromkeys(_keys_named(name, cls))]
-        return f"did you mean {' or '.join(keys)}?" if keys else hint(name, keys_of(cls))
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
