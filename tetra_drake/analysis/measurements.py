@@ -23,7 +23,7 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import read_bytes, read_text
 from tetra_drake.laws.cable import TENSION
-from tetra_drake.prototype.command_file import TIME, column_numbers, load_command, table_cells
+from tetra_drake.prototype.command_file import TIME_S, column_numbers, load_command, table_cells
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait import load_gait
@@ -312,12 +312,12 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
     """Coordinates in m of a log by time in s, NaN in gaps, with a column such as "n3 z" for each.
     Raises InputError, naming line or column, if the log is wrong."""
     cells = table_cells(_log_text(path), path)
-    if TIME not in cells:
-        raise InputError(path, TIME, "is missing, expected a column with the time in s")
-    times = column_numbers(cells.pop(TIME), path)
+    if TIME_S not in cells:
+        raise InputError(path, TIME_S, "is missing, expected a column with the time in s")
+    times = column_numbers(cells.pop(TIME_S), path)
     for row in np.flatnonzero(np.diff(times) <= 0.0):
         found = f"found {times[row + 1]:g} after {times[row]:g}"
-        raise InputError(path, f"line {row + 3}, {TIME}", f"{found}, expected ascending times")
+        raise InputError(path, f"line {row + 3}, {TIME_S}", f"{found}, expected ascending times")
     columns = {}
     for name in cells:
         match = re.fullmatch(r"((.+) [xyz])_(\w+)", name)
@@ -358,10 +358,10 @@ def _check_length(times: np.ndarray, driver: Driver, scenario: Scenario, log: st
     if found > duration + ROUNDING:
         expected = f"expected at most the duration, {duration:g}"
         problem = f"found {found:g} s, {expected} s; give simulation.duration more"
-        raise InputError(log, TIME, problem)
+        raise InputError(log, TIME_S, problem)
     if not isinstance(driver, Command):
         return
     least = min(duration, driver.period * (len(driver.samples) - 1))
     if found < (1.0 - CUT) * least:
         problem = f"found {found:g} s, expected at least the command's {least:g} s"
-        raise InputError(log, TIME, f"{problem}; give simulation.duration less to fit a part")
+        raise InputError(log, TIME_S, f"{problem}; give simulation.duration less to fit a part")

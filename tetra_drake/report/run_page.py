@@ -31,7 +31,7 @@ from tetra_drake.report.run_figures import (
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, save_gait
-from tetra_drake.robot.weights import KINDS
+from tetra_drake.robot.weights import NEURONS
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
@@ -196,7 +196,7 @@ def _weight_matrices(gait: Gait) -> dict[str, list[list[float | None]]]:
     numbers = range(1, count + 1)
     return {
         kind: [[weights.get(f"{j}->{i} {kind}") for j in numbers] for i in numbers]
-        for kind in KINDS
+        for kind in NEURONS
         if count
     }
 

@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.feedback import Gains
-from tetra_drake.robot.weights import KINDS, Weights
+from tetra_drake.robot.weights import NEURONS, Weights
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section
@@ -76,9 +76,9 @@ class Gait:
         oscillators = [str(i + 1) for i in range(count)]
         rows = []
         for onto in oscillators:
-            row = [[texts.get(f"{i}->{onto} {kind}", "-") for kind in KINDS] for i in oscillators]
+            row = [[texts.get(f"{i}->{onto} {kind}", "-") for kind in NEURONS] for i in oscillators]
             rows.append([onto, *("/".join(pair).replace("-/-", "-") for pair in row)])
-        lines.append(f"weights ({'/'.join(KINDS)}), a column for each oscillator they come from")
+        lines.append(f"weights ({'/'.join(NEURONS)}), a column for each oscillator they come from")
         return "\n".join([*lines, TextTable(["onto", *oscillators], rows).text()])
 
     def __repr__(self) -> str:

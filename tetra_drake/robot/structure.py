@@ -24,12 +24,12 @@ from pydrake.multibody.tree import (
 
 from tetra_drake.laws import cable, kinematics
 from tetra_drake.laws.capsules import StrutSearch
-from tetra_drake.laws.model import Couplings
+from tetra_drake.laws.model import WORLD, Couplings
 from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
 from tetra_drake.robot.equilibrium import Equilibrium
-from tetra_drake.scenario.blueprint import WORLD, Blueprint
+from tetra_drake.scenario.blueprint import Blueprint
 
 STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
 PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0)
@@ -44,7 +44,7 @@ SLENDERNESS = 100.0
 """Size of a robot without struts, divided by the least radius that is shown."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Structure(Blueprint):
     """Rigid bodies joined by cables; SI units. A body consists of struts between nodes."""
 

@@ -17,8 +17,9 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from tetra_drake.laws.model import WORLD
 from tetra_drake.laws.rigid_motions import rigid_motions
-from tetra_drake.scenario.blueprint import WORLD, Blueprint
+from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.robot_tetrahedra import (
     LIGHTEST,
@@ -58,16 +59,9 @@ def _check_name(name: object) -> object:
     return name
 
 
-def _check_axes(axes: object) -> object:
-    """Checks the axes along which an anchor holds a node."""
-    letters = list(axes) if isinstance(axes, str) else []
-    if not letters or sorted(letters) != sorted({"x", "y", "z"} & set(letters)):
-        refuse("", f"found {described(axes)}, expected some of the axes x, y and z, such as xyz")
-    return axes
-
-
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
+Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
@@ -203,7 +197,7 @@ class StructureFile(Section):
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    anchors: dict[str, Annotated[str, pydantic.BeforeValidator(_check_axes)]] = Field(default={})
+    anchors: dict[str, Axes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
@@ -281,11 +275,6 @@ class StructureFile(Section):
             oscillators=tuple(self.actuated),
             groups=tuple(self.cables_of_oscillator.values()),
             contacts=np.array(sorted(number[node] for node in self.contact_nodes)),
-            markers=np.array([], dtype=int),
-            followed="centre",
-            points_ahead=False,
-            feet=None,
-            settles=True,
         )
 
     @cached_property
@@ -338,7 +327,7 @@ class StructureFile(Section):
     @cached_property
     def _fixed(self) -> set[str]:
         """Nodes with an anchor along all axes."""
-        return {node for node, axes in self.anchors.items() if len(axes) == len("xyz")}
+        return {node for node, axes in self.anchors.items() if axes == "xyz"}
 
     @cached_property
     def sphere_of_node(self) -> dict[str, Sphere]:

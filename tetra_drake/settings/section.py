@@ -262,8 +262,8 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
     if error["type"] == "missing":
         return key, "is missing; give it"
     expected = error["msg"].removeprefix("Input should be ")
-    if error["type"] in _LIMITS:
-        words, name = _LIMITS[error["type"]]
+    if error["type"] in LIMIT_WORDS:
+        name, words, _ = LIMIT_WORDS[error["type"]]
         unit = unit_of(keys_of(section)[str(error["loc"][0])])
         if "length" in name:
             unit = f"items, not {len(value or ())}"
@@ -271,14 +271,15 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
     return key, f"found {described(value)}, expected {expected}"
 
 
-_LIMITS = {
-    "greater_than": ("more than", "gt"),
-    "greater_than_equal": ("at least", "ge"),
-    "less_than_equal": ("at most", "le"),
-    "too_short": ("at least", "min_length"),
-    "too_long": ("at most", "max_length"),
+LIMIT_WORDS = {
+    "greater_than": ("gt", "more than", "> {}"),
+    "greater_than_equal": ("ge", "at least", "≥ {}"),
+    "less_than_equal": ("le", "at most", "≤ {}"),
+    "too_short": ("min_length", "at least", "≥ {} items"),
+    "too_long": ("max_length", "at most", "≤ {} items"),
 }
-"""Words for limits, and pydantic's names of their numbers, by type of error."""
+"""Limits by pydantic's types of errors: pydantic's names of their numbers, words for them in
+errors, and their texts on the page of keys."""
 
 
 def joined(key: str, inner: str) -> str:

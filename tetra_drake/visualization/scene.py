@@ -46,7 +46,7 @@ SLENDERNESS = 60.0
 THICKEST, THINNEST = 0.7, 0.15
 """Drawn radius of the cable with the highest tension, and least drawn radius of a cable, in radii
 of a strut."""
-MARGIN, UNEVEN_MARGIN = 4.5, 1.5
+FLOOR_MARGIN, UNEVEN_MARGIN = 4.5, 1.5
 """Margin of floor around the robot's path, in halves of the robot's length. Uneven ground has the
 smaller one, because it needs much space in a page."""
 MOST_POINTS = 5_000
@@ -193,7 +193,7 @@ def set_surroundings(
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
     """Adds the floor around `points` (..., 3). `reach` (m) is half of the robot's length."""
     ground, units = robot.ground, robot.scenario.units
-    corners = floor_corners(points, (MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
+    corners = floor_corners(points, (FLOOR_MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
     floor = floor_points(ground, corners, units)
     contacts = robot.structure.contacts
     sunk = drawn_radii(robot.structure)[1][contacts] - robot.structure.contact_radius[contacts]
