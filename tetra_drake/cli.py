@@ -15,7 +15,7 @@ from tetra_drake import __version__
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, file_names, write_whole
 from tetra_drake.interrupts import heeding_interrupts
-from tetra_drake.options import BAD_INPUT, CommandParser, Option, integer, number, quantity, size
+from tetra_drake.options import BAD_INPUT, Option, Parser, integer, number, quantity, size
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.settings.units import INCH, SYSTEMS, shown_in
 
@@ -43,7 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not isinstance(error, BrokenPipeError):
             what = error.filename or "output"
             print(f"tetra-drake: {what}: {error.strerror or error}", file=sys.stderr)
-        _drop_output()
+        try:  # Python would try to write at its end what was printed but not written
+            sys.stdout.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except KeyboardInterrupt as interrupt:
         print("\ntetra-drake: interrupted", *interrupt.args, file=sys.stderr)
@@ -51,24 +54,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _drop_output() -> None:
-    """Drops output that was printed but not written. Python would try to write it at its end."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def make_parser() -> CommandParser:
+def make_parser() -> Parser:
     """The parser of all commands."""
-    parser = CommandParser(
+    parser = Parser(
         prog="tetra-drake",
         description="Simulate a walking tensegrity robot, nested tetrahedra driven by a Matsuoka "
         "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    common = CommandParser(add_help=False)
+    common = Parser(add_help=False)
     common.add_argument(
         "--units",
         choices=[*SYSTEMS],

@@ -19,7 +19,7 @@ from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 
 if TYPE_CHECKING:
@@ -97,7 +97,10 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     nodes = pandas.DataFrame(p_WN, list(structure.node_names), ["x", "y", "z"])
     nodes.insert(0, "body", structure.body_of_node)
     nodes["load"] = loads
-    nodes[[f"anchor_{axis}" for axis in "xyz"]] = _anchor_forces(structure, unactuated, p_WN)
+    fixed, anchors, on_structure = structure.first_node[-1], structure.anchors, np.zeros_like(p_WN)
+    on_structure[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
+    on_structure[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
+    nodes[[f"anchor_{axis}" for axis in "xyz"]] = on_structure
     cables = {
         "group": structure.cable_groups,
         "length": equilibrium.lengths,
@@ -116,15 +119,6 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
         frequencies=np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi),
     )
-
-
-def _anchor_forces(structure: Structure, unactuated: Unactuated, p_WN: np.ndarray) -> np.ndarray:
-    """Forces (nodes, 3) of the anchors on the structure at rest, at the last computed state."""
-    fixed, anchors = structure.first_node[-1], structure.anchors
-    forces = np.zeros_like(p_WN)
-    forces[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
-    forces[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
-    return forces
 
 
 def _weightless_nodes(robot: Robot) -> np.ndarray:

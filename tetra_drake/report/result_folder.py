@@ -25,7 +25,7 @@ from tetra_drake.results.result import (
     SimulationResult,
     save_result,
 )
-from tetra_drake.results.trajectory import DIMENSIONS, labels, with_indexes
+from tetra_drake.results.trajectory import DIMENSIONS, labels, save_dataset, with_indexes
 from tetra_drake.robot.command import robot_without_network
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
@@ -50,8 +50,6 @@ def check_result_folder(folder: Path) -> None:
 def save_result_folder(folder: Path, result: SimulationResult) -> None:
     """Writes the files of a simulation. Raises InputError if it has no trajectory, or if the folder
     cannot be written to."""
-    from tetra_drake.results.trajectory import save_dataset
-
     trajectory = result.trajectory
     # result.json is removed first and written last: if it is there, the other files belong to it.
     if (folder / RESULT).is_file():

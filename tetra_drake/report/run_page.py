@@ -41,6 +41,7 @@ REPORT, FIGURES = "report.html", "figures"
 ELITES_FOLDER, ELITES_CSV = "elites", "elites.csv"
 
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
+# Settings that are not shown among those that differ from the thesis's; some are elsewhere.
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 
@@ -133,7 +134,11 @@ def render_report(shown: ShownGaits, figures: Sequence[DrawnFigure], *, folder: 
         ground=ground_text(scenario),
         changed=changed,
         versions=versions(),
-        differences=_settings(scenario),
+        differences=[
+            (key, value)
+            for key, value in scenario.differences(load_scenario("thesis"))
+            if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
+        ],
         results=results(run),
         trials=trials_table(run),
         objective=_terms(scenario.objective, inverse, scenario.units),
@@ -156,16 +161,6 @@ def render_report(shown: ShownGaits, figures: Sequence[DrawnFigure], *, folder: 
             "elites": Path(ELITES_FOLDER) / ELITES_CSV,
         },
     )
-
-
-def _settings(scenario: Scenario) -> list[tuple[str, str]]:
-    """Settings that differ from the scenario `thesis`, without long lists and without settings that
-    the report shows elsewhere."""
-    return [
-        (key, value)
-        for key, value in scenario.differences(load_scenario("thesis"))
-        if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
-    ]
 
 
 def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str], units: Units) -> str:

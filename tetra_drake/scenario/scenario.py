@@ -38,7 +38,15 @@ from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import UnitsByName
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Section, Tree, flattened, written
-from tetra_drake.settings.units import Units, plainest, rounded_in_text, shortest, units_for
+from tetra_drake.settings.units import (
+    SYSTEMS,
+    Units,
+    current,
+    fitting,
+    plainest,
+    rounded_in_text,
+    shortest,
+)
 
 EngineT = TypeVar("EngineT", Drake, Compiled, Mujoco)
 
@@ -143,7 +151,8 @@ class Scenario(Section):
         """Units of this scenario in texts, pages and figures: the units of units.shown_in(); mm if
         its robot is given in mm; otherwise those that need the fewest digits for the long lengths
         of its robot."""
-        return units_for(self.robot.lengths, self.robot.unit)
+        unit = self.robot.unit
+        return current(SYSTEMS[unit] if unit else fitting(self.robot.lengths))
 
     @property
     def oscillators(self) -> int:
@@ -298,14 +307,10 @@ def _thesis() -> Scenario:
     return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
 
 
-_NONE = "none"
-"""Text of a value that a scenario does not have."""
-
-
 def _text(value: Any, *, exact: bool = False) -> str:
     """A value of a tree as text. Numbers have six digits unless `exact`."""
     if value is None:
-        return _NONE
+        return "none"
     text = json.dumps(written(value) if exact else written(value, plainest)).replace('"', "")
     return text if exact else rounded_in_text(text)
 
