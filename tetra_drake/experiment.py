@@ -271,7 +271,7 @@ def _report(directory: Path, progress: Progress) -> None:
     """Writes the report of a run."""
     from tetra_drake.report.run_page import write_report
 
-    again = f"try again with: {_draw_again(directory)}"
-    with _completing(progress, f"the report was not written; {again}"):
+    problem = f"the report was not written; try again with: {_draw_again(directory)}"
+    with _completing(progress, problem):
         progress.say("drawing figures and the report")
         write_report(directory)

@@ -196,7 +196,12 @@ class RecordFile:
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
                     self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
-            self._check_types(row, entry, kind)
+            try:
+                kind.model_validate(entry)
+            except ValidationError as error:
+                first = error.errors(include_url=False)[0]
+                wrong = ".".join(str(part) for part in first["loc"])
+                self.refuse(row, f"is damaged: {wrong}: {first['msg']}; {REMEDY}")
             if counter and entry[counter] != row:
                 problem = f"is damaged: {counter} is {entry[counter]}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
@@ -206,14 +211,6 @@ class RecordFile:
             seen.add(values)
             entries.append(entry)
         return entries
-
-    def _check_types(self, row: int, entry: Mapping[str, Any], kind: type[_Line]) -> None:
-        try:
-            kind.model_validate(entry)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            key = ".".join(str(part) for part in first["loc"])
-            self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
 
     def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
         """Appends lines; creates the folder if it is missing. On return the operating system has

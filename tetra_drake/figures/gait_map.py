@@ -40,14 +40,13 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
     gaits = elites(run)
     kept = kept_gaits(gaits)
     judged = bool(gaits["kept"].notna().any())
-    count = 2 if judged else 1
     edges = [
         np.linspace(low, high, cells + 1) / units.of(UNITS[name])[0]
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
     named = distinct_gaits(notable_gaits(run))
     page = page_of(figure, height_in=3.9 + 0.17 * len(named))
-    row = page.subplots(1, count, squeeze=False, sharey=True)[0]
+    row = page.subplots(1, 1 + judged, squeeze=False, sharey=True)[0]
     title = f"fitness ({len(kept)} of {math.prod(kind.cells)} cells)"
     _draw_cells(row[0], kept, kept["fitness"], edges, title=title, cmap="viridis")
     if judged:

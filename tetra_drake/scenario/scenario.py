@@ -6,6 +6,7 @@ import functools
 import itertools
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
@@ -44,7 +45,6 @@ from tetra_drake.settings.units import (
     current,
     fitting,
     plainest,
-    rounded_in_text,
     shortest,
 )
 
@@ -151,8 +151,8 @@ class Scenario(Section):
         """Units of this scenario in texts, pages and figures: the units of units.shown_in(); mm if
         its robot is given in mm; otherwise those that need the fewest digits for the long lengths
         of its robot."""
-        unit = self.robot.unit
-        return current(SYSTEMS[unit] if unit else fitting(self.robot.lengths))
+        robot = self.robot
+        return current(SYSTEMS[robot.unit] if robot.unit else fitting(robot.lengths))
 
     @property
     def oscillators(self) -> int:
@@ -312,7 +312,9 @@ def _text(value: Any, *, exact: bool = False) -> str:
     if value is None:
         return "none"
     text = json.dumps(written(value) if exact else written(value, plainest)).replace('"', "")
-    return text if exact else rounded_in_text(text)
+    if exact:
+        return text
+    return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
 
 
 def _differences_in_order(

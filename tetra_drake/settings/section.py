@@ -98,10 +98,11 @@ class Section(BaseModel):
         return values
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and other._compared() == self._compared()
+        # The order counts: it numbers the bodies and oscillators of a structure.
+        return type(other) is type(self) and [*other.values().items()] == [*self.values().items()]
 
     def __hash__(self) -> int:
-        return hash(self._compared())
+        return hash(_hashable(self.values()))
 
     def values(self) -> dict[str, Any]:
         """Values by dotted keys."""
@@ -112,10 +113,6 @@ class Section(BaseModel):
         """All lengths in m. A copy with disturbed numbers keeps them."""
         numbers = _quantities(self.model_dump())
         return tuple(float(number) for number in numbers if number.unit == "m")
-
-    def _compared(self) -> Any:
-        # The order counts: it numbers the bodies and oscillators of a structure.
-        return _hashable(self.values())
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:

@@ -176,11 +176,6 @@ def given_quantity(text: str, unit: str, source: object, key: str) -> float:
         raise InputError(source, key, str(error)) from error
 
 
-def rounded_in_text(text: str) -> str:
-    """Rounds all numbers with many decimals in a text to six digits."""
-    return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
-
-
 def plainest(number: float, unit: str) -> str:
     """A number given in an SI unit, as text in the unit that needs the fewest digits, such as
     "20 ms"."""

@@ -199,7 +199,11 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
     sunk = drawn_radii(robot.structure)[1][contacts] - robot.structure.contact_radius[contacts]
     floor[..., 2] -= max(0.0, sunk.min())
     if ground.flat:
-        _add_slab(meshcat, floor, scale=robot.structure.scale)
+        thickness = 0.002 * robot.structure.scale
+        width, depth, _ = floor[-1, -1] - floor[0, 0]
+        middle = (floor[-1, -1] + floor[0, 0]) / 2 - [0.0, 0.0, thickness / 2]
+        meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
+        meshcat.SetTransform("/floor/slab", RigidTransform(middle))
     else:
         _add_relief(meshcat, floor, scale=robot.structure.scale)
     _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
@@ -290,15 +294,6 @@ def _rgb(name: str) -> np.ndarray:
 def _mixed(first: str, second: str, share: np.ndarray) -> np.ndarray:
     """Mixtures (..., 3) of two named colours. `share` (...) is the share of the second."""
     return _rgb(first) + share[..., np.newaxis] * (_rgb(second) - _rgb(first))
-
-
-def _add_slab(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
-    """Adds a slab; its top is the flat floor (rows, columns, 3), in m."""
-    thickness = 0.002 * scale
-    width, depth, _ = floor[-1, -1] - floor[0, 0]
-    middle = (floor[-1, -1] + floor[0, 0]) / 2
-    meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
-    meshcat.SetTransform("/floor/slab", RigidTransform(middle - [0.0, 0.0, thickness / 2]))
 
 
 def _add_relief(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
