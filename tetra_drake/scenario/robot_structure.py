@@ -61,7 +61,7 @@ def _check_name(name: object) -> object:
 
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
-Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
+AnchorAxes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
@@ -197,7 +197,7 @@ class StructureFile(Section):
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    anchors: dict[str, Axes] = Field(default={})
+    anchors: dict[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
