@@ -94,7 +94,7 @@ def load_result(folder: str | Path) -> SimulationResult:
         wall_time=file.wall_time_s,
         integrator=file.integrator,
         engine=file.engine,
-        path=file.path.path(),
+        path=file.path.to_path(),
         recorded=trajectory,
     )
 

@@ -67,7 +67,7 @@ class PathColumns(Section):
         x, y, z = path.centre.T.tolist()
         return cls(time_s=path.times.tolist(), x_m=x, y_m=y, z_m=z, heading_rad=heading)
 
-    def path(self) -> CentrePath:
+    def to_path(self) -> CentrePath:
         """The path as arrays."""
         times, x, y, z, heading = (np.array(column, dtype=float) for _, column in self)
         return CentrePath(times, np.column_stack([x, y, z]), heading)
