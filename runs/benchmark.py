@@ -32,7 +32,7 @@ from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import Table, fixed, listed
+from tetra_drake.formatting import TextTable, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, controlled_robot
@@ -114,7 +114,7 @@ def engines_table(scenario: Scenario, engines: Sequence[str]) -> str:
         evaluations = statistics.mean(r.integrator.derivative_evaluations for r in results)
         rows.append([f"`{engine}`", f"{speed:.3g}", *errors, f"{evaluations:,.0f}"])
     headings = ["engine", "times real time per core", "median error, in", "worst error, in"]
-    return Table([*headings, "evaluations per gait"], rows).markdown()
+    return TextTable([*headings, "evaluations per gait"], rows).markdown()
 
 
 class Batch(NamedTuple):
@@ -148,7 +148,7 @@ def batches_table(scenario: Scenario) -> str:
         speeds = [f"{speed:,.0f}" for speed in median_speeds(batches)]
         too_few = [""] * (len(BATCHES) - len(batches))
         rows.append([str(cores), *too_few, *speeds])
-    return Table(["cores/gaits", *map(str, BATCHES)], rows).markdown()
+    return TextTable(["cores/gaits", *map(str, BATCHES)], rows).markdown()
 
 
 def grounds_table(scenario: Scenario) -> str:
@@ -174,7 +174,7 @@ def grounds_table(scenario: Scenario) -> str:
         for name, (alone, many, drake) in zip(grounds, speeds, strict=True)
     ]
     headings = ["ground", "compiled, one gait", f"compiled, {GROUND_BATCH} gaits", "drake"]
-    return Table(headings, rows).markdown()
+    return TextTable(headings, rows).markdown()
 
 
 def held_gait(scenario: Scenario, gait: Gait) -> Command:
@@ -257,7 +257,7 @@ def controlled_table(scenario: Scenario) -> str:
     rows = [*controlled_rows(compiled), *controlled_rows(second)]
     if installed():
         rows.append(rollout_row(second.with_changes({"friction.stiffness": "0 N/m"})))
-    return Table(["control periods per second", *map(str, CONTROLLED)], rows).markdown()
+    return TextTable(["control periods per second", *map(str, CONTROLLED)], rows).markdown()
 
 
 TABLES = {"batches": batches_table, "grounds": grounds_table, "controlled": controlled_table}

@@ -31,7 +31,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.files import check_file, read_json, read_text, write_whole
-from tetra_drake.formatting import Table, fixed, listed, ranged
+from tetra_drake.formatting import TextTable, fixed, listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.laws.curves import travelling_index
 from tetra_drake.machine import versions
@@ -253,7 +253,7 @@ def verdict(met: np.ndarray) -> str:
     return f"{words} ({met.sum()} of {met.size})"
 
 
-def claims(record: Mapping[str, Any]) -> Table:
+def claims(record: Mapping[str, Any]) -> TextTable:
     """Table of the claims: criterion for a case, result as median and range, and verdict.
 
     The template has a line for each claim, so that a criterion in words stands beside its formula.
@@ -268,7 +268,7 @@ def claims(record: Mapping[str, Any]) -> Table:
     template = jinja2.Template(read_text(TEXTS, "template"), undefined=jinja2.StrictUndefined)
     text = template.render(numbers | tools)
     headings = ["claim of the thesis", "criterion", "result, median (range)", "verdict"]
-    return Table(headings, [line.split(" | ") for line in text.splitlines()], range(4))
+    return TextTable(headings, [line.split(" | ") for line in text.splitlines()], range(4))
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from tetra_drake.analysis.measurements import Rest
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import Table, fixed
+from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot, axial_forces_at_rest
 from tetra_drake.robot.structure import node_positions
@@ -221,7 +221,7 @@ def jump(*, share: float, damping: float) -> tuple[float, float]:
 # Tables, pictures and the page
 
 
-def simplex_table(under_load: pandas.DataFrame) -> Table:
+def simplex_table(under_load: pandas.DataFrame) -> TextTable:
     """Heights and forces of the simplex at five loads."""
     steps = [int(np.abs(under_load["load"] - load).argmin()) for load in (0.0, 0.3, 0.6, 1.0, 2.1)]
     rows = []
@@ -233,19 +233,19 @@ def simplex_table(under_load: pandas.DataFrame) -> Table:
         rows.append(cells)
     quantities = ("height, mm", "bottom cables, kN", "top cables, kN", "vertical cables, kN")
     pairs = [text for quantity in quantities for text in (quantity, "measured")]
-    return Table(["load per upper node, kN", *pairs], rows, text_columns=())
+    return TextTable(["load per upper node, kN", *pairs], rows, text_columns=())
 
 
-def frequency_table(frequencies: dict[float, float]) -> Table:
+def frequency_table(frequencies: dict[float, float]) -> TextTable:
     """First natural frequencies of the simplex."""
     rows = [
         [fixed(stress, 1), fixed(predicted), fixed(SELF_STRESSES[stress])]
         for stress, predicted in frequencies.items()
     ]
-    return Table(["self-stress, kN", "first frequency, Hz", "measured"], rows, text_columns=())
+    return TextTable(["self-stress, kN", "first frequency, Hz", "measured"], rows, text_columns=())
 
 
-def free_length_table(fit: Fit) -> Table:
+def free_length_table(fit: Fit) -> TextTable:
     """The fitted free lengths beside the published ones."""
     rows = []
     for key, row in fit.parameters.iterrows():
@@ -253,10 +253,10 @@ def free_length_table(fit: Fit) -> Table:
         published, group = row["start"], str(key).split(".")[2]
         rows.append([group, *(fixed(1e3 * x, 1) for x in (row["value"], published)), interval])
     head = ["cables", "free length, fitted (mm)", "published (mm)", "95 % interval (mm)"]
-    return Table(head, rows)
+    return TextTable(head, rows)
 
 
-def spine_table(poses: pandas.DataFrame) -> Table:
+def spine_table(poses: pandas.DataFrame) -> TextTable:
     """Deviations of the spine's poses from the authors' statics, and of the camera's from them."""
     rows = []
     for name, unit, size in (("x", "m", 1e-3), ("y", "m", 1e-3), ("rad", "", math.radians(1.0))):
@@ -268,10 +268,10 @@ def spine_table(poses: pandas.DataFrame) -> Table:
         spread = f"{fixed(camera.min())} to {fixed(camera.max())}"
         rows.append([label, fixed(wanted.abs().max(), 4), fixed(camera.mean()), spread])
     headings = ["", "largest deviation from the authors' statics", "camera, mean", "camera, range"]
-    return Table(headings, rows)
+    return TextTable(headings, rows)
 
 
-def jump_table(jumps: dict[float, list[tuple[float, float]]]) -> Table:
+def jump_table(jumps: dict[float, list[tuple[float, float]]]) -> TextTable:
     """Rises of the jumper, and the least distance of its rods."""
     rows = []
     for share, results in jumps.items():
@@ -279,7 +279,7 @@ def jump_table(jumps: dict[float, list[tuple[float, float]]]) -> Table:
         least = fixed(1e3 * min(clearance for _, clearance in results), 1)
         rows.append([f"{100.0 * share:.0f} %", rises, JUMPS[share], least])
     headings = ["wound up by", "rise, m, at 2 and 0.5 N s/m", "measured", "rods' axes apart, mm"]
-    return Table(headings, rows)
+    return TextTable(headings, rows)
 
 
 def simplex_figure(under_load: pandas.DataFrame) -> Figure:

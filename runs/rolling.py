@@ -29,7 +29,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.experiment import evolve
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import Table, fixed
+from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.laws.cable import CABLE
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.results.result import SimulationResult
@@ -211,7 +211,7 @@ def best_of(policies: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return max(policies, key=lambda each: (each["rolls"], each["engines"]["MuJoCo"]["turns"]))
 
 
-def policy_table(policies: Sequence[dict[str, Any]]) -> Table:
+def policy_table(policies: Sequence[dict[str, Any]]) -> TextTable:
     """A row for each policy."""
     rows = []
     for trial, policy in enumerate(policies):
@@ -228,7 +228,7 @@ def policy_table(policies: Sequence[dict[str, Any]]) -> Table:
     headings = ["trial"]
     for engine in ENGINES:
         headings += [f"{engine}: turns", "way, m", "drift"]
-    return Table([*headings, "rolls"], rows)
+    return TextTable([*headings, "rolls"], rows)
 
 
 def lapse_figure(result: SimulationResult) -> Figure:
@@ -275,7 +275,7 @@ def evolve_networks() -> list[dict[str, float]]:
     ]
 
 
-def network_table(networks: Sequence[dict[str, float]]) -> Table:
+def network_table(networks: Sequence[dict[str, float]]) -> TextTable:
     """A row for the fittest network of each trial."""
     rows = [
         [
@@ -286,7 +286,7 @@ def network_table(networks: Sequence[dict[str, float]]) -> Table:
         ]
         for trial, each in enumerate(networks)
     ]
-    return Table(["trial", "turns", "way, m", "drift"], rows)
+    return TextTable(["trial", "turns", "way, m", "drift"], rows)
 
 
 def share(value: float) -> str:

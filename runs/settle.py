@@ -16,7 +16,7 @@ from analyse import Analysis, load_analysis
 
 from tetra_drake.analysis.statistics import interval_of_resamples, resampled
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import Table, fixed, listed, ranged
+from tetra_drake.formatting import TextTable, fixed, listed, ranged
 from tetra_drake.settings.units import INCH
 
 
@@ -48,7 +48,7 @@ def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, floa
     return float(other.mean() - one.mean()), *interval_of_resamples(other_means - means)
 
 
-def settled(first: Path, second: Path) -> Table:
+def settled(first: Path, second: Path) -> TextTable:
     """Text with the comparison of two runs."""
     one, other = (numbers(load_analysis(run)) for run in (first, second))
     rows = []
@@ -57,7 +57,7 @@ def settled(first: Path, second: Path) -> Table:
             continue
         means = [fixed(values[name].mean()) for values in (one, other)]
         rows.append([name, *means, ranged(*difference_of_means(one[name], other[name]))])
-    return Table(["mean of the trials", first.name, second.name, "difference"], rows)
+    return TextTable(["mean of the trials", first.name, second.name, "difference"], rows)
 
 
 def main(runs: list[str]) -> None:

@@ -31,7 +31,7 @@ from rolling import LAPSE, ROLLING, best_of, load_policies
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import Table, fixed, listed, rounded
+from tetra_drake.formatting import TextTable, fixed, listed, rounded
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import SCENARIO, load_scenario
@@ -198,7 +198,7 @@ def gallery_table(runs: Runs) -> str:
         keeps = "-" if math.isnan(best.kept) else f"{100.0 * best.kept:.0f} %"
         rows.append([title, *reached, keeps, fixed(minutes.get(name, math.nan), 0)])
     rows.append(["all", *["" for _ in ENGINES], "", fixed(sum(minutes.values()), 0)])
-    return Table(["experiment", *ENGINES, "keeps", "minutes"], rows).markdown()
+    return TextTable(["experiment", *ENGINES, "keeps", "minutes"], rows).markdown()
 
 
 def trust_table(runs: Runs) -> str:
@@ -223,7 +223,7 @@ def trust_table(runs: Runs) -> str:
         rows.append([law, *counts, *(fixed(x, 4) for x in numbers), *percent])
     headings = ["friction", "runs", "gaits", "diagram, median (in)", "largest"]
     headings += ["1 nm, median (in)", "largest", "MuJoCo, median", "largest"]
-    return Table(headings, rows).markdown()
+    return TextTable(headings, rows).markdown()
 
 
 def films(names: Mapping[str, str], runs: Runs, *, distances: bool) -> str:
@@ -270,7 +270,7 @@ def trials_table(name: str, runs: Runs) -> str:
     for name, (_, unit) in of_metrics.items():
         title = name.replace("_", " ")
         headings.append(f"{title} ({unit})" if unit else title)
-    table = Table(headings, rows).markdown()
+    table = TextTable(headings, rows).markdown()
     if not apart:
         return table
     trials = "trial" if len(apart) == 1 else "trials"

@@ -17,7 +17,7 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.laws.terrain import Steps
-from tetra_drake.optimizers.steady_state import SteadyState
+from tetra_drake.optimizers.steady_state import SteadyStateOptimizer
 
 
 @pytest.fixture
@@ -155,7 +155,7 @@ def test_a_run_is_resumed_only_by_its_own_method(
             with refused(run, "objective", fact):
                 resume(objective=other)
         with refused(run, "optimizer", ""):
-            resume(optimizer=SteadyState)
+            resume(optimizer=SteadyStateOptimizer)
         assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
         assert "objective=" in capsys.readouterr().err
         assert read_record(run) == recorded

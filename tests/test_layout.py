@@ -6,6 +6,7 @@ import ast
 import functools
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,19 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
         free = {name for name in rest if graph[name] - {name} <= settled}
         assert free, f"a circle among {sorted(rest)}"
         settled |= free
+
+
+def test_each_class_and_each_alias_of_a_type_has_a_name_of_its_own() -> None:
+    names: Counter[str] = Counter()
+    for file in PACKAGE.rglob("*.py"):
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                names[node.name] += 1
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+                names[ast.unparse(target)] += 1
+    types = [name for name in names if name[0].isupper() and not name.isupper()]
+    assert [name for name in types if names[name] > 1] == []
 
 
 @pytest.mark.parametrize("folder", ["laws", "engines/lanes"])

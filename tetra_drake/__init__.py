@@ -39,70 +39,29 @@ print() shows a summary of a scenario, gait, run, result or result.metrics. Numb
 their names have no other unit, such as result.metrics.distance_in. Wrong input raises an
 InputError: a ValueError with a message of one line.
 
-Each name is imported at its first use, so `import tetra_drake` loads neither Drake nor numba.
+Each name is imported at its first use, so `import tetra_drake` loads neither Drake nor numba. The
+names and their modules are in `__init__.pyi`, which type checkers read, too.
 """
 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from tetra_drake.analysis.comparison import compare as compare
-    from tetra_drake.analysis.equilibrium import study_equilibrium as study_equilibrium
-    from tetra_drake.analysis.measurements import MotionCapture as MotionCapture
-    from tetra_drake.analysis.measurements import Rest as Rest
-    from tetra_drake.analysis.robustness import robustness as robustness
-    from tetra_drake.analysis.sweep import sweep as sweep
-    from tetra_drake.engines.preparation import prepare as prepare
-    from tetra_drake.engines.simulate import simulate as simulate
-    from tetra_drake.engines.simulate import simulate_many as simulate_many
-    from tetra_drake.engines.simulation import Simulation as Simulation
-    from tetra_drake.evolution.run import load_run as load_run
-    from tetra_drake.experiment import evolve as evolve
-    from tetra_drake.experiment import fit as fit
-    from tetra_drake.prototype.command_file import load_command as load_command
-    from tetra_drake.prototype.export import export as export
-    from tetra_drake.report.result_folder import load_result as load_result
-    from tetra_drake.robot.gait import ParameterSpace as ParameterSpace
-    from tetra_drake.robot.gait import load_gait as load_gait
-    from tetra_drake.robot.gait import seeded_gait as seeded_gait
-    from tetra_drake.scenario.load import load_scenario as load_scenario
+import re
+from pathlib import Path
+from typing import Any
 
 __version__ = "0.4.0"
 
-_HOMES = {
-    "Simulation": "tetra_drake.engines.simulation",
-    "MotionCapture": "tetra_drake.analysis.measurements",
-    "ParameterSpace": "tetra_drake.robot.gait",
-    "Rest": "tetra_drake.analysis.measurements",
-    "compare": "tetra_drake.analysis.comparison",
-    "evolve": "tetra_drake.experiment",
-    "export": "tetra_drake.prototype.export",
-    "fit": "tetra_drake.experiment",
-    "load_command": "tetra_drake.prototype.command_file",
-    "load_gait": "tetra_drake.robot.gait",
-    "load_result": "tetra_drake.report.result_folder",
-    "load_run": "tetra_drake.evolution.run",
-    "load_scenario": "tetra_drake.scenario.load",
-    "prepare": "tetra_drake.engines.preparation",
-    "robustness": "tetra_drake.analysis.robustness",
-    "seeded_gait": "tetra_drake.robot.gait",
-    "simulate": "tetra_drake.engines.simulate",
-    "simulate_many": "tetra_drake.engines.simulate",
-    "study_equilibrium": "tetra_drake.analysis.equilibrium",
-    "sweep": "tetra_drake.analysis.sweep",
-}
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_MODULES = {name: module for module, name in re.findall(r"from (\S+) import (\w+)", _STUB)}
 
-__all__ = ["__version__", *_HOMES]
+__all__ = ["__version__", *_MODULES]
 
 
-if not TYPE_CHECKING:  # a type checker refuses names that are not imported above
-
-    def __getattr__(name: str) -> Any:
-        if name not in _HOMES:
-            raise AttributeError(f"module 'tetra_drake' has no attribute '{name}'")
-        return getattr(importlib.import_module(_HOMES[name]), name)
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'tetra_drake' has no attribute '{name}'")
+    return getattr(importlib.import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:

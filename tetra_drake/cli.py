@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tetra_drake import __version__
-from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, file_names, write_whole
 from tetra_drake.interrupts import heeding_interrupts
-from tetra_drake.options import BAD_INPUT, Command, Option, integer, number, quantity, size
+from tetra_drake.options import BAD_INPUT, Option, Parser, integer, number, quantity, size
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.settings.units import INCH, SYSTEMS, shown_in
 
@@ -44,7 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not isinstance(error, BrokenPipeError):
             what = error.filename or "output"
             print(f"tetra-drake: {what}: {error.strerror or error}", file=sys.stderr)
-        _drop_output()
+        try:  # Python would try to write at its end what was printed but not written
+            sys.stdout.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except KeyboardInterrupt as interrupt:
         print("\ntetra-drake: interrupted", *interrupt.args, file=sys.stderr)
@@ -52,24 +54,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _drop_output() -> None:
-    """Drops output that was printed but not written. Python would try to write it at its end."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def make_parser() -> Command:
+def make_parser() -> Parser:
     """The parser of all commands."""
-    parser = Command(
+    parser = Parser(
         prog="tetra-drake",
         description="Simulate a walking tensegrity robot, nested tetrahedra driven by a Matsuoka "
         "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    common = Command(add_help=False)
+    common = Parser(add_help=False)
     common.add_argument(
         "--units",
         choices=[*SYSTEMS],
@@ -108,15 +102,15 @@ Reach = Annotated[
 Width = Annotated[
     float, Option(metavar="LENGTH", type=quantity("m", "3.4 in", least="2 in", most="40 in"))
 ]
-Unit = Annotated[str, Option(metavar="UNIT")]
+UnitName = Annotated[str, Option(metavar="UNIT")]
 Size = Annotated[tuple[int, int], Option(metavar="WxH", type=size)]
 FontSize = Annotated[float, Option(metavar="X", type=number(2, 40))]
 FrameRate = Annotated[float, Option(metavar="X", type=number(0.01, 240))]
-Speed = Annotated[float, Option(metavar="X", type=number(0.001, 1000))]
+PlaybackSpeed = Annotated[float, Option(metavar="X", type=number(0.001, 1000))]
 View = Annotated[str, Option(choices=("free", "side", "front", "top"))]
 Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
 Labels = Annotated[list[str], Option(metavar="NAME", nargs="+")]
-Run = Annotated[Folder, Option(metavar="RUN")]
+RunFolder = Annotated[Folder, Option(metavar="RUN")]
 GaitOrRun = Annotated[Path, Option(metavar="GAIT|RUN", type=Path)]
 RunOrResult = Annotated[Path, Option(metavar="RUN_DIR|RESULT_DIR", type=Path)]
 ResultOrGait = Annotated[Path, Option(metavar="RESULT_DIR|GAIT|RUN_DIR", type=Path)]
@@ -126,19 +120,19 @@ _GAIT = "a gait file (JSON), or a folder written by `evolve` for its best gait"
 _SEED = "a random gait of this seed instead (default: one that walks)"
 _STRUCTURE = f"a structure file, one of {', '.join(shipped_structures())}, or a scenario"
 _COMMAND = "a file of actuator commands (CSV) instead, as `export` writes"
-_ENGINE = "the Drake diagram, the same laws compiled, or MuJoCo (default: the scenario's)"
+_ENGINE = "drake (the diagram), compiled (the same laws), or mujoco (default: the scenario's)"
 
 FitPath = Annotated[Path, Option(metavar="FIT", type=Path)]
 ScenarioName = Annotated[str, Option(_SCENARIO, metavar="NAME|FILE")]
-GaitFile = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
+GaitPath = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
 GaitSeed = Annotated[Seed, Option(_SEED, group="gait")]
 CommandFile = Annotated[File, Option(_COMMAND, group="gait")]
-EngineName = Annotated[str, Option(_ENGINE, choices=tuple(ENGINES))]
+EngineName = Annotated[str, Option(_ENGINE, metavar="NAME")]
 StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
 
 
 def _simulate(
-    gait: GaitFile | None = None,
+    gait: GaitPath | None = None,
     *,
     scenario: ScenarioName | None = None,
     seed: GaitSeed | None = None,
@@ -198,7 +192,7 @@ def _simulate(
 
 
 def _export(
-    gait: GaitFile | None = None,
+    gait: GaitPath | None = None,
     *,
     seed: GaitSeed | None = None,
     scenario: ScenarioName | None = None,
@@ -331,7 +325,7 @@ def _video(
     size: Size = (1920, 1080),
     fps: FrameRate = 30.0,
     view: View = "free",
-    speed: Speed = 1.0,
+    speed: PlaybackSpeed = 1.0,
     out: File,
 ) -> None:
     """Write a video of a gait, for talks.
@@ -434,7 +428,7 @@ def _robustness(
 
 
 def _compare(
-    runs: list[Run],
+    runs: list[RunFolder],
     *,
     labels: Labels | None = None,
     scenarios: bool = False,
@@ -530,7 +524,7 @@ def _fit(
 
 
 def _cpg(
-    gait: GaitFile | None = None,
+    gait: GaitPath | None = None,
     *,
     scenario: ScenarioName | None = None,
     seed: GaitSeed | None = None,
@@ -561,7 +555,7 @@ def _cpg(
 def _structure(
     source: StructureName,
     *,
-    unit: Unit | None = None,
+    unit: UnitName | None = None,
     out: File | None = None,
     mjcf: File | None = None,
     sdf: File | None = None,

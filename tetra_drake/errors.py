@@ -27,20 +27,16 @@ class InputError(ValueError):
         self.key = key
         self.problem = _one_line(problem)
         if len(key) + len(self.problem) > _LONGEST:
-            key, self.problem = _cut(key, _QUOTED), _shortened(self.problem)
+            # Long quotations are cut; one may be a whole file.
+            problem = re.sub(rf"'([^']{{{_QUOTED}}})[^']+'", r"'\1 ...'", self.problem)
+            problem = re.sub(rf"([^\s']{{{_QUOTED}}})[^\s']+", r"\1 ...", problem)
+            key, self.problem = _cut(key, _QUOTED), _cut(problem, _CUT)
         origin = f"{_cut(self.source, _LONGEST_PATH)}: {key}".removesuffix(": ")
         super().__init__(_one_line(f"{origin}: {self.problem}"))
 
     def _render_traceback_(self) -> list[str]:
         """The error in IPython and notebooks: its message alone."""
         return [f"{type(self).__name__}: {self}"]
-
-
-def _shortened(problem: str) -> str:
-    """The problem with long quotations cut. A quotation may be a whole file."""
-    problem = re.sub(rf"'([^']{{{_QUOTED}}})[^']+'", r"'\1 ...'", problem)
-    problem = re.sub(rf"([^\s']{{{_QUOTED}}})[^\s']+", r"\1 ...", problem)
-    return _cut(problem, _CUT)
 
 
 def _one_line(text: str) -> str:

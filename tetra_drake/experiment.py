@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
-from tetra_drake.analysis.fit import EVALUATIONS, Bounds, Fit, fit_values
+from tetra_drake.analysis.fit import KEPT_EVALUATIONS, Bounds, Fit, fit_values
 from tetra_drake.analysis.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure, check_whole
@@ -187,7 +187,7 @@ def fit(
     folder = None if out is None else given_path(out, "fit", "out")
     if folder is not None:
         check_folder(folder)
-        if (folder / SCENARIO).exists() and not (folder / EVALUATIONS).exists():
+        if (folder / SCENARIO).exists() and not (folder / KEPT_EVALUATIONS).exists():
             raise InputError(folder, "", f"has a {SCENARIO} of something else, expected a folder")
     found = fit_values(
         given_scenario(scenario),
@@ -271,7 +271,7 @@ def _report(directory: Path, progress: Progress) -> None:
     """Writes the report of a run."""
     from tetra_drake.report.run_page import write_report
 
-    again = f"try again with: {_draw_again(directory)}"
-    with _completing(progress, f"the report was not written; {again}"):
+    problem = f"the report was not written; try again with: {_draw_again(directory)}"
+    with _completing(progress, problem):
         progress.say("drawing figures and the report")
         write_report(directory)

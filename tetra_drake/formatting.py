@@ -26,8 +26,7 @@ def fixed(value: float, digits: int = 2) -> str:
     """A number with this many decimals, never "-0.00". "-" if it is not finite."""
     if not math.isfinite(value):
         return "-"
-    text = f"{value:.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
+    return f"{value:z.{digits}f}"
 
 
 def signed(value: float, digits: int = 2) -> str:
@@ -90,7 +89,7 @@ _NARROW = 12  # letters; texts are not folded into narrower columns
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """A table of texts with headings."""
 
     headings: Sequence[str]

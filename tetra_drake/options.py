@@ -31,14 +31,14 @@ class Option:
         self.arguments = {"help": help, "group": group, **arguments}
 
 
-class Command(argparse.ArgumentParser):
+class Parser(argparse.ArgumentParser):
     """Parser of a command's options. Its errors are one line."""
 
     def error(self, message: str) -> NoReturn:
         """Prints an error in one line and ends the process."""
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
-    def add_commands(self, functions: Sequence[Callable[..., None]], *, common: Command) -> None:
+    def add_commands(self, functions: Sequence[Callable[..., None]], *, common: Parser) -> None:
         """Adds a command for each function, by its name without an underscore in front. All have
         the options of `common`.
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
 
-from tetra_drake.engines.lanes.batch import Lanes, processor_lanes
+from tetra_drake.engines.lanes.batch import LaneThread, processor_lanes
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import Diverged, InputError
@@ -130,7 +130,7 @@ def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
 
 @pytest.mark.parametrize(
     ("engine", "inner"),
-    [("!Compiled", (Lanes, "simulate")), *((e, (Readings, "put")) for e in OTHERS)],
+    [("!Compiled", (LaneThread, "simulate")), *((e, (Readings, "put")) for e in OTHERS)],
 )
 def test_after_an_interrupt_a_reset_makes_the_robots_whole(
     short, engine, inner, monkeypatch, refused
@@ -159,11 +159,11 @@ def test_after_an_interrupt_a_reset_makes_the_robots_whole(
 
 
 def test_another_thread_is_refused_during_a_step(short, monkeypatch):
-    simulation, told, call = Simulation(short), [], Lanes.simulate
+    simulation, told, call = Simulation(short), [], LaneThread.simulate
     with ThreadPoolExecutor(1) as pool, monkeypatch.context() as patch:
         step = functools.partial(pool.submit, simulation.step, simulation.rest)
         patch.setattr(
-            Lanes, "simulate", lambda *a, **o: (told.append(step().exception()), call(*a, **o))
+            LaneThread, "simulate", lambda *a, **o: (told.append(step().exception()), call(*a, **o))
         )
         assert simulation.step(simulation.rest).time == [PERIOD]
     assert [(type(error), error.key) for error in told] == [(InputError, "step")]

@@ -7,7 +7,6 @@ import numpy as np
 from helpers.analytic import small_scenario
 
 from tetra_drake.evolution.manifest import Method
-from tetra_drake.optimizers.steady_state import SteadyState
 
 
 def scaled(result):
@@ -36,4 +35,4 @@ def test_what_is_given_from_python_has_its_module_and_fields_in_its_name():
         assert (method.objective, method.optimizer) == (name, f"{HERE}.scaled")
         assert method.given_from_python == ["objective", "optimizer"]
     built_in = Method(objective="fitness", optimizer="SteadyState")
-    assert built_in == Method.of(small_scenario(), optimizer=SteadyState)
+    assert built_in == Method.of(small_scenario())

@@ -56,7 +56,7 @@ def gait_of(robot):
     if robot == "long names":
         carried = with_long_names(prism.make_prism())
         return result_of(carried, prism.slide_prism(carried), name=NAME * 4)
-    bodies, duration = {"three": (3, 0.5), "five": (5, 9.0), "twelve": (12, 9.0)}[robot]
+    bodies, duration = {"three": (3, 0.5), "five": (5, 9.0)}[robot]
     motion = make_walk(bodies=bodies, duration=duration)
     return result_of(make_row(bodies), motion, name=NAME)
 
@@ -108,13 +108,6 @@ def check(drawn_texts, request):
 @pytest.mark.parametrize("draw", OF_A_GAIT)
 def test_figures_of_a_gait(draw, robot, check):
     check(draw, gait_of(robot))
-
-
-@SLOW
-@pytest.mark.parametrize("check", [7.0], indirect=True)
-@pytest.mark.parametrize("draw", OF_A_GAIT)
-def test_figures_of_twelve_bodies_have_room_on_their_own_page(draw, check):
-    check(draw, gait_of("twelve"))
 
 
 @pytest.mark.parametrize("draw", OF_A_GAIT)

@@ -14,7 +14,6 @@ from tetra_drake.figures.motion import (
     before_and_after,
     one_step,
     path_of_the_centre,
-    relative_distances,
     time_lapse,
 )
 from tetra_drake.figures.style import OKABE_ITO
@@ -78,14 +77,6 @@ def test_the_gait_diagram_has_the_forward_speed_and_its_mean(walk):
         velocity = walk.v_WN.sel(time=slice(2.0, 5.0), axis="x").values
         np.testing.assert_allclose(speed.get_ydata(), velocity.mean(axis=1) / length)
         assert speed.get_xdata()[[0, -1]].tolist() == [2.0, 5.0]
-
-
-def test_relative_distances_are_in_inches(walk):
-    [panel] = relative_distances(row(walk)).axes
-    lines = {line.get_label(): line for line in panel.lines}
-    assert "T1" not in lines
-    for i, name in enumerate(walk.body.values[1:], start=1):
-        np.testing.assert_allclose(lines[name].get_ydata(), i * 2.94, rtol=1e-6, atol=1e-12)
 
 
 def test_the_time_lapse_shows_instants_from_start_to_end(walk):
@@ -229,11 +220,3 @@ def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
     [panel] = paths_of(one_step(carried))
     assert panel.get_title("left") == "centre"
     assert np.ptp(panel.lines[0].get_xdata()) > 0.5 * prism.PERIOD * prism.SPEED / INCH
-
-
-def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
-    rolled = carried.trajectory.copy(deep=True)
-    rolled.normal_force.loc[{"contact": ["n0", "n2"]}] = 0.0
-    rolled.normal_force.loc[{"contact": "n4"}] = 0.2
-    figure = ground_forces(result_of(carried.robot, rolled))
-    assert [panel.get_title("left") for panel in figure.axes] == ["n4", "n1"]

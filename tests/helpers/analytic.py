@@ -19,7 +19,6 @@ from tetra_drake.evolution.evaluators import Evaluator, OnExecutor, evaluate_all
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import TrialStatus, open_trials, run_trials
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Iteration, MakeOptimizer, Task
-from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import IterationSeed
@@ -94,7 +93,7 @@ def small_scenario(
     *, oscillators: int = 4, population: int = 12, iterations: int = 15, trials: int = 2
 ) -> Scenario:
     """The thesis with little to do."""
-    evaluations = population + CHILDREN * iterations
+    evaluations = population + 2 * iterations
     changes = {"robot.tetrahedra": oscillators + 1, "optimizer.population": population}
     changes |= {"evolution.evaluations": evaluations, "evolution.trials": trials}
     return load_scenario("thesis").with_changes(changes)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetra_drake.engines.lanes.dynamics import Solver, implicit_matrix
-from tetra_drake.engines.lanes.ros2 import Step, take_step
+from tetra_drake.engines.lanes.ros2 import StepMemory, take_step
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Real, Table
@@ -11,7 +11,7 @@ from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot, sizes_of
 from tetra_drake.laws.model import Model
 
-Parts = Packed[tuple[Model, Solver, Forces, Step]]
+Parts = Packed[tuple[Model, Solver, Forces, StepMemory]]
 
 
 class Stepper:
@@ -20,7 +20,7 @@ class Stepper:
     def __init__(self, robot: Model) -> None:
         self.robot, self.solver, self.forces = robot, Solver.of(robot), Forces.of(robot)
         blocks = len(self.solver.schedule.later)
-        self.work = allocate(Step, sizes_of(robot) | {"blocks": blocks})
+        self.work = allocate(StepMemory, sizes_of(robot) | {"blocks": blocks})
         self.parts: Parts = Packed((robot, self.solver, self.forces, self.work))
 
     def force_at(self, state: np.ndarray, modes: np.ndarray, signals: np.ndarray) -> np.ndarray:

@@ -64,15 +64,6 @@ def test_failed_members_lose_every_tournament_and_do_not_count_in_the_mean():
     assert math.isnan(mean_fitness(fitnesses[:1]))
 
 
-def test_each_parameter_is_swapped_with_the_probability(generator):
-    options = {"probability": 0.2, "generator": generator}
-    pairs = np.array([cross_over(np.zeros(26), np.ones(26), **options) for _ in range(DRAWS)])
-    np.testing.assert_array_equal(pairs.sum(axis=1), 1.0)
-    # The standard deviation of a mean of 2000 is 0.009, and 0.0018 of all 26.
-    np.testing.assert_allclose(pairs[:, 0].mean(axis=0), 0.2, atol=0.04)
-    assert pairs[:, 0].mean() == pytest.approx(0.2, abs=0.006)
-
-
 def test_seven_tenths_of_the_parameters_move_by_up_to_their_step(scenario, generator):
     steps = mutation_steps(ParameterSpace.of(scenario), scenario.optimizer)
     options = {"probability": 0.7, "generator": generator}

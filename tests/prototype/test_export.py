@@ -11,7 +11,7 @@ from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.prototype.command_file import load_command
-from tetra_drake.prototype.export import COMMAND, EXPECTED, LIMITS, README, export
+from tetra_drake.prototype.export import COMMAND, EXPECTED, LIMITS_FILE, README, export
 from tetra_drake.robot.gait import load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, load_scenario
@@ -48,7 +48,7 @@ def test_the_folder_loads_and_begins_where_the_robot_does(short, tmp_path):
     folder = tmp_path / "lab"
     export(short, seeded_gait(short), rate=50.0, out=folder)
     names = {path.name for path in folder.iterdir()}
-    assert names == {COMMAND, EXPECTED, LIMITS, SCENARIO, README}
+    assert names == {COMMAND, EXPECTED, LIMITS_FILE, SCENARIO, README}
     assert load_command(folder / COMMAND, load_scenario(folder / SCENARIO)).period == 0.02
     expected = rows_of(folder / EXPECTED)
     assert len(expected) == 3 * 50 + 1
@@ -67,7 +67,7 @@ def test_forces_are_the_signals_of_the_gait(short, tmp_path):
     of_cable = Robot.of(short).structure.cables["signal"][Robot.of(short).driven]
     np.testing.assert_allclose(samples, signals.values[:, of_cable], atol=1e-6)
     assert not samples[:20].any() and samples[21:].any(), "start-up until 0.2 s"
-    for row in rows_of(tmp_path / "lab" / LIMITS):
+    for row in rows_of(tmp_path / "lab" / LIMITS_FILE):
         assert row["limit_of_force_N"] == row["time_at_a_limit_percent"] == ""
 
 
@@ -87,7 +87,7 @@ def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
     driven = short.with_changes(actuation | {"cpg.start_up": "0 s"})
     export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
     metrics = simulate(scenario=driven, gait=seeded_gait(short)).metrics
-    rows = rows_of(tmp_path / "lab" / LIMITS)
+    rows = rows_of(tmp_path / "lab" / LIMITS_FILE)
 
     def peak(name):
         return max(float(row[name]) for row in rows)
@@ -114,7 +114,7 @@ def test_least_length_and_travel_are_those_of_what_is_wound(short, actuation, wh
     export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
     result = simulate(scenario=driven, gait=seeded_gait(short), record=True)
     wound = 1e3 * result.trajectory[what].isel(cable=result.robot.driven)
-    for row, cable in zip(rows_of(tmp_path / "lab" / LIMITS), wound.cable.values, strict=True):
+    for row, cable in zip(rows_of(tmp_path / "lab" / LIMITS_FILE), wound.cable.values, strict=True):
         values = wound.sel(cable=cable).values
         assert row["cable"] == cable
         assert float(row["least_length_mm"]) == pytest.approx(values.min(), rel=1e-5)

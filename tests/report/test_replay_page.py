@@ -99,7 +99,7 @@ def test_a_damaged_result_is_refused_by_its_key(folder, key, refused):
 
 def test_a_result_stands_for_files_that_are_complete(folder, tiny, gait, result, monkeypatch):
     fail = Mock(side_effect=OSError("disk full"))
-    monkeypatch.setattr("tetra_drake.results.trajectory.save_dataset", fail)
+    monkeypatch.setattr("tetra_drake.report.result_folder.save_dataset", fail)
     with pytest.raises(OSError, match="disk full"):
         save_result_folder(folder, result)
     assert not (folder / "result.json").exists()

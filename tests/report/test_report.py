@@ -93,7 +93,7 @@ def study(run):
 def render(study, **changes):
     """The page without figures, of a study with changes of its run."""
     run = dataclasses.replace(study.run, **changes)
-    return Page(render_report(dataclasses.replace(study, run=run), {}, folder=Path("unused")))
+    return Page(render_report(dataclasses.replace(study, run=run), [], folder=Path("unused")))
 
 
 def test_figures_are_files_and_in_the_page(run, page):

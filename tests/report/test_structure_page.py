@@ -10,7 +10,7 @@ from tetra_drake.report.structure_page import robot_of_file, structure_text
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.settings.units import units_for
+from tetra_drake.settings.units import fitting
 
 BEAM = """
 unit: m
@@ -46,5 +46,5 @@ def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path, result
 
 def test_lengths_that_are_round_in_no_unit_are_shown_in_metric_units():
     turned = tuple(0.2 * np.cos([0.1, 0.7, 1.3]))
-    assert units_for(turned, None).length_name == "cm"
-    assert units_for(load_scenario("thesis").robot.lengths, None).length_name == "in"
+    assert fitting(turned).length_name == "cm"
+    assert fitting(load_scenario("thesis").robot.lengths).length_name == "in"

@@ -118,7 +118,6 @@ FAULTS = [
     ("!Structure {file: own.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
     ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.nodes", "none can move"),
     ("!Structure {file: own.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
-    ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
 ]
 
 

@@ -146,7 +146,6 @@ def test_a_height_file_has_rows_along_x(tmp_path, suffix):
 NO_HEIGHTS = [
     (np.diag([0.0, np.nan, 0.0]), "nan in row 2, column 2"),
     (np.where(np.arange(9).reshape(3, 3) == 5, -1e7, 0.0), "-10000000.0 in row 2, column 3"),
-    (np.full((3, 3), {}), "heights.npy"),
 ]
 NO_HEIGHTS += [(HEIGHTS[None], "1 x 3 x 4"), (np.zeros((2000, 2001), dtype=np.int8), "2000 x 2001")]
 

@@ -33,10 +33,6 @@ if TYPE_CHECKING:
 
 QUARTILES = (0.25, 0.5, 0.75)
 
-# Sections of the scenario that may differ: they say how a run searches, not for which gaits.
-_SEARCH = ("evolution", "optimizer")
-
-
 _TRIAL_COLUMNS = ["run", "trial", "ended", "cost", "at_common", "fitness", "distance", "reached"]
 
 
@@ -304,10 +300,11 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
         if _objective(run) != _objective(base):
             problem = f"differs from {first}; fitnesses of different objectives cannot be compared"
             raise InputError(run.directory, "objective", problem)
+        # Sections that say how a run searches, not for which gaits, may differ.
         changed = [
             f"{key} {value}"
             for key, value in run.scenario.differences(base.scenario)
-            if key.split(".")[0] not in _SEARCH
+            if key.split(".")[0] not in ("evolution", "optimizer")
         ]
         if changed:
             notes.append(f"{label} differs from {first} not only in search: {', '.join(changed)}")

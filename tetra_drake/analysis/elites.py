@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tetra_drake.analysis.robustness import by_gait, robustness
 from tetra_drake.evolution.entries import ELITES, RecordFile
@@ -49,20 +48,15 @@ def elites(run: Run) -> pandas.DataFrame:
     judged = pandas.DataFrame(run.file(ELITES).read(), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
-        table[CELLS] = _cells(table, kind)
+        low, high = np.array(list(kind.measures.values())).T
+        count, shown = np.array(kind.cells), table[list(kind.measures)].to_numpy()
+        cells = (count * (shown - low) + _EPSILON) / (high - low)  # as pyribs computes them
+        table[CELLS] = cells.clip(0, count - 1).astype(np.int64)
         table = table.sort_values(["fitness", *_KEY], ascending=[False, True, True])
         table = table.drop_duplicates(CELLS)
     else:
         table = table.iloc[:0].assign(**dict.fromkeys(CELLS, 0))
     return table.merge(judged.astype(dict.fromkeys(_JUDGED, float)), on=_KEY, how="left")
-
-
-def _cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> npt.NDArray[np.int64]:
-    """Numbers (gaits, 2) of the cell of each gait, computed as pyribs does."""
-    low, high = np.array(list(kind.measures.values())).T
-    count = np.array(kind.cells)
-    cells = (count * (gaits[list(kind.measures)].to_numpy() - low) + _EPSILON) / (high - low)
-    return cells.clip(0, count - 1).astype(np.int64)
 
 
 def judge_elites(directory: Path, *, workers: int | None = None) -> None:

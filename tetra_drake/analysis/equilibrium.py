@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 
 if TYPE_CHECKING:
@@ -52,11 +52,12 @@ class EquilibriumStudy:
         one."""
         from scipy import linalg
 
-        vibration, structure = _Vibration.of(self.robot), self.robot.structure
-        squares, motions = linalg.eigh(vibration.stiffness, vibration.mass)
+        structure = self.robot.structure
+        stiffness, mass, radius = _vibration(self.robot)
+        squares, motions = linalg.eigh(stiffness, mass)
         motions = motions[:, squares > _LEAST_SQUARE]
         by_body = motions.reshape(len(structure.bodies), 6, -1)
-        by_body[:, :3] /= vibration.radius
+        by_body[:, :3] /= radius
         p_WB = self.robot.equilibrium.state[: 7 * len(by_body)].reshape(-1, 7)[:, 4:]
         p_WN = self.nodes[["x", "y", "z"]].to_numpy()
         modes = np.zeros((motions.shape[1], *p_WN.shape))
@@ -81,9 +82,12 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         InputError: if the robot has no equilibrium.
     """
     import pandas
+    from scipy import linalg
 
     robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium
+    stiffness, mass, _ = _vibration(robot)
+    squares = linalg.eigvalsh(stiffness, mass)
     unactuated = Unactuated(robot.model)
     force_at_rest(unactuated, equilibrium.state)
     loads = np.zeros(len(structure.node_names))
@@ -93,7 +97,10 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     nodes = pandas.DataFrame(p_WN, list(structure.node_names), ["x", "y", "z"])
     nodes.insert(0, "body", structure.body_of_node)
     nodes["load"] = loads
-    nodes[[f"anchor_{axis}" for axis in "xyz"]] = _anchor_forces(structure, unactuated, p_WN)
+    fixed, anchors, on_structure = structure.first_node[-1], structure.anchors, np.zeros_like(p_WN)
+    on_structure[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
+    on_structure[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
+    nodes[[f"anchor_{axis}" for axis in "xyz"]] = on_structure
     cables = {
         "group": structure.cable_groups,
         "length": equilibrium.lengths,
@@ -110,17 +117,8 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         ),
         nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-        frequencies=_frequencies(robot),
+        frequencies=np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi),
     )
-
-
-def _anchor_forces(structure: Structure, unactuated: Unactuated, p_WN: np.ndarray) -> np.ndarray:
-    """Forces (nodes, 3) of the anchors on the structure at rest, at the last computed state."""
-    fixed, anchors = structure.first_node[-1], structure.anchors
-    forces = np.zeros_like(p_WN)
-    forces[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
-    forces[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
-    return forces
 
 
 def _weightless_nodes(robot: Robot) -> np.ndarray:
@@ -131,26 +129,10 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
     return node_positions(structure, equilibrium_of(weightless, structure, start).state)
 
 
-class _Vibration(NamedTuple):
-    """Equation of motion M x'' = -K x about the equilibrium, without damping."""
-
-    stiffness: np.ndarray
-    mass: np.ndarray
-    radius: float
-    """Length (m) that turns rotations into the displacements x; see displaced()."""
-
-    @classmethod
-    def of(cls, robot: Robot) -> _Vibration:
-        unactuated, state = Unactuated(robot.model), robot.equilibrium.state
-        force_at_rest(unactuated, state)
-        stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
-        return cls(stiffness, mass_matrix(unactuated), unactuated.radius)
-
-
-def _frequencies(robot: Robot) -> np.ndarray:
-    """Natural frequencies (Hz) above LEAST_FREQUENCY."""
-    from scipy import linalg
-
-    vibration = _Vibration.of(robot)
-    squares = linalg.eigvalsh(vibration.stiffness, vibration.mass)
-    return np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi)
+def _vibration(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
+    """Stiffness K and mass M of the equation of motion M x'' = -K x about the equilibrium, without
+    damping; and the length (m) that turns rotations into the displacements x; see displaced()."""
+    unactuated, state = Unactuated(robot.model), robot.equilibrium.state
+    force_at_rest(unactuated, state)
+    stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
+    return stiffness, mass_matrix(unactuated), unactuated.radius

@@ -19,7 +19,7 @@ from tetra_drake.analysis.joined_keys import with_joined_changes
 from tetra_drake.analysis.measurements import FitFile, Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
-from tetra_drake.formatting import Say, Table, fixed, listed, rounded, silent
+from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.scenario import Scenario
@@ -42,7 +42,7 @@ NEGLIGIBLE = 0.01
 POPULATION, MOST = 16, 480
 """Evaluations per iteration of a global search, which fill the lanes of two cores; and the most of
 all its iterations."""
-NORMAL = 1.96
+WIDTH_95 = 1.96
 """Half width of a 95 % interval in standard deviations."""
 SAME_DIRECTION = 1e-10
 """Singular value, as a share of the greatest, below which the data say nothing of a direction."""
@@ -54,7 +54,7 @@ HUGE = 1e200
 """Sum of squares where a simulation fails."""
 SEAL = 32
 """Size of the digest in the file of an evaluation, in bytes."""
-EVALUATIONS = "evaluations"
+KEPT_EVALUATIONS = "evaluations"
 """Folder of the evaluations of a fit. A file has a digest of its name and of its numbers, and the
 numbers: for each measurement the predicted ones and the offset of the clock."""
 
@@ -129,13 +129,15 @@ class Fit:
         return [*self.warnings, *clocks]
 
     @property
-    def table(self) -> Table:
+    def table(self) -> TextTable:
         """Values and intervals."""
         rows = []
         for key, row in self.parameters.iterrows():
             value = _with_uncertainty(row["value"], row["high"] - row["value"])
             rows.append([str(key), value, rounded(row["start"]), row["unit"] or "1"])
-        return Table(["key", "value, 95 % interval", "start", "unit"], rows, text_columns=(0, 3))
+        return TextTable(
+            ["key", "value, 95 % interval", "start", "unit"], rows, text_columns=(0, 3)
+        )
 
 
 def _with_uncertainty(value: float, half: float) -> str:
@@ -367,7 +369,7 @@ class _Problem:
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
     def _file(self, name: str) -> Path | None:
-        return self.folder and self.folder / EVALUATIONS / f"{name}.bin"
+        return self.folder and self.folder / KEPT_EVALUATIONS / f"{name}.bin"
 
     def _save(self, name: str) -> None:
         if file := self._file(name):
@@ -451,7 +453,7 @@ def _uncertainty(problem: _Problem, x: np.ndarray, misfit: float) -> tuple[np.nd
     directions = rows[told] / singular[told, np.newaxis]
     covariance = directions.T @ directions
     deviation = np.sqrt(covariance.diagonal())
-    share = NORMAL * math.sqrt(max(1.0, misfit)) * deviation
+    share = WIDTH_95 * math.sqrt(max(1.0, misfit)) * deviation
     half = np.where(weak | (share > 0.5), math.inf, share * width * problem.scale)
     spread = np.where(deviation > 0.0, deviation, 1.0)
     return half, covariance / np.outer(spread, spread)

@@ -19,9 +19,9 @@ from pydantic import AfterValidator, Field
 from tetra_drake.analysis.equilibrium import study_equilibrium
 from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import MOST_BYTES, read_bytes, read_text
+from tetra_drake.files import read_bytes, read_text
 from tetra_drake.laws.cable import TENSION
-from tetra_drake.prototype.command_file import TIME, column_numbers, load_command, table_cells
+from tetra_drake.prototype.command_file import TIME_S, column_numbers, load_command, table_cells
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.gait import load_gait
@@ -30,7 +30,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.common_sections import different_keys
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import read_mapping
-from tetra_drake.settings.quantities import Force, Length, Time, Unit
+from tetra_drake.settings.quantities import ForceQuantity, Length, Time, Unit
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of
 from tetra_drake.settings.units import given_quantity
@@ -150,13 +150,13 @@ class Rest(Section):
     """Values of scenario keys in this case, such as loads."""
     positions: dict[str, Annotated[Length, _SIZE]] = Field(default={})
     """Coordinates by node and axis, such as "n3 z"."""
-    tensions: dict[str, Annotated[Force, _SIZE]] = Field(default={})
+    tensions: dict[str, Annotated[ForceQuantity, _SIZE]] = Field(default={})
     """Tensions by the names of the cables."""
     frequencies: list[Annotated[Frequency, _SIZE]] = Field(default=[])
     """Natural frequencies, the lowest one first."""
     position_uncertainty: Annotated[Length, _UNCERTAINTY] = 1e-3
     """Standard deviation of a coordinate."""
-    tension_uncertainty: Annotated[Force, _UNCERTAINTY] = 1.0
+    tension_uncertainty: Annotated[ForceQuantity, _UNCERTAINTY] = 1.0
     """Standard deviation of a tension."""
     frequency_uncertainty: Annotated[Frequency, _UNCERTAINTY] = 0.05
     """Standard deviation of a frequency."""
@@ -209,7 +209,7 @@ def load_fit_file(path: str | Path) -> FitFile:
     """Reads the file of a fit. Paths in it are relative to it. Raises InputError, naming file and
     key, if it is wrong."""
     path = Path(path)
-    tree = read_mapping(path, "file of a fit", keys=[*keys_of(FitFile)], most=MOST_BYTES)
+    tree = read_mapping(path, "file of a fit", keys=keys_of(FitFile))
     given = FitFile.from_tree(tree, path)
     placed = []
     for measurement in given.measurements:
@@ -310,12 +310,12 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
     """Coordinates in m of a log by time in s, NaN in gaps, with a column such as "n3 z" for each.
     Raises InputError, naming line or column, if the log is wrong."""
     cells = table_cells(_log_text(path), path)
-    if TIME not in cells:
-        raise InputError(path, TIME, "is missing, expected a column with the time in s")
-    times = column_numbers(cells.pop(TIME), path)
+    if TIME_S not in cells:
+        raise InputError(path, TIME_S, "is missing, expected a column with the time in s")
+    times = column_numbers(cells.pop(TIME_S), path)
     for row in np.flatnonzero(np.diff(times) <= 0.0):
         found = f"found {times[row + 1]:g} after {times[row]:g}"
-        raise InputError(path, f"line {row + 3}, {TIME}", f"{found}, expected ascending times")
+        raise InputError(path, f"line {row + 3}, {TIME_S}", f"{found}, expected ascending times")
     columns = {}
     for name in cells:
         match = re.fullmatch(r"((.+) [xyz])_(\w+)", name)
@@ -356,10 +356,10 @@ def _check_length(times: np.ndarray, driver: Driver, scenario: Scenario, log: st
     if found > duration + ROUNDING:
         expected = f"expected at most the duration, {duration:g}"
         problem = f"found {found:g} s, {expected} s; give simulation.duration more"
-        raise InputError(log, TIME, problem)
+        raise InputError(log, TIME_S, problem)
     if not isinstance(driver, Command):
         return
     least = min(duration, driver.period * (len(driver.samples) - 1))
     if found < (1.0 - CUT) * least:
         problem = f"found {found:g} s, expected at least the command's {least:g} s"
-        raise InputError(log, TIME, f"{problem}; give simulation.duration less to fit a part")
+        raise InputError(log, TIME_S, f"{problem}; give simulation.duration less to fit a part")

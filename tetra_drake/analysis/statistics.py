@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,17 +41,14 @@ def interval_of_resamples(resamples: np.ndarray) -> tuple[float, float]:
 def share_interval(count: int, total: int) -> tuple[float, float]:
     """Wilson score interval (95 %) of the share `count` / `total`.
 
-    Its width is positive even if the share is 0 or 1: 40 of 40 give 91 to 100 %. See Wilson,
-    "Probable inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22,
-    1927.
+    Its width is positive even if the share is 0 or 1: 40 of 40 give 91 to 100 %.
     """
+    from scipy.stats import binomtest
+
     if total == 0:
         return math.nan, math.nan
-    z = NormalDist().inv_cdf(0.975)
-    share, scale = count / total, 1.0 / (1.0 + z * z / total)
-    centre = scale * (share + 0.5 * z * z / total)
-    reach = scale * z * math.sqrt(share * (1.0 - share) / total + 0.25 * (z / total) ** 2)
-    return max(0.0, centre - reach), min(1.0, centre + reach)
+    found = binomtest(count, total).proportion_ci(method="wilson")
+    return float(found.low), float(found.high)
 
 
 def interquartile_mean(values: npt.ArrayLike, axis: int = -1) -> Any:
@@ -62,9 +58,9 @@ def interquartile_mean(values: npt.ArrayLike, axis: int = -1) -> Any:
     than the median (Agarwal et al. 2021, "Deep reinforcement learning at the edge of the
     statistical precipice").
     """
-    ordered = np.sort(np.asarray(values, dtype=float), axis=axis)
-    count = ordered.shape[axis]
-    return ordered.take(range(count // 4, count - count // 4), axis=axis).mean(axis=axis)
+    from scipy.stats import trim_mean
+
+    return trim_mean(values, 0.25, axis=axis)
 
 
 def json_rows(table: pandas.DataFrame) -> list[dict[Any, Any]]:

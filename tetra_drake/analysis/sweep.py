@@ -85,7 +85,11 @@ def sweep(
     for key, values in changes.items():
         along = [each[key] for each in grid]
         firsts = [scenarios[along.index(value)] for value in values]
-        labels[_dimension(key, changes)] = _labels(key, values, firsts)
+        # The last part of the key, or the whole key if the dataset already has that name.
+        name = key.rpartition(".")[2]
+        others = [other.rpartition(".")[2] for other in changes if other != key]
+        is_taken = name in ("gait", "fitness", *METRICS, *others)
+        labels[key if is_taken else name] = _labels(key, values, firsts)
     labels["gait"] = [gait.name for gait in walkers], {}
     shape = [len(values) for values, _ in labels.values()]
     rows = [_numbers(outcome) for outcome in outcomes]
@@ -105,14 +109,6 @@ def _values(key: str, given: Any) -> Collection[Any]:
     if not len(values):
         raise InputError("sweep", key, "found no value, expected one at least")
     return values
-
-
-def _dimension(key: str, changes: Iterable[str]) -> str:
-    """Name of the dimension of a key: its last part, or the whole key if the dataset already has
-    that name."""
-    name = key.rpartition(".")[2]
-    others = [other.rpartition(".")[2] for other in changes if other != key]
-    return key if name in ("gait", "fitness", *METRICS, *others) else name
 
 
 def _labels(

@@ -7,7 +7,6 @@ import importlib
 from collections.abc import Sequence
 from typing import ClassVar
 
-from tetra_drake.engines import ENGINES
 from tetra_drake.engines.batch import Batch, LoneRobot, SerialBatch, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
@@ -86,7 +85,7 @@ class Engine:
 
 def engine_of(scenario: Scenario) -> Engine:
     """The engine of a scenario. The engine's module is imported on demand."""
-    engine: Engine = importlib.import_module(ENGINES[scenario.engine_name]).ENGINE
+    engine: Engine = importlib.import_module(scenario.engine.module).ENGINE
     return engine
 
 

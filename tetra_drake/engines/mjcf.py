@@ -30,8 +30,6 @@ from tetra_drake.robot.xml_elements import add_element, xml_text
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 
-Array = np.ndarray
-
 _IMPRATIO = 1000.0
 """MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo a
 slipping node gets a part, 1 / impratio, of the force that would hold it as normal force. With the
@@ -62,7 +60,7 @@ def check_mjcf(scenario: Scenario) -> None:
     scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
 
-def make_mjcf(robot: Robot, *, rest: Array | None = None, own_laws: bool = False) -> str:
+def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = False) -> str:
     """Model of a robot with a tendon for each cable and a motor for each driven one. If the
     actuators have drives, tendons have no law, and a motor for each cable exerts its tension. With
     `own_laws`, this is so wherever is_pulled() is true, and struts pass through each other: the
@@ -265,7 +263,9 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
         _add_push(actuators, world, f"load {structure.node_names[node]}", np.zeros(3), of_axes)
 
 
-def _add_push(actuators: Element, world: Element, name: str, place: Array, laws: Array) -> None:
+def _add_push(
+    actuators: Element, world: Element, name: str, place: np.ndarray, laws: np.ndarray
+) -> None:
     """Adds an actuator along each axis of the world that pushes the node after the blank of `name`.
 
     The three numbers of each law are a constant force, and the force per displacement from `place`

@@ -20,7 +20,7 @@ from tetra_drake.robot.driven import DrivenRobot
 CLEARED = 16
 """Number of states from one computation of the clearance to the next, of states added at once."""
 
-Parts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
+TallyParts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
 """A robot, its tally, and the memory for its forces."""
 
 
@@ -58,7 +58,7 @@ class Observer:
 
 @compiled
 def observe_states(
-    parts: Parts, times: Table, states: Table, signals: Table, drives: Table
+    parts: TallyParts, times: Table, states: Table, signals: Table, drives: Table
 ) -> None:
     """Adds states (k, 13 bodies), signals (k, m) and drives (k, drives) at times (k,) in s to the
     tally.

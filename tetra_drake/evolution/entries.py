@@ -28,7 +28,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NamedTuple, NoReturn
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -51,12 +51,6 @@ REMEDY = (
 
 _CHECKSUM = re.compile(rb'(.*), "crc": "([0-9a-f]{8})"\}')
 """Pattern of a line: its content, then the CRC-32 of the content in hexadecimal digits."""
-
-_COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
-"""Key of the number of a line, by file name."""
-
-_UNIQUE = {IN_PROGRESS: ("index",), REEVALUATIONS: ("index",), ELITES: ("trial", "index")}
-"""Keys whose values are unique among the lines of a file, by file name."""
 
 
 def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
@@ -117,12 +111,23 @@ class _EliteLine(_Line):
     mean_distance: float | None
 
 
-_LINES: dict[str, type[_Line]] = {
-    **dict.fromkeys((EVALUATIONS, IN_PROGRESS, REEVALUATIONS), _EvaluationLine),
-    ITERATIONS: _IterationLine,
-    ELITES: _EliteLine,
+class _Lines(NamedTuple):
+    """What the lines of a file are."""
+
+    kind: type[_Line]
+    counter: str = ""
+    """Key of the number of a line; "" if lines are not numbered."""
+    unique: tuple[str, ...] = ()
+    """Keys whose values are unique among the lines."""
+
+
+_FILES = {
+    EVALUATIONS: _Lines(_EvaluationLine, counter="index"),
+    ITERATIONS: _Lines(_IterationLine, counter="iteration"),
+    IN_PROGRESS: _Lines(_EvaluationLine, unique=("index",)),
+    REEVALUATIONS: _Lines(_EvaluationLine, unique=("index",)),
+    ELITES: _Lines(_EliteLine, unique=("trial", "index")),
 }
-"""What a line is, by file name."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -185,15 +190,20 @@ class RecordFile:
         packed, entries = compressed(self.path), []
         earlier = _parse(_unpacked(packed), packed, is_packed=True)
         later = _parse(_read(self.path), self.path, is_packed=False)
-        counter, unique = _COUNTERS.get(self.path.name), _UNIQUE.get(self.path.name, ())
+        kind, counter, unique = _FILES[self.path.name]
         seen = set()
         for row, entry in enumerate(itertools.chain(earlier, later)):
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
                     self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
-            self._check_types(row, entry)
-            if counter is not None and entry.get(counter) != row:
-                problem = f"is damaged: {counter} is {entry.get(counter)}, expected {row}"
+            try:
+                kind.model_validate(entry)
+            except ValidationError as error:
+                first = error.errors(include_url=False)[0]
+                wrong = ".".join(str(part) for part in first["loc"])
+                self.refuse(row, f"is damaged: {wrong}: {first['msg']}; {REMEDY}")
+            if counter and entry[counter] != row:
+                problem = f"is damaged: {counter} is {entry[counter]}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
             values = tuple(entry[key] for key in unique)
             if unique and values in seen:
@@ -201,14 +211,6 @@ class RecordFile:
             seen.add(values)
             entries.append(entry)
         return entries
-
-    def _check_types(self, row: int, entry: Mapping[str, Any]) -> None:
-        try:
-            _LINES[self.path.name].model_validate(entry)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            key = ".".join(str(part) for part in first["loc"])
-            self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
 
     def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
         """Appends lines; creates the folder if it is missing. On return the operating system has

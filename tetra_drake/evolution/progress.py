@@ -8,7 +8,6 @@ import sys
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
 from tetra_drake.evolution.trials import TrialStatus
@@ -18,8 +17,7 @@ from tetra_drake.kernels.compiling import compiling_time
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
-_LINE_PERIOD = 10.0  # s, between plain lines
-_FIRST_ESTIMATE = 5  # tasks; the time left is estimated after these, and after a line's period
+_LINE_PERIOD = 10.0  # s, between plain lines, and before the time left is estimated
 
 
 class Progress(contextlib.AbstractContextManager["Progress"]):
@@ -59,8 +57,12 @@ class Display(Progress):
             console=Console(file=stream),
             refresh_per_second=4,
             disable=self._plain,
+            speed_estimate_period=math.inf,
+            # The clock stands still while kernels are compiled.
+            get_time=lambda: time.monotonic() - compiling_time(),
         )
-        self._stages: dict[str, _Stage] = {}
+        self._stages: dict[str, TaskID] = {}
+        """The bar of each stage."""
         self._printed = -math.inf
         """Time at which the last plain line was printed."""
         self._line = ""
@@ -92,13 +94,14 @@ class Display(Progress):
         """Moves the bar of the stage, or prints a line if one is due."""
         now, begins = time.monotonic(), title not in self._stages
         if begins:
-            bar = self._bars.add_task(title, total=total, text="")
-            self._stages[title] = _Stage(bar, done, done, now - compiling_time())
-        stage = self._stages[title]
-        parts = [text] if text else []
-        if left := stage.time_left(done, total, now - compiling_time()):
-            parts.append(f"{duration(left)} left")
-        self._bars.update(stage.bar, completed=done, total=total, text=", ".join(parts))
+            bar = self._bars.add_task(title, total=total, completed=done, text="")
+            self._stages[title] = bar
+        bar = self._stages[title]
+        self._bars.update(bar, completed=done, total=total)
+        parts, stage = [text] if text else [], self._bars.tasks[bar]
+        if stage.time_remaining and (stage.elapsed or 0.0) >= _LINE_PERIOD:
+            parts.append(f"{duration(stage.time_remaining)} left")
+        self._bars.update(bar, text=", ".join(parts))
         if not self._plain:
             return
         line = ", ".join([f"{title}: {done} of {total}", *parts])
@@ -106,27 +109,6 @@ class Display(Progress):
         if due and line != self._line:
             self._printed, self._line = now, line
             self.say(line)
-
-
-@dataclass
-class _Stage:
-    """One stage of a run: its bar, and what the time left is estimated from."""
-
-    bar: TaskID
-    first: int
-    """Number of tasks that were done when it began."""
-    done: int
-    began: float
-    """Time (s) on a clock that stands still while kernels are compiled."""
-    per_task: float = math.nan
-    """Time (s) per task, up to the last one."""
-
-    def time_left(self, done: int, total: int, now: float) -> float:
-        """Time (s) for the tasks that are not done; 0 if it cannot be estimated yet."""
-        made, passed = done - self.first, now - self.began
-        if done > self.done and made >= _FIRST_ESTIMATE and passed >= _LINE_PERIOD:
-            self.done, self.per_task = done, passed / made
-        return 0.0 if math.isnan(self.per_task) else (total - done) * self.per_task
 
 
 def overview(statuses: Sequence[TrialStatus]) -> str:

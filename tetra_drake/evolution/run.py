@@ -22,7 +22,7 @@ from tetra_drake.evolution.entries import (
 from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
-from tetra_drake.formatting import Table, heading_html, rounded
+from tetra_drake.formatting import TextTable, heading_html, rounded
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.metrics import METRICS
@@ -95,7 +95,7 @@ class Run:
             counts = [str(trial.number), str(trial.evaluations), rounded(trial.best_fitness)]
             rows.append([*counts, distance, trial.stop or "not finished"])
         headings = ["trial", "evaluations", "best fitness", "distance", "end"]
-        return heading_html(str(self)) + Table(headings, rows, (0, 4)).html()
+        return heading_html(str(self)) + TextTable(headings, rows, (0, 4)).html()
 
     @property
     def scenario(self) -> Scenario:

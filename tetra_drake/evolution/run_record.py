@@ -40,7 +40,7 @@ from tetra_drake.evolution.manifest import (
 from tetra_drake.files import check_file, check_folder, make_folder
 from tetra_drake.laws.height_files import RECORDED
 from tetra_drake.optimizers.base import Evaluation, Task
-from tetra_drake.robot.gait import Gait, Vector, save_gait
+from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
 
@@ -146,7 +146,7 @@ class TrialRecord:
         self._run = run
         names = (EVALUATIONS, ITERATIONS, IN_PROGRESS)
         self._files = {name: run.file(name, number) for name in names}
-        self._best_gait = trial_folder(run.directory, number) / BEST_GAIT
+        self.best_gait = trial_folder(run.directory, number) / BEST_GAIT
         self._lines: dict[str, _Lines] = dict.fromkeys(names, ())
         """Recorded lines of each file."""
         for name in names if run.begun else ():
@@ -191,10 +191,6 @@ class TrialRecord:
         self._write(ITERATIONS, [iteration], first=iteration["iteration"])
         if evaluations[-1]["index"] >= len(self._lines[EVALUATIONS]):
             self._files[IN_PROGRESS].path.unlink(missing_ok=True)
-
-    def save_best(self, gait: Gait, scenario: Scenario) -> None:
-        """Writes the best gait."""
-        save_gait(gait, self._best_gait, scenario)
 
     def finish(self, evaluations: int) -> None:
         """Checks that the record has no evaluations beyond the end of the trial."""

@@ -15,7 +15,7 @@ from tetra_drake.evolution.evaluators import Evaluations, Evaluator, evaluate_al
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.settings.units import INCHES, Units
 
 _SHOW_PERIOD = 1.0  # s
@@ -158,7 +158,7 @@ class Trial:
         if self._best is not None and self._best is not self._saved:
             task, _ = self._best
             gait = self._manifest.gait(task.vector, trial=task.trial, index=task.index)
-            self._record.save_best(gait, self._manifest.scenario)
+            save_gait(gait, self._record.best_gait, self._manifest.scenario)
             self._saved = self._best
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import pandas
@@ -98,19 +97,6 @@ def initial_fitness(run: Run, trial: int, *, figure: Page | None = None) -> Draw
     return page
 
 
-def quartiles_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFrame:
-    """Quartiles over trials: low, median, high, by number of evaluations.
-
-    `fitness` has a column per trial. A finished trial keeps its last value, because its population
-    no longer changes. The quartiles end at the last value of the shortest unfinished trial.
-    """
-    ended = run.iterations.dropna(subset="stop")["trial"]
-    going_on = [fitness[t].last_valid_index() for t in fitness if t not in ended.values]
-    table = fitness.ffill().loc[: min(going_on, default=fitness.index[-1])]
-    shares = {"low": 0.25, "median": 0.5, "high": 0.75}
-    return pandas.DataFrame({name: table.quantile(q, axis=1) for name, q in shares.items()})
-
-
 @figure_function
 def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     """Fitness over evaluations: the mean of each trial's population, or the best if the optimiser
@@ -125,7 +111,9 @@ def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     page = page_of(figure, height_in=3.6)
     panel = page.subplots()
     ends = table.ffill().iloc[-1].sort_values(ascending=False)
-    looks = _looks(list(ends.index))
+    looks = {trial: line_style(series) for series, trial in enumerate(ends.index)}
+    if len(ends) >= _SEVERAL:
+        looks = {ends.index[0]: _FITTEST, ends.index[-1]: _LEAST_FIT}
     for trial in table:
         series = table[trial].dropna()
         # A dot at the end makes even a line of one point visible.
@@ -133,22 +121,19 @@ def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
         panel.plot(series.index, series, label=f"trial {trial}", **looks.get(trial, _TRIAL), **dot)
     legend = {f"trial {trial}: {fixed(ends[trial], 1)}": look for trial, look in looks.items()}
     if len(ends) >= _SEVERAL:
-        quartiles = quartiles_over_trials(run, table)
-        panel.plot(quartiles.index, quartiles["median"], label="median", **_MEDIAN)
-        panel.fill_between(quartiles.index, quartiles["low"], quartiles["high"], **_BAND)
-        legend[f"median: {fixed(quartiles['median'].iloc[-1], 1)}"] = _MEDIAN
+        ended = run.iterations.dropna(subset="stop")["trial"]
+        going_on = [table[trial].last_valid_index() for trial in table if trial not in ended.values]
+        # The population of a finished trial no longer changes, so it keeps its last value.
+        filled = table.ffill().loc[: min(going_on, default=table.index[-1])]
+        low, median, high = (filled.quantile(share, axis=1) for share in (0.25, 0.5, 0.75))
+        panel.plot(filled.index, median, label="median", **_MEDIAN)
+        panel.fill_between(filled.index, low, high, **_BAND)
+        legend[f"median: {fixed(median.iloc[-1], 1)}"] = _MEDIAN
     panel.set(xlabel="evaluations", ylabel=f"{kind} fitness", xmargin=0.02)
     panel.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
     legend_below(page, legend)
     set_title(page, f"{kind.capitalize()} fitness of each trial")
     return page
-
-
-def _looks(trials: Sequence[int]) -> dict[int, Any]:
-    """Line styles of the trials in the legend. `trials` begins with the fittest."""
-    if len(trials) < _SEVERAL:
-        return {trial: line_style(series) for series, trial in enumerate(trials)}
-    return {trials[0]: _FITTEST, trials[-1]: _LEAST_FIT}
 
 
 def _whole_iterations(run: Run) -> pandas.DataFrame:

@@ -66,8 +66,15 @@ def gait_diagram(
     the second half of the simulation, the last quarter is shown."""
     structure, unit = result.robot.structure, result.scenario.units
     cycle = measures.last_step(result.trajectory)
-    trajectory = shown_part(result.trajectory, time or _last_cycles(result.trajectory, cycle))
-    stands = _stance(trajectory, structure)
+    first, end = (float(result.trajectory.time[i]) for i in (0, -1))
+    length = _LAST_SHARE * (end - first)
+    if cycle is not None:
+        length, end = _CYCLES * (cycle[1] - cycle[0]), cycle[1]
+    trajectory = shown_part(result.trajectory, time or (max(first, end - length), end))
+    # Feet are the bottom nodes of tetrahedra, and all other nodes that touch the ground.
+    stands = ~measures.off_ground(trajectory)
+    are_feet = np.isin(structure.contacts, structure.markers)
+    stands = stands[:, stands.any("time").values | are_feet]
     feet, width = _rows_of_feet(stands), _NAMES * page_width(figure)
     names_of_feet = {folded(name, width): row for name, row in _named_rows(stands, feet).items()}
     height = max(feet.values(), default=0.0) * _rows_of_names(names_of_feet)
@@ -85,23 +92,6 @@ def gait_diagram(
     of_cycle = "" if cycle is None else f", cycle of {fixed(cycle[1] - cycle[0])} s"
     set_title(page, f"Gait diagram{of_cycle}")
     return page
-
-
-def _last_cycles(trajectory: xarray.Dataset, cycle: Span | None) -> Span:
-    """Start and end (s) of the last cycles. Without a cycle, of the last quarter."""
-    if cycle is None:
-        start, end = (float(trajectory.time[i]) for i in (0, -1))
-        return end - _LAST_SHARE * (end - start), end
-    start, end = cycle
-    return max(float(trajectory.time[0]), end - _CYCLES * (end - start)), end
-
-
-def _stance(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
-    """True if a foot bears load (time, contact). Feet are the bottom nodes of tetrahedra, and all
-    other nodes that touch the ground."""
-    stands = ~measures.off_ground(trajectory)
-    are_feet = np.isin(structure.contacts, structure.markers)
-    return stands[:, stands.any("time").values | are_feet]
 
 
 def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:

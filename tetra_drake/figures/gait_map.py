@@ -23,7 +23,6 @@ from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, 
 from tetra_drake.formatting import listed
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.settings.units import Units
 
 _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}
 _NUMBER: Any = {"ha": "center", "va": "center", "size": "small", "weight": "bold", "zorder": 4}
@@ -41,14 +40,13 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
     gaits = elites(run)
     kept = kept_gaits(gaits)
     judged = bool(gaits["kept"].notna().any())
-    count = 2 if judged else 1
     edges = [
         np.linspace(low, high, cells + 1) / units.of(UNITS[name])[0]
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
     named = distinct_gaits(notable_gaits(run))
     page = page_of(figure, height_in=3.9 + 0.17 * len(named))
-    row = page.subplots(1, count, squeeze=False, sharey=True)[0]
+    row = page.subplots(1, 1 + judged, squeeze=False, sharey=True)[0]
     title = f"fitness ({len(kept)} of {math.prod(kind.cells)} cells)"
     _draw_cells(row[0], kept, kept["fitness"], edges, title=title, cmap="viridis")
     if judged:
@@ -56,7 +54,8 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
         shares = 100.0 * gaits["kept"]
         look: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
         _draw_cells(row[1], gaits, shares, edges, title="draws kept (%)", **look)
-    x_label, y_label = (_label(name, units) for name in kind.measures)
+    named_units = {name.replace("_", " "): units.of(UNITS[name])[1] for name in kind.measures}
+    x_label, y_label = (f"{name} ({unit})" if unit else name for name, unit in named_units.items())
     row[0].set(ylabel=y_label)
     for panel in row:
         panel.set(xlabel=x_label)
@@ -92,9 +91,3 @@ def _middles(gaits: Any, edges: Sequence[np.ndarray]) -> list[Any]:
     """Centres of the cells of one gait, or of a table of gaits, along each axis."""
     along = zip(edges, CELLS, strict=True)
     return [(edge[:-1] + edge[1:])[gaits[cell]] / 2.0 for edge, cell in along]
-
-
-def _label(name: str, units: Units) -> str:
-    unit = units.of(UNITS[name])[1]
-    title = name.replace("_", " ")
-    return f"{title} ({unit})" if unit else title

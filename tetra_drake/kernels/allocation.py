@@ -19,10 +19,10 @@ from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-Record = TypeVar("Record", bound=tuple)
+NamedTupleT = TypeVar("NamedTupleT", bound=tuple)
 
 
-def allocate(kind: type[Record], sizes: Mapping[str, int]) -> Record:
+def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
     """A NamedTuple of new tables.
 
     Args:
@@ -39,7 +39,7 @@ def allocate(kind: type[Record], sizes: Mapping[str, int]) -> Record:
     return kind(*fields)
 
 
-def write_tables(to: Record, source: Record) -> None:
+def write_tables(to: NamedTupleT, source: NamedTupleT) -> None:
     """Writes the numbers of a NamedTuple of tables to another one of the same sizes."""
     for ours, theirs in zip(to, source, strict=True):
         if isinstance(ours, tuple):

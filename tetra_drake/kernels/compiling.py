@@ -26,7 +26,7 @@ from numba.extending import overload
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 
-F = TypeVar("F", bound=Callable[..., object])
+F = TypeVar("F", bound=Callable[..., Any])
 
 LOGGER = "tetra_drake"
 """Name of the logger that gets a warning when compilation takes long."""

@@ -42,7 +42,7 @@ import functools
 import math
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 from llvmlite import ir
@@ -62,12 +62,12 @@ from numba.extending import (
     unbox,
 )
 
+from tetra_drake.kernels.allocation import NamedTupleT
 from tetra_drake.kernels.compiling import inlined
 
 Real: TypeAlias = float
 Truth: TypeAlias = bool
 Table: TypeAlias = Any
-Record = TypeVar("Record", bound=tuple)
 
 _intrinsic: Callable[..., Any] = intrinsic
 
@@ -325,7 +325,7 @@ def _overload_gather(numbers, index, offset):  # type: ignore[no-untyped-def]
     return lambda numbers, index, offset: numbers[int(index) + offset]
 
 
-def named(kind: type[Record], table: Table) -> Record:
+def named(kind: type[NamedTupleT], table: Table) -> NamedTupleT:
     """Converts a table of numbers to a NamedTuple, in the order of its fields."""
     return kind(*table)
 

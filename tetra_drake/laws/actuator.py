@@ -26,8 +26,7 @@ from tetra_drake.laws.cable import (
     most_tension,
     slack_tension,
 )
-from tetra_drake.settings import quantities
-from tetra_drake.settings.quantities import Length, Speed, Time
+from tetra_drake.settings.quantities import ForceQuantity, Length, Speed, Time
 from tetra_drake.settings.section import Kinds, Section
 
 LIMITS = "limited actuators"
@@ -238,7 +237,7 @@ class Force(ActuatorKind):
 class LimitedActuator(ActuatorKind):
     """An actuator of limited force and speed on each driven cable. The cable never pushes."""
 
-    max_force: quantities.Force = Field(gt=0)
+    max_force: ForceQuantity = Field(gt=0)
     """Tension at which the actuator stalls. A greater tension pulls a winch backward."""
     max_speed: Speed = Field(gt=0)
     """Speed without tension."""

@@ -51,7 +51,7 @@ from tetra_drake.laws.struts import (
     vector_between,
 )
 from tetra_drake.laws.vectors import (
-    Vector,
+    Vector3,
     add_vector,
     difference,
     dot,
@@ -71,7 +71,7 @@ LEAST_SQUARE = 1e-30
 """Lower limit (m²) of squared distances, for axes that meet. The force is zero there."""
 
 
-class Search(NamedTuple):
+class StrutSearch(NamedTuple):
     """Distances (m) of the search for near struts, and what else limits steps near contacts."""
 
     near: Real
@@ -92,7 +92,7 @@ class StrutContactLaw(NamedTuple):
     normal: Table
     """Table of the numbers of NormalForce."""
     search: Table
-    """Table of the numbers of Search."""
+    """Table of the numbers of StrutSearch."""
 
 
 class NearStruts(NamedTuple):
@@ -135,7 +135,7 @@ def find_near_struts(
     `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
     laws.kinematics for a `state` (13 bodies,).
     """
-    limit, count = named(Search, contact.search).near, 0
+    limit, count = named(StrutSearch, contact.search).near, 0
     for first in range(radius.size):
         for second in range(first + 1, radius.size):
             offset = difference(origin(state, second), origin(state, first))
@@ -161,7 +161,7 @@ class Touch(NamedTuple):
     """Place on the second axis."""
     depth: Real
     """Depth (m) of the overlap; negative if the struts are apart."""
-    gradient: tuple[Vector, Vector, Vector, Vector]
+    gradient: tuple[Vector3, Vector3, Vector3, Vector3]
     """Derivatives of the distance by the positions of the ends: start and end of the first axis,
     then of the second."""
 
@@ -201,7 +201,7 @@ def time_to_pass(
     """
     if not law.acts:
         return horizon
-    search, normal = named(Search, law.search), named(NormalForce, law.normal)
+    search, normal = named(StrutSearch, law.search), named(NormalForce, law.normal)
     # A bar that is hit at its end gives way like a quarter of its mass, two bars like an eighth.
     brief = math.sqrt(0.125 * search.lightest / normal.stiffness)
     square, beyond = 0.0, 2.0 * search.drift
@@ -297,7 +297,7 @@ class NoStrutContact(Section):
 
     tag: ClassVar[str] = "Nothing"
 
-    def law(self, search: Search) -> StrutContactLaw:
+    def law(self, search: StrutSearch) -> StrutContactLaw:
         """The law in the form of the kernels. `search` has the distances of the search."""
         return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
 
@@ -312,7 +312,7 @@ class HuntCrossley(Section):
     """Hunt-Crossley dissipation c, as Drake's. It lowers the restitution of an impact at a low
     speed v: e = 1 - 2/3 c v."""
 
-    def law(self, search: Search) -> StrutContactLaw:
+    def law(self, search: StrutSearch) -> StrutContactLaw:
         """The law in the form of the kernels. `search` has the distances of the search."""
         normal = NormalForce(self.stiffness, damping=self.stiffness * self.dissipation)
         return StrutContactLaw(acts=True, normal=np.array(normal), search=np.array(search))

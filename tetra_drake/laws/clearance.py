@@ -15,7 +15,7 @@ from tetra_drake.laws.struts import (
     origin,
     strut_distance,
 )
-from tetra_drake.laws.vectors import Vector, difference, dot, vector_at
+from tetra_drake.laws.vectors import Vector3, difference, dot, vector_at
 
 
 @inlined
@@ -42,7 +42,7 @@ def nearest_struts(
     nodes: Table,
     first: int,
     second: int,
-    offset: Vector,
+    offset: Vector3,
     least: Real,
 ) -> Real:
     """Least distance (m) between struts of two bodies, or `least` if it is smaller.

@@ -253,7 +253,7 @@ def move_stick_point(
     frames: Table,
     i: int,
     along: tuple[Truth, Truth],
-    bend: friction.Pair,
+    bend: friction.Vector2,
     slide: friction.Slide,
     modes: Table,
 ) -> None:

@@ -226,7 +226,7 @@ def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
     law, near, nodes = robot.strut_contact, forces.near_struts, forces.nodes
     if not law.acts:
         return
-    search = named(capsules.Search, law.search)
+    search = named(capsules.StrutSearch, law.search)
     if capsules.have_moved(nodes, near, search.drift):
         capsules.find_near_struts(robot.struts, law, robot.bodies.radius, state, nodes, near)
     normal = named(contact.NormalForce, law.normal)

@@ -38,15 +38,14 @@ functions, and its line in by_law().
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, cast
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
-from tetra_drake.kernels.compiling import inlined
+from tetra_drake.kernels.compiling import F, inlined
 from tetra_drake.kernels.lanes import (
     Real,
     Table,
@@ -62,7 +61,7 @@ from tetra_drake.settings.kind_text import settings_text
 from tetra_drake.settings.quantities import (
     Damping,
     DampingPerLength,
-    Force,
+    ForceQuantity,
     Length,
     Stiffness,
 )
@@ -73,9 +72,8 @@ from tetra_drake.settings.units import INCH, POUND_FORCE
 STICK = 0.0
 """Friction mode of a node that sticks."""
 
-F = TypeVar("F", bound=Callable[..., Any])
 
-Pair = tuple[Real, Real]
+Vector2 = tuple[Real, Real]
 """Components along the tangents t1 and t2."""
 
 
@@ -138,7 +136,7 @@ class Slide(NamedTuple):
 
     t1: TangentSlide
     t2: TangentSlide
-    heading: Pair
+    heading: Vector2
     """Direction of the node's body at touchdown, a unit vector."""
     normal: Real
     """Normal force in N."""
@@ -147,10 +145,10 @@ class Slide(NamedTuple):
 class NextMode(NamedTuple):
     """Friction mode of a node at the end of a step, if it stays on the ground."""
 
-    mode: Pair
+    mode: Vector2
     begins: tuple[Truth, Truth]
     """For each tangent, True if the node begins to stick along it."""
-    bend: Pair
+    bend: Vector2
     """Deflection (m) along each tangent with which it begins to stick."""
 
 
@@ -198,7 +196,7 @@ class ResetIntegrator(FrictionKind):
     breaks_free: Literal["each", "both"] = "each"
     """Tangents along which a node breaks free: `each` by itself, or `both` as soon as the
     deflection along one reaches the stiction range."""
-    load: Force | None = Field(default=None, gt=0)
+    load: ForceQuantity | None = Field(default=None, gt=0)
     """Normal force at which friction is as given; friction is proportional to the normal force. If
     not given, friction is independent of it."""
 
@@ -249,7 +247,7 @@ class ResetConstants(NamedTuple):
 
 
 @inlined
-def reset_force(slide: Slide, law: ResetConstants) -> Pair:
+def reset_force(slide: Slide, law: ResetConstants) -> Vector2:
     """Friction (N) of the reset integrator (Eq. 3-5)."""
     force_1, force_2 = tangent_force(slide.t1, law), tangent_force(slide.t2, law)
     if not any_lane(law.per_load > 0.0):
@@ -343,7 +341,7 @@ def tangent_margin(slide: TangentSlide, law: ResetConstants) -> float:
 
 @inlined
 def time_to_reset_change(
-    slide: Slide, acceleration: Pair, normal_rate: Real, horizon: Real, law: ResetConstants
+    slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: ResetConstants
 ) -> Real:
     """Time (s) to the next mode change of the reset integrator along either tangent."""
     return minimum(
@@ -462,7 +460,7 @@ class BristleForce(NamedTuple):
 
 
 @inlined
-def coulomb_sticks(mode: Pair) -> Truth:
+def coulomb_sticks(mode: Vector2) -> Truth:
     """True if a mode of Coulomb friction means stick."""
     return (mode[0] == STICK) & (mode[1] == STICK)
 
@@ -480,7 +478,7 @@ def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
 
 
 @inlined
-def coulomb_size(u_1: Real, u_2: Real, heading: Pair, law: CoulombConstants) -> Real:
+def coulomb_size(u_1: Real, u_2: Real, heading: Vector2, law: CoulombConstants) -> Real:
     """Size of a vector for direction-dependent friction.
 
     Vectors of the same size lie on an ellipse. Its half-axes are the directional factors: `forward`
@@ -494,7 +492,7 @@ def coulomb_size(u_1: Real, u_2: Real, heading: Pair, law: CoulombConstants) -> 
 
 
 @inlined
-def coulomb_force(slide: Slide, law: CoulombConstants) -> Pair:
+def coulomb_force(slide: Slide, law: CoulombConstants) -> Vector2:
     """Coulomb friction (N): -u, limited by the normal force."""
     bristle = bristle_force(slide, law)
     share = select(bristle.size > bristle.limit, bristle.limit / bristle.size, 1.0)
@@ -547,7 +545,7 @@ def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
 
 @inlined
 def time_to_coulomb_change(
-    slide: Slide, acceleration: Pair, normal_rate: Real, horizon: Real, law: CoulombConstants
+    slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: CoulombConstants
 ) -> Real:
     """Time (s) until the bristle's force crosses the limit, at its present rate."""
     bristle = bristle_force(slide, law)

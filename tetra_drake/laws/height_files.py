@@ -19,7 +19,7 @@ from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.settings.refusals import described, refuse
 
 MOST_HEIGHTS = 4_000_000
-LARGEST = 1e6
+HIGHEST = 1e6
 """Largest height (m). Larger numbers would leave too few digits for the robot's motion."""
 
 RECORDED = re.compile(r"heights-[0-9a-f]{16}\.npy")
@@ -47,9 +47,9 @@ class HeightFile(str):
             shape = " x ".join(map(str, heights.shape)) or "a single number"
             expected = f"at least 3 x 3 heights, at most {MOST_HEIGHTS}"
             refuse("", f"'{path}' holds {shape}, expected {expected}")
-        for row, column in np.argwhere(~(np.abs(heights) <= LARGEST))[:1]:
+        for row, column in np.argwhere(~(np.abs(heights) <= HIGHEST))[:1]:
             found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
-            refuse("", f"'{path}' has {found}, expected heights of at most {LARGEST:g} m")
+            refuse("", f"'{path}' has {found}, expected heights of at most {HIGHEST:g} m")
         digest = hashlib.sha256(f"{heights.shape}".encode() + heights.astype("<f8").tobytes())
         file = cls(f"heights-{digest.hexdigest()[:16]}.npy")
         if RECORDED.fullmatch(os.path.basename(path)) and os.path.basename(path) != file:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.laws.kinematics import rotation
-from tetra_drake.laws.vectors import Vector, cross, dot
+from tetra_drake.laws.vectors import Vector3, cross, dot
 
 XX, YY, ZZ, XY, XZ, YZ, INERTIA_COLUMNS = range(7)
 """Columns of an inertia, and their number."""
@@ -33,7 +33,7 @@ def turn_inertia(state: Table, inertia_B: Table, inertia_W: Table) -> None:
 
 
 @inlined
-def times_inertia(inertia: Table, body: int, a: Vector) -> Vector:
+def times_inertia(inertia: Table, body: int, a: Vector3) -> Vector3:
     """Inertia of a body times a vector."""
     xx, yy, zz = inertia[body, XX], inertia[body, YY], inertia[body, ZZ]
     xy, xz, yz = inertia[body, XY], inertia[body, XZ], inertia[body, YZ]
@@ -41,7 +41,7 @@ def times_inertia(inertia: Table, body: int, a: Vector) -> Vector:
 
 
 @inlined
-def over_inertia(inertia: Table, body: int, a: Vector) -> Vector:
+def over_inertia(inertia: Table, body: int, a: Vector3) -> Vector3:
     """Inverse of a body's inertia times a vector. For a torque, it is the angular acceleration."""
     xx, yy, zz = inertia[body, XX], inertia[body, YY], inertia[body, ZZ]
     xy, xz, yz = inertia[body, XY], inertia[body, XZ], inertia[body, YZ]
@@ -57,6 +57,6 @@ def over_inertia(inertia: Table, body: int, a: Vector) -> Vector:
 
 
 @inlined
-def gyroscopic_torque(inertia: Table, body: int, w_WB: Vector) -> Vector:
+def gyroscopic_torque(inertia: Table, body: int, w_WB: Vector3) -> Vector3:
     """Gyroscopic torque -w x (I w) of a body with angular velocity w."""
     return cross(times_inertia(inertia, body, w_WB), w_WB)

@@ -7,7 +7,7 @@ import numpy as np
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, inverse_sqrt, select
 from tetra_drake.laws.vectors import (
-    Vector,
+    Vector3,
     cross,
     difference,
     dot,
@@ -16,8 +16,6 @@ from tetra_drake.laws.vectors import (
     sum_of,
     vector_at,
 )
-
-Array = np.ndarray
 
 P_BN_W, P_WN, V_WN, FORCE, NODE_COLUMNS = 0, 3, 6, 9, 12
 """Columns of the table `nodes` (nodes, 12), and their number: vector from the body's origin to the
@@ -101,7 +99,7 @@ def pitch_rate(nodes: Table, moving: int) -> Real:
 
 
 @inlined
-def rotation(state: Table, body: int) -> tuple[Vector, Vector, Vector]:
+def rotation(state: Table, body: int) -> tuple[Vector3, Vector3, Vector3]:
     """Rotation matrix R_WB of a body, as its rows."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
@@ -155,7 +153,7 @@ def put_orientation(state: Table, body: int, row: int, column: int, table: Table
 
 
 @inlined
-def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> Vector:
+def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> Vector3:
     """Rotation vector (rad) in the world frame that turns a body from an orientation of
     put_orientation() to its present one, to third order in the angle."""
     w, x, y, z = state[7 * body], state[7 * body + 1], state[7 * body + 2], state[7 * body + 3]
@@ -166,14 +164,14 @@ def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> V
 
 
 @inlined
-def angular_velocity(state: Table, body: int) -> Vector:
+def angular_velocity(state: Table, body: int) -> Vector3:
     """Angular velocity w_WB (rad/s) of a body in the world frame."""
     v = 7 * (state.size // 13) + 6 * body
     return state[v], state[v + 1], state[v + 2]
 
 
 @inlined
-def forward_axis(state: Table, body: int) -> Vector:
+def forward_axis(state: Table, body: int) -> Vector3:
     """The x axis of a body in the world frame."""
     x, y, z = rotation(state, body)
     return x[0], y[0], z[0]
@@ -182,7 +180,7 @@ def forward_axis(state: Table, body: int) -> Vector:
 @inlined
 def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int, body: int
-) -> Vector:
+) -> Vector3:
     """Acceleration (m/s²) of a node in the world frame. `acceleration` is dv/dt of the bodies, 6
     numbers per body."""
     v, a = 7 * (state.size // 13) + 6 * body, 6 * body
@@ -223,7 +221,7 @@ def add_force_at(nodes: Table, row: int, body: int, generalized_force: Table) ->
 
 
 @compiled
-def interpolate_state(before: Array, after: Array, step: float, part: float) -> Array:
+def interpolate_state(before: Table, after: Table, step: float, part: float) -> Table:
     """State (13 bodies,) within a step of length `step` (s), at the share `part` (0 to 1) of it.
 
     Positions are cubic polynomials that fit positions and velocities at both ends. Velocities are

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, any_lane, minimum, named, select
 from tetra_drake.kernels.packed import unpacked
@@ -14,9 +12,7 @@ from tetra_drake.laws.forces import Forces, Parts, move_contacts
 from tetra_drake.laws.kinematics import P_BN_W, node_acceleration
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.terrain import to_frame
-from tetra_drake.laws.vectors import Vector, cross, difference, sum_of, vector_at
-
-Array = np.ndarray
+from tetra_drake.laws.vectors import Vector3, cross, difference, sum_of, vector_at
 
 
 @compiled
@@ -28,7 +24,7 @@ def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
 
 
 @compiled
-def mode_margin(parts: Parts, state: Array, modes: Array) -> float:
+def mode_margin(parts: Parts, state: Table, modes: Table) -> float:
     """Mode margin of the robot: positive until the first mode changes, zero at the change.
 
     It is the least of the gaps of nodes in the air, the depths of nodes in the ground (m), and the
@@ -81,7 +77,7 @@ def time_to_mode_change(
 @inlined
 def foot_acceleration(
     ground: contact.Ground, i: int, state: Table, acceleration: Table, nodes: Table
-) -> Vector:
+) -> Vector3:
     """Rate (m/s²) of the velocity at the lowest point of foot i. The point moves with the contact,
     not with the material, so that it has the centripetal acceleration of the node."""
     centre, body = ground.centres[i], ground.carriers[i]
@@ -96,11 +92,7 @@ def foot_acceleration(
 
 @compiled
 def next_mode_change(
-    parts: Parts,
-    state: Array,
-    acceleration: Array,
-    modes: Array,
-    horizon: float,
+    parts: Parts, state: Table, acceleration: Table, modes: Table, horizon: float
 ) -> tuple[bool, float]:
     """Updates `modes` for a state. Returns whether a mode changed, and the predicted time (s) to
     the next change (see time_to_mode_change()).

@@ -14,6 +14,9 @@ from tetra_drake.laws.contact import Ground
 from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.laws.struts import Struts
 
+WORLD = -1
+"""Index of the world among the bodies: of fixed nodes, which belong to no body."""
+
 
 class Bodies(NamedTuple):
     """Constants of the bodies; SI units."""

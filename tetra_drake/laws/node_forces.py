@@ -7,7 +7,7 @@ from typing import NamedTuple
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.laws.kinematics import FORCE, P_WN, V_WN
-from tetra_drake.laws.vectors import Vector, add_vector, difference, vector_at
+from tetra_drake.laws.vectors import Vector3, add_vector, difference, vector_at
 
 
 class AnchorSprings(NamedTuple):
@@ -35,7 +35,7 @@ class NodeLoads(NamedTuple):
 
 
 @inlined
-def anchor_force(anchors: AnchorSprings, nodes: Table, i: int) -> Vector:
+def anchor_force(anchors: AnchorSprings, nodes: Table, i: int) -> Vector3:
     """Force (N) of anchor i on its node, in the world frame. `nodes` is the table of
     `kinematics`."""
     node = anchors.nodes[i]

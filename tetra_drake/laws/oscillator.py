@@ -21,11 +21,9 @@ from pydantic import Field, model_validator
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, select
 from tetra_drake.laws.feedback import Pathway
-from tetra_drake.settings.quantities import Force, Time
+from tetra_drake.settings.quantities import ForceQuantity, Time
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
-
-Array = np.ndarray
 
 U, V, U_RATE, V_RATE, Y, U_START, V_START, U_SUM, V_SUM, NEURON_COLUMNS = range(10)
 """Columns of the table `neurons` (2n, 9), and their number: inner state u, self-inhibition v, their
@@ -43,7 +41,7 @@ class CpgSection(Section):
     """Initial values: u of every neuron, v of the extensors, v of the flexors."""
     partner_weight: float = Field(ge=0)
     """Weight of the inhibition between extensor and flexor of an oscillator."""
-    gain: Force
+    gain: ForceQuantity
     """Force per unit of y_extensor - y_flexor."""
     start_up: Time = Field(ge=0)
     """Time until which the cables are not actuated."""
@@ -114,7 +112,7 @@ class Network(NamedTuple):
         )
 
 
-def make_neurons(state: Array) -> Array:
+def make_neurons(state: np.ndarray) -> np.ndarray:
     """Table `neurons` for a state (4n,): u of all neurons, then v."""
     neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
     neurons[:, U], neurons[:, V] = state.reshape(2, -1)
@@ -187,7 +185,7 @@ def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table
 
 @compiled
 def network_output(
-    network: Network, inputs: Array, step: float, listing: bool, neurons: Array, output: Array
+    network: Network, inputs: Table, step: float, listing: bool, neurons: Table, output: Table
 ) -> None:
     """Writes the outputs (samples, n) of a network without lanes, one sample per step (s).
 

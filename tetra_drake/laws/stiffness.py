@@ -12,12 +12,9 @@ import numpy as np
 
 from tetra_drake.laws import cable, capsules, contact, kinematics
 from tetra_drake.laws.forces import Forces
-from tetra_drake.laws.model import Model
+from tetra_drake.laws.model import WORLD, Model
 from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.laws.struts import Axes, axes_of, vector_between
-
-WORLD = -1
-"""Index of the world among the bodies."""
 
 
 class Springs(NamedTuple):

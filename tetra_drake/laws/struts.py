@@ -8,7 +8,7 @@ from typing import NamedTuple
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, any_lane, maximum, minimum
 from tetra_drake.laws.kinematics import P_WN
-from tetra_drake.laws.vectors import Vector, difference, dot, scaled, sum_of, vector_at
+from tetra_drake.laws.vectors import Vector3, difference, dot, scaled, sum_of, vector_at
 
 MARGIN = 1.0 + 1e-9
 """Factor on bounds, so that rounding errors cannot exclude a pair whose distance equals a bound."""
@@ -35,9 +35,9 @@ class Axes(NamedTuple):
     """Axes of two struts: vectors u and v along them, and r from the start of the second to the
     start of the first, with their scalar products."""
 
-    u: Vector
-    v: Vector
-    r: Vector
+    u: Vector3
+    v: Vector3
+    r: Vector3
     uu: Real
     vv: Real
     uv: Real
@@ -79,7 +79,7 @@ def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
 
 
 @inlined
-def vector_between(axes: Axes, s: Real, t: Real) -> Vector:
+def vector_between(axes: Axes, s: Real, t: Real) -> Vector3:
     """Vector (m) from the place t on the second axis to the place s on the first."""
     return difference(sum_of(axes.r, scaled(s, axes.u)), scaled(t, axes.v))
 
@@ -100,20 +100,20 @@ def share(x: Real) -> Real:
 
 
 @inlined
-def origin(state: Table, body: int) -> Vector:
+def origin(state: Table, body: int) -> Vector3:
     """Position of a body's origin (m)."""
     return state[7 * body + 4], state[7 * body + 5], state[7 * body + 6]
 
 
 @inlined
-def midpoint(struts: Struts, nodes: Table, i: int) -> Vector:
+def midpoint(struts: Struts, nodes: Table, i: int) -> Vector3:
     """Midpoint of a strut (m)."""
     p_WA, p_WB = vector_at(nodes, struts.node_a[i], P_WN), vector_at(nodes, struts.node_b[i], P_WN)
     return scaled(0.5, sum_of(p_WA, p_WB))
 
 
 @inlined
-def may_be_nearer(offset: Vector, reach: Real, least: Real) -> bool:
+def may_be_nearer(offset: Vector3, reach: Real, least: Real) -> bool:
     """False if two parts are certainly farther from each other than `least`, in all lanes.
 
     `offset` is the vector between the centres of the parts, `reach` (m) the sum of their radii.

@@ -37,7 +37,7 @@ from tetra_drake.kernels.lanes import (
 )
 from tetra_drake.laws.height_files import HeightFile
 from tetra_drake.laws.kinematics import P_WN
-from tetra_drake.laws.vectors import Vector, put_vector
+from tetra_drake.laws.vectors import Vector3, put_vector
 from tetra_drake.settings.kind_text import settings_text
 from tetra_drake.settings.quantities import Angle, Length
 from tetra_drake.settings.section import Kinds, Section
@@ -143,7 +143,7 @@ def find_frames(
 
 
 @inlined
-def to_frame(vector: Vector, frames: Table, i: int, flat: bool) -> Vector:
+def to_frame(vector: Vector3, frames: Table, i: int, flat: bool) -> Vector3:
     """Components of a vector of the world frame along t1, t2 and n of a frame."""
     if flat:
         return vector
@@ -156,7 +156,7 @@ def to_frame(vector: Vector, frames: Table, i: int, flat: bool) -> Vector:
 
 
 @inlined
-def to_world(t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool) -> Vector:
+def to_world(t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool) -> Vector3:
     """Converts components along t1, t2 and n of a frame to a vector in the world frame."""
     if flat:
         return t_1, t_2, n

@@ -5,17 +5,17 @@ from __future__ import annotations
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table
 
-Vector = tuple[Real, Real, Real]
+Vector3 = tuple[Real, Real, Real]
 
 
 @inlined
-def vector_at(table: Table, row: int, column: int) -> Vector:
+def vector_at(table: Table, row: int, column: int) -> Vector3:
     """Vector in a row of a table, in three columns beginning with `column`."""
     return table[row, column], table[row, column + 1], table[row, column + 2]
 
 
 @inlined
-def put_vector(vector: Vector, row: int, column: int, table: Table) -> None:
+def put_vector(vector: Vector3, row: int, column: int, table: Table) -> None:
     """Writes a vector to a row of a table, in three columns beginning with `column`."""
     table[row, column] = vector[0]
     table[row, column + 1] = vector[1]
@@ -23,7 +23,7 @@ def put_vector(vector: Vector, row: int, column: int, table: Table) -> None:
 
 
 @inlined
-def add_vector(vector: Vector, row: int, column: int, table: Table) -> None:
+def add_vector(vector: Vector3, row: int, column: int, table: Table) -> None:
     """Adds a vector to three columns of a table, beginning with `column`."""
     table[row, column] += vector[0]
     table[row, column + 1] += vector[1]
@@ -31,7 +31,7 @@ def add_vector(vector: Vector, row: int, column: int, table: Table) -> None:
 
 
 @inlined
-def subtract_vector(vector: Vector, row: int, column: int, table: Table) -> None:
+def subtract_vector(vector: Vector3, row: int, column: int, table: Table) -> None:
     """Subtracts a vector from three columns of a table, beginning with `column`."""
     table[row, column] -= vector[0]
     table[row, column + 1] -= vector[1]
@@ -39,30 +39,30 @@ def subtract_vector(vector: Vector, row: int, column: int, table: Table) -> None
 
 
 @inlined
-def sum_of(a: Vector, b: Vector) -> Vector:
+def sum_of(a: Vector3, b: Vector3) -> Vector3:
     """Sum a + b of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @inlined
-def difference(a: Vector, b: Vector) -> Vector:
+def difference(a: Vector3, b: Vector3) -> Vector3:
     """Difference a - b of two vectors."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @inlined
-def scaled(factor: Real, a: Vector) -> Vector:
+def scaled(factor: Real, a: Vector3) -> Vector3:
     """Product of a number and a vector."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 @inlined
-def dot(a: Vector, b: Vector) -> Real:
+def dot(a: Vector3, b: Vector3) -> Real:
     """Scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
-def cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Vector3, b: Vector3) -> Vector3:
     """Vector product of two vectors."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

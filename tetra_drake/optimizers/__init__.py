@@ -7,17 +7,17 @@ from typing import Any
 
 from tetra_drake.machine import check_package
 from tetra_drake.optimizers.base import MakeOptimizer
-from tetra_drake.optimizers.cma_es import CmaEs
-from tetra_drake.optimizers.quality_diversity import QualityDiversity
-from tetra_drake.optimizers.random_search import RandomSearch
-from tetra_drake.optimizers.steady_state import SteadyState
+from tetra_drake.optimizers.cma_es import CmaEsOptimizer
+from tetra_drake.optimizers.quality_diversity import QualityDiversityOptimizer
+from tetra_drake.optimizers.random_search import RandomSearchOptimizer
+from tetra_drake.optimizers.steady_state import SteadyStateOptimizer
 from tetra_drake.scenario import optimizer_kinds as kinds
 
 OPTIMIZERS: dict[type, Any] = {
-    kinds.SteadyState: SteadyState,
-    kinds.CmaEs: CmaEs,
-    kinds.RandomSearch: RandomSearch,
-    kinds.QualityDiversity: QualityDiversity,
+    kinds.SteadyState: SteadyStateOptimizer,
+    kinds.CmaEs: CmaEsOptimizer,
+    kinds.RandomSearch: RandomSearchOptimizer,
+    kinds.QualityDiversity: QualityDiversityOptimizer,
 }
 """Class of optimiser by kind. Its constructor takes the arguments of MakeOptimizer and
 `settings`."""

@@ -8,13 +8,12 @@ found.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import MIDDLE, Generational, Matrix, Ranges
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
@@ -41,7 +40,11 @@ GROWTH = 2.0
 """Factor on the population at each restart (IPOP)."""
 
 
-class CmaEs(Generational[kinds.CmaEs]):
+_one_thread: Any = threadpool_limits.wrap(limits=1, user_api="blas")
+"""Decorator. With many parameters, digits depend on the number of threads of linear algebra."""
+
+
+class CmaEsOptimizer(Generational[kinds.CmaEs]):
     """Several searches by CMA-ES. Each runs for TRYOUT evaluations; then the best continues. If it
     stalls, too, a new search begins.
 
@@ -65,14 +68,8 @@ class CmaEs(Generational[kinds.CmaEs]):
         self._searches.append(search)
         return search
 
-    def ask(self) -> list[Vector]:
-        # With many parameters, digits depend on the number of threads of linear algebra.
-        with threadpool_limits(1, user_api="blas"):
-            return super().ask()
-
-    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        with threadpool_limits(1, user_api="blas"):
-            return super().tell(evaluations)
+    ask = _one_thread(Generational.ask)
+    tell = _one_thread(Generational.tell)
 
     def _draw(self) -> Matrix:
         self._current = self._unfinished()

@@ -32,7 +32,7 @@ SIGMA = 0.5
 """Initial standard deviation. An emitter starts at a random gait and restarts at one of the map."""
 
 
-class QualityDiversity(Generational[kinds.QualityDiversity]):
+class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
     """An optimiser that fills a map of gaits.
 
     Each emitter draws a part of the batch. The archive (the map) rates a vector by the difference

@@ -7,7 +7,7 @@ GAITS = 50
 """Number of gaits per iteration."""
 
 
-class RandomSearch(Generational[kinds.RandomSearch]):
+class RandomSearchOptimizer(Generational[kinds.RandomSearch]):
     """An optimiser that only draws random gaits."""
 
     def _draw(self) -> Matrix:

@@ -17,14 +17,12 @@ from tetra_drake.robot.gait import TAU_A, TAU_B, TAU_B_PER_TAU_A, ParameterSpace
 from tetra_drake.scenario import optimizer_kinds as kinds
 from tetra_drake.scenario.common_sections import EvolutionSection
 
-CHILDREN = 2
-
 GAIN_MUTATION = 0.2
 """Largest change of a feedback gain in one mutation."""
 
 
 @dataclass(eq=False)
-class SteadyState:
+class SteadyStateOptimizer:
     """The thesis's optimiser: a random population, then two children per iteration.
 
     Both children have the same parents and the same mutation. Both are made before either enters

@@ -18,7 +18,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
 from tetra_drake.settings.refusals import hint
 
-TIME = "time_s"
+TIME_S = "time_s"
 
 
 _UNEVEN = 0.05
@@ -40,7 +40,7 @@ def command_text(robot: Robot, command: Command) -> str:
 
 def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) -> str:
     """CSV with a row for each time (s) and its values."""
-    table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME))
+    table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME_S))
     return table.reset_index().to_csv(index=False, float_format="%.6f")
 
 
@@ -66,19 +66,19 @@ def load_command(path: str | Path, scenario: GivenScenario) -> Command:
     """
     path, scenario = given_path(path, "load_command", "path"), given_scenario(scenario)
     robot, text = Robot.of(scenario), read_text(path, "command file")
-    wanted = [TIME, *command_columns(robot)]
+    wanted = [TIME_S, *command_columns(robot)]
     cells = table_cells(text, path, wanted=wanted)
     table = np.column_stack([column_numbers(cells[name], path) for name in wanted])
     times, least = table[:, 0], scenario.cpg.listing_step
     if len(times) < 2 or abs(times[0]) > 1e-6:
-        raise InputError(path, TIME, "expected at least two samples, the first at 0")
+        raise InputError(path, TIME_S, "expected at least two samples, the first at 0")
     period = float(np.median(np.diff(times)))
     if period < (1.0 - _UNEVEN) * least:
         problem = f"found samples {period:g} s apart, expected at least {least:g} s"
-        raise InputError(path, TIME, problem)
+        raise InputError(path, TIME_S, problem)
     for row in np.flatnonzero(np.abs(np.diff(times) - period) > _UNEVEN * period):
         problem = f"found {times[row + 1]:g} after {times[row]:g}, expected {period:g} s more"
-        raise InputError(path, f"line {row + 3}, {TIME}", problem)
+        raise InputError(path, f"line {row + 3}, {TIME_S}", problem)
     samples = scenario.actuation.command_unit * table[:, 1:]
     return Command(path.name, float(times[-1]) / (len(times) - 1), samples)
 

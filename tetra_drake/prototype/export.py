@@ -21,7 +21,7 @@ from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 
-COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
+COMMAND, EXPECTED, LIMITS_FILE = "command.csv", "expected.csv", "limits.csv"
 README = "README.md"
 
 LEAST_RATE = 1000.0
@@ -74,7 +74,7 @@ def export(
         folder = Path(temporary) / out.name
         write_whole(folder / COMMAND, command_text(robot, command))
         write_whole(folder / EXPECTED, table_text(axes, motion.time.values, positions))
-        write_whole(folder / LIMITS, loads.table.to_csv(float_format="%.6g"))
+        write_whole(folder / LIMITS_FILE, loads.table.to_csv(float_format="%.6g"))
         save_scenario(folder, scenario)
 
         try:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tetra_drake.analysis.comparison import Compared
 from tetra_drake.analysis.robustness import LOSS, Judgement, by_change, by_gait, chance
-from tetra_drake.formatting import Table, fixed, percents, ranged, rounded, signed
+from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
 from tetra_drake.settings.units import Units
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def robustness_text(judgement: Judgement) -> str:
     return "\n\n".join(texts)
 
 
-def _gaits_table(gaits: pandas.DataFrame, units: Units, *, with_missed: bool) -> Table:
+def _gaits_table(gaits: pandas.DataFrame, units: Units, *, with_missed: bool) -> TextTable:
     shown = ["undisturbed", "5 %", "50 %", "95 %"]
     counts = ["failed", "missed"] if with_missed else ["failed"]
     rows = []
@@ -46,10 +46,10 @@ def _gaits_table(gaits: pandas.DataFrame, units: Units, *, with_missed: bool) ->
         cells.append(percents(row["kept"], row["kept_low"], row["kept_high"]))
         cells += [f"{row[count]:.0f}" for count in counts]
         rows.append(cells)
-    return Table(["gait", *shown, "mean", "robust", *counts], rows)
+    return TextTable(["gait", *shown, "mean", "robust", *counts], rows)
 
 
-def _changes_table(changes: pandas.DataFrame, units: Units) -> Table:
+def _changes_table(changes: pandas.DataFrame, units: Units) -> TextTable:
     rows = []
     for what, row in changes.iterrows():
         correlation, size = signed(row["correlation"]), fixed(row["correlation_size"])
@@ -59,7 +59,7 @@ def _changes_table(changes: pandas.DataFrame, units: Units) -> Table:
         median, worst = fixed(lengths["median"], digits), signed(lengths["worst"], digits)
         rows.append([str(what), median, worst, f"{row['failed']:.0f}", correlation, size])
     headings = ["disturbance", "median change", "worst", "failed", "correlation", "|correlation|"]
-    return Table(headings, rows)
+    return TextTable(headings, rows)
 
 
 def comparison_text(compared: Compared) -> str:
@@ -97,11 +97,11 @@ def improvement_text(improvement: pandas.DataFrame) -> str:
     return (
         "Probability that a trial of the row's run ends fitter than a trial of the column's run\n"
         "(95 % confidence interval); - where a run has a single trial.\n"
-        + Table(["run", *labels], rows).text()
+        + TextTable(["run", *labels], rows).text()
     )
 
 
-def _fitness_table(compared: Compared) -> Table:
+def _fitness_table(compared: Compared) -> TextTable:
     rows = []
     for label, row in compared.runs.iterrows():
         cells = [str(label), f"{row['trials']:.0f}", f"{row['cost']:.0f}"]
@@ -109,10 +109,10 @@ def _fitness_table(compared: Compared) -> Table:
         cells.append(ranged(row["fitness_mean"], row["fitness_low"], row["fitness_high"]))
         rows.append(cells)
     headings = ["run", "trials", "simulations", f"after {compared.common}", "at the end"]
-    return Table(headings, rows)
+    return TextTable(headings, rows)
 
 
-def _distance_table(compared: Compared) -> Table:
+def _distance_table(compared: Compared) -> TextTable:
     headings, units = ["run", "distance", "s per evaluation"], compared.scenario.units
     if compared.reach is not None:
         headings += [f"simulations to {units.shown(compared.reach, 'm')}", "trials that reach it"]
@@ -127,7 +127,7 @@ def _distance_table(compared: Compared) -> Table:
             reached_by = row["share"] * row["trials"]
             cells.append(f"{reached_by:.0f} of {row['trials']:.0f}")
         rows.append(cells)
-    return Table(headings, rows)
+    return TextTable(headings, rows)
 
 
 def _cost(cost: float) -> str:

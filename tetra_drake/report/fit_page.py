@@ -8,7 +8,7 @@ from tetra_drake.analysis.fit import Fit
 from tetra_drake.figures.residuals import residuals
 from tetra_drake.figures.style import save_findings
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import Table, fixed
+from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.scenario.load import SCENARIO, save_scenario
 
 PAGE = "README.md"
@@ -46,7 +46,7 @@ noise, there may be an interval."""
 def _page(fit: Fit) -> str:
     notes = "\n".join(f"- {note}" for note in fit.notes)
     rows = [[str(key), *map(fixed, row)] for key, *row in fit.correlations.itertuples()]
-    correlations = Table(["correlation", *map(str, fit.correlations)], rows)
+    correlations = TextTable(["correlation", *map(str, fit.correlations)], rows)
     return "\n\n".join(
         [
             f"# Fit of {fit.scenario.name}",

@@ -11,25 +11,27 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pydantic
 from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import check_folder, given_path, read_json
-from tetra_drake.results.result import IntegratorWork, SimulationResult, save_result
-from tetra_drake.results.trajectory import DIMENSIONS, labels, with_indexes
+from tetra_drake.results.result import (
+    IntegratorWork,
+    PathColumns,
+    SimulationResult,
+    save_result,
+)
+from tetra_drake.results.trajectory import DIMENSIONS, labels, save_dataset, with_indexes
 from tetra_drake.robot.command import robot_without_network
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.metrics import METRICS, Metrics, wrong_metric
-from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
 
 if TYPE_CHECKING:
@@ -48,8 +50,6 @@ def check_result_folder(folder: Path) -> None:
 def save_result_folder(folder: Path, result: SimulationResult) -> None:
     """Writes the files of a simulation. Raises InputError if it has no trajectory, or if the folder
     cannot be written to."""
-    from tetra_drake.results.trajectory import save_dataset
-
     trajectory = result.trajectory
     # result.json is removed first and written last: if it is there, the other files belong to it.
     if (folder / RESULT).is_file():
@@ -94,34 +94,9 @@ def load_result(folder: str | Path) -> SimulationResult:
         wall_time=file.wall_time_s,
         integrator=file.integrator,
         engine=file.engine,
-        path=file.path.columns(),
+        path=file.path.to_path(),
         recorded=trajectory,
     )
-
-
-class _Path(Section):
-    """The path of the centre in result.json."""
-
-    time_s: list[float]
-    x_m: list[float]
-    y_m: list[float]
-    z_m: list[float]
-    heading_rad: list[float | None]
-
-    @pydantic.model_validator(mode="after")
-    def _check_lengths(self) -> Self:
-        count = len(self.time_s)
-        for name, column in self:
-            if len(column) != count or count < 2:
-                expected = f"{max(count, 2)}, as many as time_s"
-                refuse(name, f"found {len(column)} numbers, expected {expected}")
-        return self
-
-    def columns(self) -> CentrePath:
-        """The path as arrays."""
-        centre = np.column_stack([self.x_m, self.y_m, self.z_m])
-        heading = np.array([_number(angle) for angle in self.heading_rad])
-        return CentrePath(np.array(self.time_s), centre, heading)
 
 
 class _ResultFile(Section):
@@ -136,7 +111,7 @@ class _ResultFile(Section):
     integrator: IntegratorWork
     gait: Any
     """See GaitFile; None if a command was played."""
-    path: _Path
+    path: PathColumns
 
 
 def _read_result_file(path: Path) -> _ResultFile:

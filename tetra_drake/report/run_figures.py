@@ -9,7 +9,7 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas
 
@@ -82,29 +82,35 @@ def simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
     return RecordedGait(recorded, simulate(run.scenario, gait, record=True))
 
 
+class DrawnFigure(NamedTuple):
+    """A figure that was written to a folder."""
+
+    part: str
+    """Part of the report that shows it: "gait", "evolution" or "forces"."""
+    name: str
+    caption: str
+
+
 def draw_trajectory(
     result: SimulationResult, folder: Path, printed: Print = AS_USUAL
-) -> dict[str, str]:
-    """Writes the figures of one simulation. Returns captions by name of figure.
-
-    Raises InputError if the folder cannot be written to.
-    """
-    pictures: list[tuple[Any, ...]] = [
-        (gait_diagram, result),
-        (motion.time_lapse, result),
+) -> list[DrawnFigure]:
+    """Writes the figures of one simulation. Raises InputError if a file cannot be written."""
+    of_gait = [(gait_diagram, result), (motion.time_lapse, result)]
+    of_forces = [
         (motion.path_of_the_centre, result),
         (motion.relative_distances, result),
         (motion.one_step, result),
     ]
     if result.robot.structure.signals:
-        pictures.append((forces.signals_and_tensions, result))
+        of_forces.append((forces.signals_and_tensions, result))
     if len(result.robot.structure.contacts):
-        pictures.append((forces.ground_forces, result))
-    return _save(folder, pictures, printed)
+        of_forces.append((forces.ground_forces, result))
+    drawn = _save(folder, "gait", of_gait, printed)
+    return drawn + _save(folder, "forces", of_forces, printed)
 
 
-def draw_run(shown: ShownGaits, folder: Path, printed: Print = AS_USUAL) -> dict[str, str]:
-    """Writes the figures of a run and of its best gait. Returns captions by name of figure."""
+def draw_run(shown: ShownGaits, folder: Path, printed: Print = AS_USUAL) -> list[DrawnFigure]:
+    """Writes the figures of a run and of its best gait."""
     run = shown.run
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
     trials = fitness.initial_extremes(run).index
@@ -115,15 +121,18 @@ def draw_run(shown: ShownGaits, folder: Path, printed: Print = AS_USUAL) -> dict
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     pictures.append((motion.before_and_after, shown.initial.result, shown.best.result))
-    captions = _save(folder, pictures, printed)
-    return captions | draw_trajectory(shown.best.result, folder, printed)
+    of_run = _save(folder, "evolution", pictures, printed)
+    return of_run + draw_trajectory(shown.best.result, folder, printed)
 
 
-def _save(folder: Path, pictures: Sequence[tuple[Any, ...]], printed: Print) -> dict[str, str]:
-    """Draws and saves figures. A picture is a figure function and its arguments."""
-    captions = {}
+def _save(
+    folder: Path, part: str, pictures: Sequence[tuple[Any, ...]], printed: Print
+) -> list[DrawnFigure]:
+    """Draws and saves the figures of a part. A picture is a figure function and its arguments."""
+    drawn = []
     for draw, *data in pictures:
         figure = draw(*data, **vars(printed.look))
         save_figure(figure, folder, draw.__name__, kinds=printed.kinds)
-        captions[draw.__name__] = " ".join((inspect.getdoc(draw) or "").split())
-    return captions
+        caption = " ".join((inspect.getdoc(draw) or "").split())
+        drawn.append(DrawnFigure(part, draw.__name__, caption))
+    return drawn

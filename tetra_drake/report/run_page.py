@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import base64
 import os
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pandas
@@ -17,10 +17,11 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.figures.style import AS_USUAL, Print
 from tetra_drake.files import check_folder, write_whole
-from tetra_drake.formatting import Table, listed, render, rounded
+from tetra_drake.formatting import TextTable, listed, render, rounded
 from tetra_drake.machine import versions
-from tetra_drake.report.result_folder import RESULT, load_result
+from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.report.run_figures import (
+    DrawnFigure,
     ShownGaits,
     draw_run,
     draw_trajectory,
@@ -30,26 +31,17 @@ from tetra_drake.report.run_figures import (
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, save_gait
-from tetra_drake.robot.weights import KINDS
+from tetra_drake.robot.weights import NEURONS
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import Units
 
-REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
-ELITES, ELITES_CSV = "elites", "elites.csv"
+REPORT, FIGURES = "report.html", "figures"
+ELITES_FOLDER, ELITES_CSV = "elites", "elites.csv"
 
-_PARTS = {
-    "gait_diagram": "gait",
-    "time_lapse": "gait",
-    "fitness_of_trials": "evolution",
-    "before_and_after": "evolution",
-    "initial_distances": "evolution",
-    "initial_fitness": "evolution",
-    "map_of_gaits": "evolution",
-}
-"""Parts of the report by names of figures; other figures are in the part "forces"."""
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
+# Settings that are not shown among those that differ from the thesis's; some are elsewhere.
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 
@@ -88,10 +80,10 @@ def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     shown = simulate_shown_gaits(load_run(directory))
-    captions = draw_run(shown, figures, printed)
+    drawn = draw_run(shown, figures, printed)
     _write_map(shown, directory)
     shown.best.result.save_replay(replay)
-    write_whole(report, render_report(shown, captions, folder=figures))
+    write_whole(report, render_report(shown, drawn, folder=figures))
     return [figures, replay, report]
 
 
@@ -101,7 +93,7 @@ def _write_map(shown: ShownGaits, directory: Path) -> None:
     run = shown.run
     on_map = distinct_gaits(notable_gaits(run))
     if on_map:
-        write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
+        write_whole(directory / ELITES_FOLDER / ELITES_CSV, elites(run).to_csv(index=False))
     for names, row in on_map:
         trial, index = row["trial"], row["index"]
         gait_file, page = _map_files(names, row, shown)
@@ -112,13 +104,13 @@ def _write_map(shown: ShownGaits, directory: Path) -> None:
 
 def _map_files(names: Sequence[str], row: pandas.Series, shown: ShownGaits) -> tuple[Path, Path]:
     """Gait file and replay page of a notable gait of the map, relative to the run's folder."""
-    path = Path(ELITES) / names[0].replace(", ", "_").replace(" ", "_")
+    path = Path(ELITES_FOLDER) / names[0].replace(", ", "_").replace(" ", "_")
     page = Path(REPLAY) if gait_label(row) == shown.best.label else path.with_suffix(".html")
     return path.with_suffix(".json"), page
 
 
-def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Path) -> str:
-    """The report as HTML. The figures are in `folder`; `captions` are by name of figure."""
+def render_report(shown: ShownGaits, figures: Sequence[DrawnFigure], *, folder: Path) -> str:
+    """The report as HTML, with figures that are files in `folder`."""
     run, scenario = shown.run, shown.run.scenario
     best_gait = trial_folder(Path(), shown.trial) / BEST_GAIT
     named = {"initially": shown.initial.recorded, "best": shown.best.recorded}
@@ -142,7 +134,11 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
         ground=ground_text(scenario),
         changed=changed,
         versions=versions(),
-        differences=_settings(scenario),
+        differences=[
+            (key, value)
+            for key, value in scenario.differences(load_scenario("thesis"))
+            if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
+        ],
         results=results(run),
         trials=trials_table(run),
         objective=_terms(scenario.objective, inverse, scenario.units),
@@ -157,24 +153,14 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
         map_metrics=_metrics(on_map, scenario) if on_map else None,
         parameters=_parameters(gait),
         weights=_weight_matrices(gait),
-        pictures=_pictures(captions, folder),
+        pictures=_pictures(figures, folder),
         files={
             "scenario": SCENARIO,
             "replay": REPLAY,
             "figures": FIGURES,
-            "elites": Path(ELITES) / ELITES_CSV,
+            "elites": Path(ELITES_FOLDER) / ELITES_CSV,
         },
     )
-
-
-def _settings(scenario: Scenario) -> list[tuple[str, str]]:
-    """Settings that differ from the scenario `thesis`, without long lists and without settings that
-    the report shows elsewhere."""
-    return [
-        (key, value)
-        for key, value in scenario.differences(load_scenario("thesis"))
-        if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
-    ]
 
 
 def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str], units: Units) -> str:
@@ -183,7 +169,7 @@ def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str], units: U
     return ", ".join(terms)
 
 
-def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]], scenario: Scenario) -> Table:
+def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]], scenario: Scenario) -> TextTable:
     return metrics_table({names[0]: gait for names, gait in gaits}, scenario)
 
 
@@ -196,38 +182,26 @@ def _parameters(gait: Gait) -> str:
     return listed(texts)
 
 
-@dataclass(frozen=True)
-class WeightMatrix:
-    """The weights between all extensors, or between all flexors, for a heat map."""
-
-    kind: str
-    rows: list[list[float | None]]
-    """A row per oscillator with the weights from all oscillators; None where no weight is."""
-
-    @property
-    def largest(self) -> float:
-        """The largest weight; 1 if all weights are zero."""
-        return max((weight for row in self.rows for weight in row if weight), default=1.0)
-
-
-def _weight_matrices(gait: Gait) -> list[WeightMatrix]:
-    """The weights of a gait as matrices: extensors, flexors. Empty for a single oscillator."""
+def _weight_matrices(gait: Gait) -> dict[str, list[list[float | None]]]:
+    """The weights between all extensors, and between all flexors, as heat maps: a row per
+    oscillator with the weights from all oscillators, None where no weight is. Empty for a single
+    oscillator."""
     weights = dict(zip(gait.weight_names, gait.weights, strict=True))
     count = max((int(name.partition("->")[0]) for name in weights), default=0)
     numbers = range(1, count + 1)
-    matrices = []
-    for kind in KINDS if count else ():
-        rows = [[weights.get(f"{j}->{i} {kind}") for j in numbers] for i in numbers]
-        matrices.append(WeightMatrix(kind, rows))
-    return matrices
+    return {
+        kind: [[weights.get(f"{j}->{i} {kind}") for j in numbers] for i in numbers]
+        for kind in NEURONS
+        if count
+    }
 
 
-def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple[str, str, str]]]:
+def _pictures(figures: Sequence[DrawnFigure], folder: Path) -> dict[str, list[tuple[str, ...]]]:
     """The figures of each part of the report: image URL, file and caption."""
-    parts: dict[str, list[tuple[str, str, str]]] = {"gait": [], "evolution": [], "forces": []}
-    for name, caption in captions.items():
+    parts: dict[str, list[tuple[str, ...]]] = defaultdict(list)
+    for part, name, caption in figures:
         # Embedded directly, not as the URL of an image, the ids of two SVGs would clash.
         content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
         picture = f"data:image/svg+xml;base64,{content}", f"{FIGURES}/{name}.svg", caption
-        parts[_PARTS.get(name, "forces")].append(picture)
+        parts[part].append(picture)
     return parts

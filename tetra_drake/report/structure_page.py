@@ -12,7 +12,7 @@ import numpy as np
 
 from tetra_drake.analysis.equilibrium import EquilibriumStudy
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import Table, fixed, listed, rounded
+from tetra_drake.formatting import TextTable, fixed, listed, rounded
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.laws.terrain import Flat
@@ -128,7 +128,7 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     return lines
 
 
-def _bodies_table(study: EquilibriumStudy) -> Table:
+def _bodies_table(study: EquilibriumStudy) -> TextTable:
     rows, structure, units = [], study.robot.structure, study.robot.scenario.units
     height = functools.partial(fixed, digits=units.decimals + 1)
     for body, mass in zip(structure.bodies, structure.mass, strict=True):
@@ -138,19 +138,21 @@ def _bodies_table(study: EquilibriumStudy) -> Table:
         rows.append([body, rounded(1e3 * mass, 4), heights, load])
     heights = f"heights of nodes ({units.length_name})"
     load = f"load on the ground ({units.force_name})"
-    return Table(["body", "mass (g)", heights, load], rows)
+    return TextTable(["body", "mass (g)", heights, load], rows)
 
 
-def _anchors_table(study: EquilibriumStudy) -> Table:
+def _anchors_table(study: EquilibriumStudy) -> TextTable:
     units = study.robot.scenario.units
     forces = study.nodes.loc[study.robot.structure.held.any(axis=1), "anchor_x":"anchor_z"]
     noise = _NOISE * forces.abs().to_numpy().max()
     shown = (forces.where(forces.abs() > noise, 0.0) / units.force).itertuples()
     rows = [[str(node), *map(rounded, pushes)] for node, *pushes in shown]
-    return Table(["anchor", *(f"force along {axis} ({units.force_name})" for axis in "xyz")], rows)
+    return TextTable(
+        ["anchor", *(f"force along {axis} ({units.force_name})" for axis in "xyz")], rows
+    )
 
 
-def _cables_table(study: EquilibriumStudy) -> Table:
+def _cables_table(study: EquilibriumStudy) -> TextTable:
     rows, units = [], study.robot.scenario.units
     for group, cables in study.cables.groupby("group", sort=False):
         lengths = (_range(cables[name] / units.length) for name in ("free_length", "length"))
@@ -158,7 +160,7 @@ def _cables_table(study: EquilibriumStudy) -> Table:
         rows.append([str(group), str(len(cables)), *lengths, tension])
     length, force = units.length_name, units.force_name
     names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
-    return Table(["cables", "number", *names], rows)
+    return TextTable(["cables", "number", *names], rows)
 
 
 def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> str:

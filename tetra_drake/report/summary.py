@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
-from tetra_drake.formatting import Table, fixed, rounded
+from tetra_drake.formatting import TextTable, fixed, rounded
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.robot import Robot
@@ -38,7 +38,7 @@ _NOISE = 1e-5
 
 def metrics_table(
     gaits: Mapping[str, Mapping[str, Any] | pandas.Series], scenario: Scenario
-) -> Table:
+) -> TextTable:
     """Table of fitness and metrics, with a column per gait. A gait is a row of `Run.evaluations`.
 
     The first row is the main metric of the objective. Numbers that are zero for all gaits are left
@@ -57,7 +57,7 @@ def metrics_table(
             whole = name in _SHARES
             digits = [fixed(x, 0) if whole or abs(x) < _NOISE else rounded(x) for x in values]
             rows.append([title, *digits, _NOTES.get(name, "")])
-    return Table(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))
+    return TextTable(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))
 
 
 def _size_and_title(name: str, units: Units) -> tuple[float, str]:
@@ -97,7 +97,7 @@ def ground_text(scenario: Scenario) -> str:
 
 def run_text(run: Run) -> str:
     """Text about a run, printed at its end."""
-    texts = [Table(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
+    texts = [TextTable(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
     if len(run.statuses) > 1:
         texts.append(trials_table(run).text())
     if not run.best().empty:
@@ -150,7 +150,7 @@ def results(run: Run) -> list[tuple[str, str]]:
     return rows + effort
 
 
-def trials_table(run: Run) -> Table:
+def trials_table(run: Run) -> TextTable:
     """Table of the trials of a run: initial and final best gait, evaluations, state.
 
     Gaits are described by the main metric of the objective. "in Drake" is the final best gait,
@@ -176,7 +176,7 @@ def trials_table(run: Run) -> Table:
     shown = [i for i, cells in enumerate(zip(*rows, strict=True)) if {*cells} - {"-", ""}]
     rows = [[row[i] for i in shown] for row in rows]
     names = [columns[i] for i in shown]
-    return Table(names, rows, text_columns=(0, names.index("end") if "end" in names else 0))
+    return TextTable(names, rows, text_columns=(0, names.index("end") if "end" in names else 0))
 
 
 def _about(run: Run) -> str:

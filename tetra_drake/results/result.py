@@ -7,9 +7,10 @@ import html
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
+import pydantic
 
 from tetra_drake import __version__
 from tetra_drake.errors import InputError
@@ -28,6 +29,7 @@ from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.metrics import UNITS, Metrics
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
 from tetra_drake.settings.units import INCH
 
@@ -47,6 +49,38 @@ class IntegratorWork(Section):
     derivative_evaluations: int
     jacobian_evaluations: int = 0
     """Number of the derivative evaluations that were made for Jacobians."""
+
+
+class PathColumns(Section):
+    """The path of the centre in result.json."""
+
+    time_s: list[float]
+    x_m: list[float]
+    y_m: list[float]
+    z_m: list[float]
+    heading_rad: list[float | None]
+    """Headings; None where the heading is undefined."""
+
+    @classmethod
+    def of(cls, path: CentrePath) -> PathColumns:
+        """The columns of a path."""
+        heading = [json_number(angle) for angle in path.heading.tolist()]
+        x, y, z = path.centre.T.tolist()
+        return cls(time_s=path.times.tolist(), x_m=x, y_m=y, z_m=z, heading_rad=heading)
+
+    def to_path(self) -> CentrePath:
+        """The path as arrays."""
+        times, x, y, z, heading = (np.array(column, dtype=float) for _, column in self)
+        return CentrePath(times, np.column_stack([x, y, z]), heading)
+
+    @pydantic.model_validator(mode="after")
+    def _check_lengths(self) -> Self:
+        count = len(self.time_s)
+        for name, column in self:
+            if len(column) != count or count < 2:
+                expected = f"{max(count, 2)}, as many as time_s"
+                refuse(name, f"found {len(column)} numbers, expected {expected}")
+        return self
 
 
 @dataclass(frozen=True)
@@ -205,7 +239,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
     """Writes result.json: metrics in SI, lengths also in inches, times in s, and the path of the
     centre as columns. `gait` is null for a command."""
     scenario, gait = result.scenario, result.gait
-    way, metrics, radius = result.path, vars(result.metrics), result.metrics.path_radius
+    metrics, radius = vars(result.metrics), result.metrics.path_radius
     lengths = [name for name, unit in UNITS.items() if unit == "m"]
     content = {
         "schema": SCHEMA,
@@ -222,12 +256,6 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
         "integrator": result.integrator.model_dump(),
         "versions": versions(scenario.engine.packages),
         "gait": gait and gait.to_json(scenario),
-        "path": {
-            "time_s": way.times.tolist(),
-            "x_m": way.centre[:, 0].tolist(),
-            "y_m": way.centre[:, 1].tolist(),
-            "z_m": way.centre[:, 2].tolist(),
-            "heading_rad": [json_number(angle) for angle in way.heading.tolist()],
-        },
+        "path": PathColumns.of(result.path).model_dump(),
     }
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")

@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.kernels.compiling import LOGGER, compiled
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.kernels.packed import Packed, unpacked
-from tetra_drake.laws.cable import LENGTH, PASSIVE
+from tetra_drake.laws import cable
 from tetra_drake.laws.capsules import BARREL, PARALLEL
 from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.laws.forces import Forces, Parts, compute_forces, move_robot
@@ -82,7 +82,7 @@ class Unactuated:
 
     def __init__(self, model: Model) -> None:
         """The robot of a model, with all cables passive."""
-        cables = model.cables._replace(signal=np.full_like(model.cables.signal, PASSIVE))
+        cables = model.cables._replace(signal=np.full_like(model.cables.signal, cable.PASSIVE))
         self.model = model._replace(cables=cables)
         self.forces = Forces.of(model)
         """Forces at the state that was last computed."""
@@ -127,7 +127,7 @@ def find_equilibrium(
             reason = "its position is not finite, or two ends of a cable meet"
         raise InputError(source, "robot", f"{found} on '{bodies[body]}': {reason}")
     force_at_rest(robot, descent.state)
-    lengths = np.round(robot.forces.cable_forces[:, LENGTH], LENGTH_DIGITS)
+    lengths = np.round(robot.forces.cable_forces[:, cable.LENGTH], LENGTH_DIGITS)
     feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
     return Equilibrium(descent.state, lengths, feet)
 

@@ -13,9 +13,9 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
-from tetra_drake.formatting import Table, heading_html
+from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.feedback import Gains
-from tetra_drake.robot.weights import KINDS, Weights
+from tetra_drake.robot.weights import NEURONS, Weights
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section
@@ -76,10 +76,10 @@ class Gait:
         oscillators = [str(i + 1) for i in range(count)]
         rows = []
         for onto in oscillators:
-            row = [[texts.get(f"{i}->{onto} {kind}", "-") for kind in KINDS] for i in oscillators]
+            row = [[texts.get(f"{i}->{onto} {kind}", "-") for kind in NEURONS] for i in oscillators]
             rows.append([onto, *("/".join(pair).replace("-/-", "-") for pair in row)])
-        lines.append(f"weights ({'/'.join(KINDS)}), a column for each oscillator they come from")
-        return "\n".join([*lines, Table(["onto", *oscillators], rows).text()])
+        lines.append(f"weights ({'/'.join(NEURONS)}), a column for each oscillator they come from")
+        return "\n".join([*lines, TextTable(["onto", *oscillators], rows).text()])
 
     def __repr__(self) -> str:
         return f"<Gait {self.name}>"
@@ -89,7 +89,7 @@ class Gait:
         rows += self._further
         least, most = min(self.weights, default=0.0), max(self.weights, default=0.0)
         rows.append([f"{len(self.weights)} weights", f"{least:.2f} to {most:.2f}"])
-        return heading_html(self.name) + Table(["parameter", "value"], rows, (0, 1)).html()
+        return heading_html(self.name) + TextTable(["parameter", "value"], rows, (0, 1)).html()
 
     @property
     def _further(self) -> list[list[str]]:

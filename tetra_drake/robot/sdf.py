@@ -13,9 +13,9 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from tetra_drake.laws.model import WORLD
 from tetra_drake.robot.structure import NODE_COLOUR, Shape, Structure, shapes_of
 from tetra_drake.robot.xml_elements import add_element, xml_text
-from tetra_drake.scenario.blueprint import WORLD
 
 FIXED = "fixed nodes"
 """Name of the link of the fixed nodes."""

@@ -23,13 +23,13 @@ from pydrake.multibody.tree import (
 )
 
 from tetra_drake.laws import cable, kinematics
-from tetra_drake.laws.capsules import Search
-from tetra_drake.laws.model import Couplings
+from tetra_drake.laws.capsules import StrutSearch
+from tetra_drake.laws.model import WORLD, Couplings
 from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
 from tetra_drake.robot.equilibrium import Equilibrium
-from tetra_drake.scenario.blueprint import WORLD, Blueprint
+from tetra_drake.scenario.blueprint import Blueprint
 
 STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
 PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0)
@@ -44,7 +44,7 @@ SLENDERNESS = 100.0
 """Size of a robot without struts, divided by the least radius that is shown."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Structure(Blueprint):
     """Rigid bodies joined by cables; SI units. A body consists of struts between nodes."""
 
@@ -106,13 +106,13 @@ class Structure(Blueprint):
         return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
 
     @property
-    def strut_search(self) -> Search:
+    def strut_search(self) -> StrutSearch:
         """Distances of the search for struts that may touch; zeros if there are no struts."""
         if not self.strut_radius.size:
-            return Search(0.0, drift=0.0, passage=0.0, lightest=self.mass.min())
+            return StrutSearch(0.0, drift=0.0, passage=0.0, lightest=self.mass.min())
         skin = SKIN * self.strut_table.length.min()
         near, passage = 2.0 * self.strut_radius.max() + skin, PASSAGE * self.strut_radius.min()
-        return Search(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
+        return StrutSearch(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
 
     @property
     def least_radius(self) -> float:

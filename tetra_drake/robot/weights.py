@@ -11,7 +11,7 @@ import numpy as np
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.scenario import Scenario
 
-KINDS = "extensor", "flexor"
+NEURONS = "extensor", "flexor"
 """Kinds of neurons, by index modulo 2."""
 
 
@@ -55,4 +55,4 @@ class Weights:
     def names(self) -> tuple[str, ...]:
         """Names of the weights: "3->1 extensor" is from oscillator 3 onto 1, counted from 1."""
         pairs = self.couplings.tolist()
-        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {KINDS[i % 2]}" for i, j in pairs)
+        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {NEURONS[i % 2]}" for i, j in pairs)

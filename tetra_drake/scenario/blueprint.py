@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
 
-WORLD = -1
-"""Index that fixed nodes have in place of the index of a body."""
+from tetra_drake.laws.model import WORLD
 
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
@@ -21,7 +20,7 @@ USUAL_SIZES = 0.1, 1.0
 lengths are chosen. They grow and shrink with other robots. See Blueprint.scale."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Blueprint:
     """A robot at the positions of its settings; SI units.
 
@@ -83,16 +82,16 @@ class Blueprint:
     """Indices of the cables that each oscillator drives (m)."""
     contacts: np.ndarray
     """Indices of the nodes that the ground can touch (contacts,), ascending."""
-    markers: np.ndarray
+    markers: np.ndarray = field(default_factory=lambda: np.array([], dtype=int))
     """Indices of the nodes whose motion is shown (markers,), in the order of the bodies. Empty if
     the motion of the centre of mass is shown."""
-    followed: str
+    followed: str = "centre"
     """Name of the points whose motion is shown."""
-    points_ahead: bool
+    points_ahead: bool = False
     """True if the bodies' x axes point forward, so that the robot has a heading."""
-    feet: int | None
+    feet: int | None = None
     """Number of nodes that bear the weight; None if it follows from the equilibrium."""
-    settles: bool
+    settles: bool = True
     """True if the robot starts in equilibrium, False if it starts at the given positions."""
 
     @functools.cached_property

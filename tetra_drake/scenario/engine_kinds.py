@@ -17,6 +17,8 @@ LONGEST_LOOK_AHEAD = 2e-5
 class EngineSettings(Section):
     """Base class of the kinds of engines."""
 
+    module: ClassVar[str]
+    """Module with the ENGINE that simulates; see engines.interface."""
     packages: ClassVar[tuple[str, ...]] = ()
     """Packages that only this engine needs."""
 
@@ -31,6 +33,7 @@ class Drake(EngineSettings):
     Modes are contact and stiction of the nodes.
     """
 
+    module: ClassVar[str] = "tetra_drake.engines.drake"
     scheme: Literal["radau3", "runge_kutta3"] = "radau3"
     """Integrator: implicit (radau3) or explicit."""
     accuracy: float | None = Field(default=None, gt=0)
@@ -49,6 +52,7 @@ class Drake(EngineSettings):
 class Compiled(EngineSettings):
     """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
 
+    module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed = Field(default=1e-4, gt=0)
     """Permitted error per step of the velocity of a body; for rotations, of its strut tips."""
     max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
@@ -64,14 +68,14 @@ class Compiled(EngineSettings):
 class Mujoco(EngineSettings):
     """MuJoCo with its own contact, on planes."""
 
+    module: ClassVar[str] = "tetra_drake.engines.mujoco"
+    packages: ClassVar[tuple[str, ...]] = ("mujoco",)
     step: Time = Field(default=0.0625e-3, ge=1e-7, le=1)
     """Time step. A simulation fails at once if it is too long for springs and dampers."""
-
-    packages: ClassVar[tuple[str, ...]] = ("mujoco",)
 
     def friction_text(self, friction: FrictionKind) -> str:
         return friction.cone_text
 
 
-Engine = Annotated[Drake | Compiled | Mujoco, Kinds()]
+EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds()]
 """Union of the kinds of engines. A mapping without a tag is of the first kind."""

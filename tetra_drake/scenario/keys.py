@@ -15,11 +15,11 @@ from typing import Any, Literal
 
 from pydantic.fields import FieldInfo
 
-from tetra_drake.formatting import Table
+from tetra_drake.formatting import TextTable
 from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.quantities import Unit, UnitsByName, unit_of
-from tetra_drake.settings.section import Kinds, Section, joined, keys_of
+from tetra_drake.settings.section import LIMIT_WORDS, Kinds, Section, joined, keys_of
 from tetra_drake.settings.units import plainest
 
 PAGE = Path(__file__).parent / "KEYS.md"
@@ -32,15 +32,6 @@ _INTRODUCTION = """\
 - A quantity may have any unit that converts to the one given here.
 - A key without a default is in your file or in its `base`.
 - Of the kinds of a section, the first needs no tag. NAME stands for a name of your choice."""
-
-_LIMITS = {
-    "gt": "> {}",
-    "ge": "≥ {}",
-    "le": "≤ {}",
-    "min_length": "≥ {} items",
-    "max_length": "≤ {} items",
-}
-"""Texts of limits by the attributes of pydantic's marks."""
 
 _WORDS = {float: "number", int: "integer", str: "text", bool: "true or false"}
 
@@ -66,7 +57,7 @@ def keys_page() -> str:
 
 def _table_of_keys(rows: Sequence[Row]) -> str:
     cells = [(f"`{key}`", *rest) for key, *rest in rows]
-    return Table(["key", "value", "default", "what it is"], cells, range(4)).markdown()
+    return TextTable(["key", "value", "default", "what it is"], cells, range(4)).markdown()
 
 
 def _table_of_metrics() -> str:
@@ -75,7 +66,7 @@ def _table_of_metrics() -> str:
         limit = "at most" if metric.is_cost else "at least"
         rows.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", texts[name]))
     headings = ["metric", "unit", "`require`", "robots", "what it is"]
-    return Table(headings, rows, range(5)).markdown()
+    return TextTable(headings, rows, range(5)).markdown()
 
 
 def _rows(key: str, section: type[Section]) -> Iterator[Row]:
@@ -125,16 +116,17 @@ def _value(kind: Any, marks: Sequence[Any] = ()) -> str:
 
 def _limits(marks: Sequence[Any], unit: str) -> Iterator[str]:
     """The limits of a number, or of the length of a list."""
+    texts = {name: text for name, _, text in LIMIT_WORDS.values()}
     limits = {
         name: getattr(mark, name)
-        for mark, name in itertools.product(marks, _LIMITS)
+        for mark, name in itertools.product(marks, texts)
         if getattr(mark, name, None) is not None
     }
     if "max_length" in limits and limits["max_length"] == limits.get("min_length"):
         yield f"{limits.pop('max_length')} items"
         del limits["min_length"]
     for name, limit in limits.items():
-        yield _LIMITS[name].format(plainest(limit, unit) if unit else f"{limit:g}")
+        yield texts[name].format(plainest(limit, unit) if unit else f"{limit:g}")
 
 
 def _default(field: FieldInfo) -> str:

@@ -18,9 +18,6 @@ from tetra_drake.settings.section import Tree, keys_of, written
 SCENARIO = "scenario.yaml"
 """The scenario's file in the folder of a command."""
 
-MOST_BYTES = 2**20
-"""Upper limit of the size of a scenario file."""
-
 
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     """Loads a scenario.
@@ -92,7 +89,7 @@ def _file(name: str, folder: Path) -> Path:
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     """Loads the scenario of a file, on top of its bases."""
     keys = [*keys_of(Scenario), "base"]
-    given = read_mapping(file, "scenario file", keys=keys, most=MOST_BYTES)
+    given = read_mapping(file, "scenario file", keys=keys)
     if file.resolve() in seen:
         raise InputError(file, "base", "the scenario is based on itself")
     _resolve_files(given, file)

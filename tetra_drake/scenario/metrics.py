@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tetra_drake.files import json_number
-from tetra_drake.formatting import Table
+from tetra_drake.formatting import TextTable
 from tetra_drake.laws.actuator import LIMITS
 from tetra_drake.laws.curves import curvature, travelling_index
 from tetra_drake.settings.units import INCH, INCHES, Units, current
@@ -293,7 +293,7 @@ class Metrics:
         return cls(**numbers, lifted_shares=walk.lifted_shares, units=units)
 
     @property
-    def table(self) -> Table:
+    def table(self) -> TextTable:
         """Table of the metrics that apply to the robot, with units, in two pairs of columns."""
         rows, units = [], current(self.units)
         for name, unit in UNITS.items():
@@ -303,7 +303,7 @@ class Metrics:
         half = (len(rows) + 1) // 2
         pairs = itertools.zip_longest(rows[:half], rows[half:], fillvalue=["", ""])
         side_by_side = [left + right for left, right in pairs]
-        return Table(["metric", "value"] * 2, side_by_side, text_columns=range(4))
+        return TextTable(["metric", "value"] * 2, side_by_side, text_columns=range(4))
 
     def __str__(self) -> str:
         return self.table.text()

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.blueprint import WORLD
+from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.ntrt_assembly import Assembly, Place, Rule, TaggedPair
 from tetra_drake.scenario.ntrt_file import CLASSES, Builder
 from tetra_drake.scenario.robot_structure import Member, StructureFile, components

@@ -19,9 +19,6 @@ from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import keys_of
 from tetra_drake.settings.units import LARGEST
 
-MOST_BYTES = 2**20
-"""Largest size of a file in bytes."""
-
 MOST_PARTS = MOST_NODES // 2
 """Largest number of substructures, including nested ones."""
 
@@ -80,8 +77,7 @@ class Assembly:
         """Adds a file. `above` are the files that contain it. The names of its nodes begin with
         `part`."""
         if file not in self._read:
-            keys, what = keys_of(NtrtFile), "structure file of NTRT"
-            content = read_mapping(file, what, keys=keys, most=MOST_BYTES)
+            content = read_mapping(file, "structure file of NTRT", keys=keys_of(NtrtFile))
             self._read[file] = NtrtFile.from_tree(content, file)
         given = self._read[file]
         if file.resolve() in above:

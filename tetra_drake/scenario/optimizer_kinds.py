@@ -64,7 +64,7 @@ class RandomSearch(Section):
 
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
-Count = Annotated[int, Field(ge=2, le=1000)]
+CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(Section):
@@ -78,7 +78,7 @@ class QualityDiversity(Section):
         default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
     """Two metrics with their ranges on the map. Values outside belong to the cells at the edge."""
-    cells: list[Count] = Field(default=[20, 20], min_length=2, max_length=2)
+    cells: list[CellCount] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
     """Number of draws of disturbances. Each gait of the map is simulated in all draws at the

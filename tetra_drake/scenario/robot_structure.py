@@ -17,8 +17,9 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from tetra_drake.laws.model import WORLD
 from tetra_drake.laws.rigid_motions import rigid_motions
-from tetra_drake.scenario.blueprint import WORLD, Blueprint
+from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.robot_tetrahedra import (
     LIGHTEST,
@@ -31,7 +32,7 @@ from tetra_drake.settings.quantities import (
     Acceleration,
     Damping,
     Density,
-    Force,
+    ForceQuantity,
     Length,
     Mass,
     Position,
@@ -58,16 +59,12 @@ def _check_name(name: object) -> object:
     return name
 
 
-def _check_axes(axes: object) -> object:
-    """Checks the axes along which an anchor holds a node."""
-    letters = list(axes) if isinstance(axes, str) else []
-    if not letters or sorted(letters) != sorted({"x", "y", "z"} & set(letters)):
-        refuse("", f"found {described(axes)}, expected some of the axes x, y and z, such as xyz")
-    return axes
-
-
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
+AnchorAxes = Annotated[
+    Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
+    pydantic.BeforeValidator(lambda axes: "".join(sorted(axes)) if isinstance(axes, str) else axes),
+]
 Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
@@ -134,7 +131,7 @@ class CableGroup(Section):
     """Tension per elongation."""
     free_length: Length | None = Field(default=None, ge=0)
     """Length without tension. A group has a free length or a tension."""
-    tension: Force | None = Field(default=None, ge=0)
+    tension: ForceQuantity | None = Field(default=None, ge=0)
     """Tension at the given coordinates of the nodes."""
 
     @pydantic.model_validator(mode="after")
@@ -199,9 +196,11 @@ class StructureFile(Section):
     masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload that cables hold."""
-    loads: dict[str, Annotated[list[Force], Field(min_length=3, max_length=3)]] = Field(default={})
+    loads: dict[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
+        default={}
+    )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    anchors: dict[str, Annotated[str, pydantic.BeforeValidator(_check_axes)]] = Field(default={})
+    anchors: dict[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
@@ -279,11 +278,6 @@ class StructureFile(Section):
             oscillators=tuple(self.actuated),
             groups=tuple(self.cables_of_oscillator.values()),
             contacts=np.array(sorted(number[node] for node in self.contact_nodes)),
-            markers=np.array([], dtype=int),
-            followed="centre",
-            points_ahead=False,
-            feet=None,
-            settles=True,
         )
 
     @cached_property
@@ -336,7 +330,7 @@ class StructureFile(Section):
     @cached_property
     def _fixed(self) -> set[str]:
         """Nodes with an anchor along all axes."""
-        return {node for node, axes in self.anchors.items() if len(axes) == len("xyz")}
+        return {node for node, axes in self.anchors.items() if axes == "xyz"}
 
     @cached_property
     def sphere_of_node(self) -> dict[str, Sphere]:
@@ -603,7 +597,7 @@ class StructureFile(Section):
                 oscillators[cable] = oscillator
 
 
-Robot = Annotated[Tetrahedra | StructureFile, Kinds()]
+RobotKind = Annotated[Tetrahedra | StructureFile, Kinds()]
 """Union of the kinds of robots. A mapping without a tag is of the first kind.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`

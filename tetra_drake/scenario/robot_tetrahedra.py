@@ -31,7 +31,7 @@ BOTTOM_LEFT, BOTTOM_RIGHT, TOP, TIP = range(4)
 STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
 """Indices of the two nodes of each strut of a tetrahedron."""
 
-Cable = Literal[
+CableName = Literal[
     "outer bottom_left",
     "outer bottom_right",
     "outer top",
@@ -42,7 +42,7 @@ Cable = Literal[
 """Names of the cables of a junction, from one tetrahedron to the next. Outer cables join base nodes
 with the same name. Inner cables join the tip to base nodes."""
 
-CABLES: tuple[str, ...] = get_args(Cable)
+CABLES: tuple[str, ...] = get_args(CableName)
 
 
 def tetrahedron_nodes(strut_length: float) -> np.ndarray:
@@ -147,7 +147,7 @@ class Tetrahedra(Section):
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
     tip of the foremost; no other node reaches flat ground. `all`: all four of every tetrahedron."""
-    actuation: list[Annotated[list[Cable], Field(min_length=1)]] = Field(
+    actuation: list[Annotated[list[CableName], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
     """Groups of a junction's cables that share an oscillator, the same for every junction."""

@@ -6,6 +6,7 @@ import functools
 import itertools
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
@@ -14,7 +15,7 @@ from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.formatting import Table, heading_html
+from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
@@ -29,18 +30,25 @@ from tetra_drake.scenario.common_sections import (
     SimulationSection,
     separate,
 )
-from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
+from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.robot_structure import Robot
+from tetra_drake.scenario.robot_structure import RobotKind
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import UnitsByName
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Section, Tree, flattened, written
-from tetra_drake.settings.units import Units, plainest, rounded_in_text, shortest, units_for
+from tetra_drake.settings.units import (
+    SYSTEMS,
+    Units,
+    current,
+    fitting,
+    plainest,
+    shortest,
+)
 
-EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
+EngineT = TypeVar("EngineT", Drake, Compiled, Mujoco)
 
 MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
 """Largest number of values of all signals in one simulation, on Drake and on other engines. They
@@ -60,7 +68,7 @@ class Scenario(Section):
 
     name: str
     """Label of the scenario; equal scenarios may have different names."""
-    robot: Robot
+    robot: RobotKind
     ground: GroundSection
     friction: Friction
     terrain: Terrain = Flat()
@@ -69,7 +77,7 @@ class Scenario(Section):
     cpg: CpgSection
     gait_bounds: GaitBounds
     simulation: SimulationSection
-    engine: Engine = Drake()
+    engine: EngineKind = Drake()
     objective: Annotated[
         dict[str, float], UnitsByName({name: inverse(unit) for name, unit in UNITS.items()})
     ] = Field(min_length=1)
@@ -105,7 +113,7 @@ class Scenario(Section):
     def _repr_html_(self) -> str:
         heading = heading_html(str(self).partition("\n")[0])
         rows = [[key, text] for key, text in self.differences(_thesis()) if len(text) <= _WIDTH]
-        return heading + Table(["differs from thesis", "value"], rows[:_ROWS], (0, 1)).html()
+        return heading + TextTable(["differs from thesis", "value"], rows[:_ROWS], (0, 1)).html()
 
     def to_yaml(self) -> str:
         """All settings as a scenario file, in units with few digits."""
@@ -143,7 +151,8 @@ class Scenario(Section):
         """Units of this scenario in texts, pages and figures: the units of units.shown_in(); mm if
         its robot is given in mm; otherwise those that need the fewest digits for the long lengths
         of its robot."""
-        return units_for(self.robot.lengths, self.robot.unit)
+        robot = self.robot
+        return current(SYSTEMS[robot.unit] if robot.unit else fitting(robot.lengths))
 
     @property
     def oscillators(self) -> int:
@@ -155,7 +164,7 @@ class Scenario(Section):
         """Name of the engine: its kind in lower case."""
         return type(self.engine).__name__.lower()
 
-    def settings_of(self, engine: type[EngineKind]) -> EngineKind:
+    def settings_of(self, engine: type[EngineT]) -> EngineT:
         """The settings of the scenario's engine. Raises TypeError if it is of another kind."""
         if not isinstance(self.engine, engine):
             raise TypeError(f"the engine is !{type(self.engine).__name__}")
@@ -201,7 +210,7 @@ class Scenario(Section):
         is on this engine or there is no name, otherwise with default settings."""
         if name in (None, self.engine_name):
             return self
-        return self.with_changes({"engine": f"!{str(name).capitalize()}"})
+        return self.with_changes({"engine": {TAG: str(name).capitalize()}})
 
     def with_sections(self, **sections: Any) -> Self:
         """A copy with other sections. They are not checked."""
@@ -298,16 +307,14 @@ def _thesis() -> Scenario:
     return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
 
 
-_NONE = "none"
-"""Text of a value that a scenario does not have."""
-
-
 def _text(value: Any, *, exact: bool = False) -> str:
     """A value of a tree as text. Numbers have six digits unless `exact`."""
     if value is None:
-        return _NONE
+        return "none"
     text = json.dumps(written(value) if exact else written(value, plainest)).replace('"', "")
-    return text if exact else rounded_in_text(text)
+    if exact:
+        return text
+    return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
 
 
 def _differences_in_order(

@@ -10,7 +10,6 @@ from typing import Any
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.ntrt import ntrt_tree
-from tetra_drake.scenario.ntrt_assembly import MOST_BYTES
 from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
@@ -48,7 +47,7 @@ def names_scenario(name_or_file: str | Path) -> bool:
     if name in shipped_structures() or not os.path.isfile(name):
         return name in shipped_scenarios() and name not in shipped_structures()
     keys = [*keys_of(StructureFile), *keys_of(NtrtFile), *SCENARIO_KEYS]
-    content = read_mapping(Path(name), "structure file", keys=keys, most=MOST_BYTES)
+    content = read_mapping(Path(name), "structure file", keys=keys)
     return not SCENARIO_KEYS.isdisjoint(content)
 
 
@@ -91,7 +90,7 @@ def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
     """Content of a structure file or of a file of NTRT. `source` and `key` tell, in errors, where
     the `unit` of NTRT is missing."""
     keys = keys_of(StructureFile) | keys_of(NtrtFile)
-    content = read_mapping(file, "structure file", keys=keys, most=MOST_BYTES)
+    content = read_mapping(file, "structure file", keys=keys)
     if not KEYS_OF_NTRT & content.keys():
         return content
     if unit is None:

@@ -17,6 +17,9 @@ from tetra_drake.files import read_text
 from tetra_drake.settings.refusals import TAG
 from tetra_drake.settings.section import Tree
 
+LARGEST_YAML = 2**20
+"""Largest size of a file in bytes."""
+
 
 def parse_yaml(content: str, source: object) -> Any:
     """Content of a YAML text. Raises InputError if it is not YAML."""
@@ -34,13 +37,13 @@ def parse_yaml(content: str, source: object) -> Any:
         raise InputError(source, "", "is not YAML: it holds what YAML cannot") from error
 
 
-def read_mapping(file: Path, what: str, *, keys: Collection[str], most: int) -> Tree:
-    """Content of a YAML file: a mapping with some of `keys`, at most `most` bytes.
+def read_mapping(file: Path, what: str, *, keys: Collection[str]) -> Tree:
+    """Content of a YAML file: a mapping with some of `keys`.
 
     Raises InputError for another content. The file may be a private one, so the error does not show
     its content.
     """
-    content = parse_yaml(read_text(file, what, most=most), file)
+    content = parse_yaml(read_text(file, what, most=LARGEST_YAML), file)
     if not isinstance(content, dict):
         raise InputError(file, "", f"holds no mapping of keys, expected a {what}")
     if content.keys().isdisjoint(keys):

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import pydantic
-from pydantic import Field
+from pydantic import Field, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.settings.refusals import described, hint, refuse
 from tetra_drake.settings.units import plainest, quantity_to_si
-
-Info = core_schema.ValidationInfo
 
 
 class Quantity(float):
@@ -45,7 +43,7 @@ class Unit:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
     ) -> CoreSchema:
-        def read(value: Any, info: Info) -> Any:
+        def read(value: Any, info: ValidationInfo) -> Any:
             return _si_number(value, self.name, info)
 
         def write(number: float) -> Quantity:
@@ -62,7 +60,7 @@ Time = Annotated[float, Unit("s")]
 Speed = Annotated[float, Unit("m/s")]
 InverseSpeed = Annotated[float, Unit("s/m")]
 Acceleration = Annotated[float, Unit("m/s^2")]
-Force = Annotated[float, Unit("N")]
+ForceQuantity = Annotated[float, Unit("N")]
 Stiffness = Annotated[float, Unit("N/m")]
 Damping = Annotated[float, Unit("N*s/m")]
 DampingPerLength = Annotated[float, Unit("N*s/m^2")]
@@ -82,7 +80,7 @@ class UnitsByName:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
     ) -> CoreSchema:
-        def read(given: Any, info: Info) -> Any:
+        def read(given: Any, info: ValidationInfo) -> Any:
             if not isinstance(given, dict):
                 return given
             for name in given:
@@ -105,14 +103,14 @@ def _each(given: dict[str, Any], change: Callable[[Any, str], Any]) -> dict[str,
 
 
 def _converted(
-    schema: CoreSchema, read: Callable[[Any, Info], Any], write: Callable[[Any], Any]
+    schema: CoreSchema, read: Callable[[Any, ValidationInfo], Any], write: Callable[[Any], Any]
 ) -> CoreSchema:
     """A schema with functions that convert values before validation and when they are dumped."""
     serializer = core_schema.plain_serializer_function_ser_schema(write)
     return core_schema.with_info_before_validator_function(read, schema, serialization=serializer)
 
 
-def _si_number(value: Any, unit: str, info: Info, *, key: str = "") -> Any:
+def _si_number(value: Any, unit: str, info: ValidationInfo, *, key: str = "") -> Any:
     """The SI number of a quantity. Other values are returned as they are, for pydantic's errors.
 
     In a validation with a context (for a file), numbers without a unit are refused, except 0.

@@ -90,16 +90,19 @@ class Section(BaseModel):
         fields, values = keys_of(cls), {}
         for name, value in tree.items():
             if name != TAG and name not in fields:
-                refuse(str(name), f"unknown key; {cls._advice(str(name))}")
+                named = [f"'{key}'" for key in dict.fromkeys(_keys_named(str(name), cls))]
+                advice = f"did you mean {' or '.join(named)}?" if named else hint(name, fields)
+                refuse(str(name), f"unknown key; {advice}")
             if name != TAG:
                 values[name] = _with_mappings(python_value(value), fields[name].annotation)
         return values
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and other._compared() == self._compared()
+        # The order counts: it numbers the bodies and oscillators of a structure.
+        return type(other) is type(self) and [*other.values().items()] == [*self.values().items()]
 
     def __hash__(self) -> int:
-        return hash(self._compared())
+        return hash(_hashable(self.values()))
 
     def values(self) -> dict[str, Any]:
         """Values by dotted keys."""
@@ -110,16 +113,6 @@ class Section(BaseModel):
         """All lengths in m. A copy with disturbed numbers keeps them."""
         numbers = _quantities(self.model_dump())
         return tuple(float(number) for number in numbers if number.unit == "m")
-
-    def _compared(self) -> Any:
-        # The order counts: it numbers the bodies and oscillators of a structure.
-        return _hashable(self.values())
-
-    @classmethod
-    def _advice(cls, name: str) -> str:
-        """Advice about an unknown key: the same name in a section, or a similar key."""
-        keys = [f"'{key}'" for key in dict.fromkeys(_keys_named(name, cls))]
-        return f"did you mean {' or '.join(keys)}?" if keys else hint(name, keys_of(cls))
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
@@ -266,8 +259,8 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
     if error["type"] == "missing":
         return key, "is missing; give it"
     expected = error["msg"].removeprefix("Input should be ")
-    if error["type"] in _LIMITS:
-        words, name = _LIMITS[error["type"]]
+    if error["type"] in LIMIT_WORDS:
+        name, words, _ = LIMIT_WORDS[error["type"]]
         unit = unit_of(keys_of(section)[str(error["loc"][0])])
         if "length" in name:
             unit = f"items, not {len(value or ())}"
@@ -275,14 +268,15 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
     return key, f"found {described(value)}, expected {expected}"
 
 
-_LIMITS = {
-    "greater_than": ("more than", "gt"),
-    "greater_than_equal": ("at least", "ge"),
-    "less_than_equal": ("at most", "le"),
-    "too_short": ("at least", "min_length"),
-    "too_long": ("at most", "max_length"),
+LIMIT_WORDS = {
+    "greater_than": ("gt", "more than", "> {}"),
+    "greater_than_equal": ("ge", "at least", "≥ {}"),
+    "less_than_equal": ("le", "at most", "≤ {}"),
+    "too_short": ("min_length", "at least", "≥ {} items"),
+    "too_long": ("max_length", "at most", "≤ {} items"),
 }
-"""Words for limits, and pydantic's names of their numbers, by type of error."""
+"""Limits by pydantic's types of errors: pydantic's names of their numbers, words for them in
+errors, and their texts on the page of keys."""
 
 
 def joined(key: str, inner: str) -> str:

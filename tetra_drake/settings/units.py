@@ -96,19 +96,13 @@ def shown_in(name: str | None) -> Iterator[None]:
         _chosen.reset(token)
 
 
-def units_for(lengths: tuple[float, ...], unit: str | None) -> Units:
-    """The units of shown_in(); otherwise the units of a robot that is given in `unit`, or without
-    it, of a robot with these lengths (m)."""
-    return current(SYSTEMS[unit] if unit else _fitting(lengths))
-
-
 def current(own: Units) -> Units:
     """The units of shown_in(); otherwise `own`."""
     return _chosen.get() or own
 
 
 @functools.lru_cache(maxsize=1000)
-def _fitting(lengths: tuple[float, ...]) -> Units:
+def fitting(lengths: tuple[float, ...]) -> Units:
     """The units that need the fewest digits for the long ones among lengths (m); metric ones if the
     lengths are round in no unit, as in a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
@@ -180,11 +174,6 @@ def given_quantity(text: str, unit: str, source: object, key: str) -> float:
         return quantity_to_si(text, unit)
     except ValueError as error:
         raise InputError(source, key, str(error)) from error
-
-
-def rounded_in_text(text: str) -> str:
-    """Rounds all numbers with many decimals in a text to six digits."""
-    return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
 
 
 def plainest(number: float, unit: str) -> str:

@@ -35,7 +35,7 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import Adder
 
 from tetra_drake.errors import InputError, check_type
-from tetra_drake.scenario.blueprint import WORLD
+from tetra_drake.laws.model import WORLD
 
 
 class Nodes(NamedTuple):

@@ -14,7 +14,7 @@ from tetra_drake.visualization.scene import (
     ASPECT,
     COLOURS,
     FIELD_OF_VIEW,
-    MARGIN,
+    FLOOR_MARGIN,
     THICKEST,
     camera_position,
     drawn_radii,
@@ -64,7 +64,7 @@ def _floor(
 ) -> list[LineCollection]:
     """Lines of the floor around the robot, and the shadows of its struts."""
     least = robot.scenario.units.square
-    side = least * np.ceil(MARGIN * reach / _SQUARES[-1] / least)
+    side = least * np.ceil(FLOOR_MARGIN * reach / _SQUARES[-1] / least)
     x, y = side * (_SQUARES + np.round(p_WN.mean(axis=0)[:2, np.newaxis] / side))
     floor = np.zeros((y.size, x.size, 3))
     floor[..., :2] = np.stack(np.meshgrid(x, y), axis=-1)

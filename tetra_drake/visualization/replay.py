@@ -108,7 +108,11 @@ def replay_page(
     set_surroundings(meshcat, robot, p_WN, seen=p_WN[0])
     page, script = meshcat.StaticHtml(), ""
     if address:
-        page, script = _without_viewer(page, address=address)
+        parts = re.split(r"<script[^>]*>(.+?)</script>", page, maxsplit=1, flags=re.S)
+        before, script, after = parts
+        reader = render("visualization/viewer.html.jinja", address=address)
+        # Before the body, so that nothing of the body is shown if the file is missing.
+        page = (before + after).replace("</head>", f"{reader}</head>", 1)
     page = _with_overlay(page, title, film_of(robot, frames))
     return pack_page(page, title=title), script
 
@@ -262,14 +266,6 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
     return "</main></body>".join(page.rsplit("</body>", 1))
-
-
-def _without_viewer(page: str, *, address: str) -> tuple[str, str]:
-    """Splits Meshcat's page into a page that reads the script from `address`, and the script."""
-    before, script, after = re.split(r"<script[^>]*>(.+?)</script>", page, maxsplit=1, flags=re.S)
-    reader = render("visualization/viewer.html.jinja", address=address)
-    # The reader is before the body, so that nothing of the body is shown if the file is missing.
-    return (before + after).replace("</head>", f"{reader}</head>", 1), script
 
 
 def _write_once(path: Path, text: str) -> None:

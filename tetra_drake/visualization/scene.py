@@ -46,7 +46,7 @@ SLENDERNESS = 60.0
 THICKEST, THINNEST = 0.7, 0.15
 """Drawn radius of the cable with the highest tension, and least drawn radius of a cable, in radii
 of a strut."""
-MARGIN, UNEVEN_MARGIN = 4.5, 1.5
+FLOOR_MARGIN, UNEVEN_MARGIN = 4.5, 1.5
 """Margin of floor around the robot's path, in halves of the robot's length. Uneven ground has the
 smaller one, because it needs much space in a page."""
 MOST_POINTS = 5_000
@@ -193,13 +193,17 @@ def set_surroundings(
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
     """Adds the floor around `points` (..., 3). `reach` (m) is half of the robot's length."""
     ground, units = robot.ground, robot.scenario.units
-    corners = floor_corners(points, (MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
+    corners = floor_corners(points, (FLOOR_MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
     floor = floor_points(ground, corners, units)
     contacts = robot.structure.contacts
     sunk = drawn_radii(robot.structure)[1][contacts] - robot.structure.contact_radius[contacts]
     floor[..., 2] -= max(0.0, sunk.min())
     if ground.flat:
-        _add_slab(meshcat, floor, scale=robot.structure.scale)
+        thickness = 0.002 * robot.structure.scale
+        width, depth, _ = floor[-1, -1] - floor[0, 0]
+        middle = (floor[-1, -1] + floor[0, 0]) / 2 - [0.0, 0.0, thickness / 2]
+        meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
+        meshcat.SetTransform("/floor/slab", RigidTransform(middle))
     else:
         _add_relief(meshcat, floor, scale=robot.structure.scale)
     _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
@@ -290,15 +294,6 @@ def _rgb(name: str) -> np.ndarray:
 def _mixed(first: str, second: str, share: np.ndarray) -> np.ndarray:
     """Mixtures (..., 3) of two named colours. `share` (...) is the share of the second."""
     return _rgb(first) + share[..., np.newaxis] * (_rgb(second) - _rgb(first))
-
-
-def _add_slab(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
-    """Adds a slab; its top is the flat floor (rows, columns, 3), in m."""
-    thickness = 0.002 * scale
-    width, depth, _ = floor[-1, -1] - floor[0, 0]
-    middle = (floor[-1, -1] + floor[0, 0]) / 2
-    meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
-    meshcat.SetTransform("/floor/slab", RigidTransform(middle - [0.0, 0.0, thickness / 2]))
 
 
 def _add_relief(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:

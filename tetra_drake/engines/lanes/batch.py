@@ -69,7 +69,7 @@ class LaneBatch(Batch):
         }
         self._log, self._places = allocate(loop.Log, sizes), allocate(Places, sizes)
         tables = self._log, self._places, self._heights, self.readings
-        self._threads = [Lanes(first, *tables) for _ in range(min(threads, places))]
+        self._threads = [LaneThread(first, *tables) for _ in range(min(threads, places))]
         self._start_pool()
         self._begin_all(robots)
 
@@ -186,7 +186,9 @@ class LaneBatch(Batch):
         first, *others = self._threads
         for i, thread in enumerate(self._threads):
             thread.take(places[i :: len(self._threads)])
-        simulate = functools.partial(Lanes.simulate, wall_times=self._wall_times, briefly=briefly)
+        simulate = functools.partial(
+            LaneThread.simulate, wall_times=self._wall_times, briefly=briefly
+        )
         started = [self._pool.submit(simulate, thread) for thread in others]
         simulate(first)
         for other in started:
@@ -246,7 +248,7 @@ class LaneBatch(Batch):
         return failure
 
 
-class Lanes:
+class LaneThread:
     """Lanes of one thread, and its queue of robots that wait for a lane."""
 
     def __init__(

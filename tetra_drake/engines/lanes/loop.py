@@ -18,7 +18,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tetra_drake.engines.lanes.dynamics import Solver, accelerate
-from tetra_drake.engines.lanes.ros2 import Step, larger, take_step
+from tetra_drake.engines.lanes.ros2 import StepMemory, larger, take_step
 from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import (
@@ -39,8 +39,6 @@ from tetra_drake.laws.kinematics import interpolate_state
 from tetra_drake.laws.mode_change import time_to_mode_change
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.tally import Tally, observe
-
-Array = np.ndarray
 
 IDLE, RUNNING, DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(6)
 """Status of a lane. DONE: it has reached its pause."""
@@ -117,7 +115,7 @@ class LaneState(NamedTuple):
     tonic: Annotated[Table, "2 * signals"]
     """Inputs of the neurons without feedback."""
     tally: Tally
-    step: Step
+    step: StepMemory
     scratch: Annotated[Table, SCRATCH_ROWS]
     """Numbers that are computed for all lanes and then read lane by lane."""
     forces: Forces
@@ -481,7 +479,7 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
 
 
 @inlined
-def column(table: Table, lane: int) -> Array:
+def column(table: Table, lane: int) -> np.ndarray:
     """Copy of one lane of a table (size, W)."""
     copy = np.empty(table.shape[0])
     for k in range(copy.size):

@@ -51,13 +51,13 @@ class Memory(NamedTuple):
     constants: Table
 
 
-Parts: TypeAlias = Packed[tuple[Constants, LaneState, Log, Memory, Places, Readings, bool]]
+LaneParts: TypeAlias = Packed[tuple[Constants, LaneState, Log, Memory, Places, Readings, bool]]
 """The simulations, packed for kernels that Python calls often. The last part is True if the network
 is live."""
 
 
 @functools.partial(compiled, nogil=True)
-def advance(parts: Parts, rounds: int) -> None:
+def advance(parts: LaneParts, rounds: int) -> None:
     """Simulates until a robot has ended and no robot waits, at most `rounds`. A robot has ended at
     its pause, or failed. The last round is cut short if no robot is left.
 
@@ -98,7 +98,7 @@ def measure_clearance(constants: Constants, lanes: LaneState) -> None:
 
 
 @functools.partial(compiled, nogil=True)
-def exchange(parts: Parts) -> None:
+def exchange(parts: LaneParts) -> None:
     """Puts robots that have ended back to their places, and robots that wait in idle lanes."""
     constants, lanes, log, memory, places, _, _ = unpacked(parts)
     clock, queue = by_lane(lanes.clock), places.queue

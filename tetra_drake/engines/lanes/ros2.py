@@ -50,12 +50,12 @@ from tetra_drake.laws.forces import Forces, compute_forces, move_robot
 from tetra_drake.laws.inertia import INERTIA_COLUMNS
 from tetra_drake.laws.kinematics import P_BN_W, move_bodies
 from tetra_drake.laws.model import Model
-from tetra_drake.laws.vectors import Vector, cross, vector_at
+from tetra_drake.laws.vectors import Vector3, cross, vector_at
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
-class Step(NamedTuple):
+class StepMemory(NamedTuple):
     """Memory of a step from `state` to `end` (13 bodies,)."""
 
     state: Annotated[Table, "13 * bodies"]
@@ -85,7 +85,7 @@ class Step(NamedTuple):
 def take_step(
     robot: Model,
     solver: dynamics.Solver,
-    work: Step,
+    work: StepMemory,
     modes: Table,
     forces: Forces,
     signals: Table,
@@ -145,7 +145,7 @@ def take_step(
 
 @inlined
 def compute_end_forces(
-    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, write_parts: bool
+    robot: Model, work: StepMemory, modes: Table, forces: Forces, signals: Table, write_parts: bool
 ) -> None:
     """Writes work.end_force: the forces at work.end. Torques are converted to the mass matrix at
     the beginning of the step."""
@@ -184,7 +184,7 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
 
 
 @inlined
-def motion_at(nodes: Table, row: int, turn: Vector) -> Real:
+def motion_at(nodes: Table, row: int, turn: Vector3) -> Real:
     """Largest component of the motion of a row of `nodes` as its body turns."""
     x, y, z = cross(turn, vector_at(nodes, row, P_BN_W))
     return larger(larger(abs(x), abs(y)), abs(z))

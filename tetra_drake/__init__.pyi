@@ -1,0 +1,24 @@
+"""Names of the package, with their modules: for type checkers, and for __getattr__()."""
+
+from tetra_drake.analysis.comparison import compare as compare
+from tetra_drake.analysis.equilibrium import study_equilibrium as study_equilibrium
+from tetra_drake.analysis.measurements import MotionCapture as MotionCapture
+from tetra_drake.analysis.measurements import Rest as Rest
+from tetra_drake.analysis.robustness import robustness as robustness
+from tetra_drake.analysis.sweep import sweep as sweep
+from tetra_drake.engines.preparation import prepare as prepare
+from tetra_drake.engines.simulate import simulate as simulate
+from tetra_drake.engines.simulate import simulate_many as simulate_many
+from tetra_drake.engines.simulation import Simulation as Simulation
+from tetra_drake.evolution.run import load_run as load_run
+from tetra_drake.experiment import evolve as evolve
+from tetra_drake.experiment import fit as fit
+from tetra_drake.prototype.command_file import load_command as load_command
+from tetra_drake.prototype.export import export as export
+from tetra_drake.report.result_folder import load_result as load_result
+from tetra_drake.robot.gait import ParameterSpace as ParameterSpace
+from tetra_drake.robot.gait import load_gait as load_gait
+from tetra_drake.robot.gait import seeded_gait as seeded_gait
+from tetra_drake.scenario.load import load_scenario as load_scenario
+
+__version__: str
