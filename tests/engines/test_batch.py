@@ -5,7 +5,6 @@ import pytest
 import xarray
 from helpers.converged import shortly
 
-from tetra_drake.engines.batch import Batch
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.errors import Diverged
@@ -14,7 +13,6 @@ from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.scenario import Scenario
 
-PAUSES = [0.06, 0.13]
 ENGINES = {
     # Engine, and largest difference (m) of a copy: its integrator begins anew.
     "compiled": ("!Compiled", 0.0),
@@ -88,26 +86,22 @@ def test_a_place_is_used_again_and_a_failure_stays_in_its_place(scenario_and_err
     assert batch.result(0).metrics.distance == expected == batch.result(1).metrics.distance
 
 
-def test_a_pause_changes_a_motion_by_no_more_than_a_step_does(scenario_and_error):
+def test_a_pause_changes_a_motion_by_no_more_than_a_step_does(scenario_and_error, refused):
     scenario, _ = scenario_and_error
-    whole, paused = (engine_of(scenario).start([walking(scenario)]) for _ in range(2))
+    whole, paused = (engine_of(scenario).start([walking(scenario)], places=2) for _ in range(2))
     whole.advance()
-    for until in (*PAUSES, PAUSES[-1], 0.1, np.inf):  # a time that has passed does nothing
-        paused.advance(until)
+    for until, reached in ((0.06, 0.06), (0.13, 0.13), (0.1, 0.13)):
+        paused.advance([until, np.inf])
+        assert paused.readings.time.tolist() == pytest.approx([reached, 0.0])
+    for place in (0, 1):
+        with refused("Batch", f"place {place}", ""):
+            paused.result(place)
+    paused.advance()
     np.testing.assert_allclose(paused.readings.p_WN, whole.readings.p_WN, rtol=0.0, atol=2e-4)
 
 
-def readings_at_pauses(batch: Batch) -> list[np.ndarray]:
-    """Times of all robots at pauses."""
-    times = []
-    for until in PAUSES:
-        batch.advance(until)
-        times.append(batch.readings.time.copy())
-    return times
-
-
-def test_all_robots_pause_at_the_same_times(scenario_and_error):
+@pytest.mark.parametrize("wrong", [{"until": [0.1]}, {"signals": np.zeros((2, 7))}])
+def test_arguments_of_another_shape_are_refused(scenario_and_error, refused, wrong):
     scenario, _ = scenario_and_error
-    batch = engine_of(scenario).start([walking(scenario)] * 3, places=5)
-    for until, times in zip(PAUSES, readings_at_pauses(batch), strict=True):
-        assert times.tolist() == pytest.approx([until] * 3 + [0.0] * 2)
+    with refused("Batch", next(iter(wrong)), "shape"):
+        engine_of(scenario).start([held(scenario)] * 2).advance(**wrong)

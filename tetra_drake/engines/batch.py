@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
@@ -34,6 +35,8 @@ class Batch:
     """Readings of all robots at their last pause. At the start only the times are set."""
     failures: list[SimulationFailure | None]
     """Failure of the robot in each place; None if it has not failed."""
+    signals: int
+    """Number m of signals of each robot."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
         """Puts robots in the first places. Raises InputError if one does not fit."""
@@ -52,8 +55,8 @@ class Batch:
 
     def advance(
         self,
-        until: np.ndarray | float = math.inf,
-        signals: np.ndarray | None = None,
+        until: npt.ArrayLike = math.inf,
+        signals: npt.ArrayLike | None = None,
         *,
         briefly: bool = False,
     ) -> None:
@@ -65,10 +68,25 @@ class Batch:
             until: times (s), for each place (N,) or for all. A robot that is not before its time
                 pauses.
             signals: signals (N, m) in N that controllers hold from now on. A change takes one
-                `cpg.listing_step`.
+                `cpg.listing_step`. Signals of robots that pause may be anything.
             briefly: returns earlier: as soon as a robot has ended, or after some 30 ms. An engine
-                without lanes simulates at least one robot to its end.
+                without lanes simulates at least one robot to its time.
+
+        Raises:
+            InputError: if an argument has another shape.
         """
+        places, size = len(self.failures), self.signals
+        times = np.asarray(until, dtype=float)
+        if times.shape not in ((), (places,)):
+            problem = f"found the shape {times.shape}, expected a time for all, or {places}"
+            raise InputError("Batch", "until", problem)
+        held = None if signals is None else np.asarray(signals, dtype=float)
+        if held is not None and held.shape != (places, size):
+            problem = f"found the shape {held.shape}, expected {(places, size)}"
+            raise InputError("Batch", "signals", problem)
+        self._advance(np.broadcast_to(times, places), held, briefly)
+
+    def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         raise NotImplementedError
 
     def ended(self, place: int) -> bool:
@@ -77,7 +95,14 @@ class Batch:
 
     def result(self, place: int) -> SimulationResult:
         """The result of the robot in a place, at the end of its simulation. Raises its failure if
-        it failed."""
+        it failed, and InputError if it has not ended."""
+        if failure := self.failures[place]:
+            raise failure
+        if not self.ended(place):
+            raise InputError("Batch", f"place {place}", "has no robot that has reached its end")
+        return self._result(place)
+
+    def _result(self, place: int) -> SimulationResult:
         raise NotImplementedError
 
     def copy(self, place: int, to: int) -> None:
@@ -119,7 +144,7 @@ class SerialBatch(Batch):
     ) -> None:
         """Robots in the first of the places. `start` puts a robot at its start."""
         self.readings = Readings.empty(robots[0].robot.structure, places)
-        self.failures = [None] * places
+        self.failures, self.signals = [None] * places, robots[0].robot.structure.signals
         self._start = start
         self._robots: list[LoneRobot | None] = [None] * places
         self._reached, self._ends = np.zeros(places), np.zeros(places)
@@ -131,13 +156,7 @@ class SerialBatch(Batch):
         self._reached[place], self._ends[place] = 0.0, robot.robot.scenario.simulation.duration
         return True
 
-    def advance(
-        self,
-        until: np.ndarray | float = math.inf,
-        signals: np.ndarray | None = None,
-        *,
-        briefly: bool = False,
-    ) -> None:
+    def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         until = np.minimum(until, self._ends)
         for place in np.flatnonzero(until > self._reached).tolist():
             robot = self._robots[place]
@@ -155,11 +174,10 @@ class SerialBatch(Batch):
                 self._reached[place] = until[place]
 
     def ended(self, place: int) -> bool:
-        return self.failures[place] is not None or self._reached[place] >= self._ends[place]
+        is_over = self.failures[place] is not None or self._reached[place] >= self._ends[place]
+        return bool(is_over) and self._robots[place] is not None
 
-    def result(self, place: int) -> SimulationResult:
-        if failure := self.failures[place]:
-            raise failure
+    def _result(self, place: int) -> SimulationResult:
         robot = self._robots[place]
         assert robot is not None
         return robot.result()

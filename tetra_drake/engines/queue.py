@@ -1,4 +1,4 @@
-"""Queue of simulations: threads, each of which keeps a batch full until the queue is empty."""
+"""Queue of simulations: several threads work it off, each with a batch that it keeps full."""
 
 from __future__ import annotations
 

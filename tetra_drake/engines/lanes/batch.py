@@ -54,7 +54,7 @@ class LaneBatch(Batch):
         """Robots in the first of the places. Compiles the kernel if necessary."""
         first = self._first = Prepared.of(robots[0], record=record)
         self.readings = Readings.empty(first.robot.structure, places)
-        self.failures = [None] * places
+        self.failures, self.signals = [None] * places, first.robot.structure.signals
         self._prepared: list[Prepared | None] = [None] * places
         self._ends, self._wall_times, self._tried = np.zeros((3, places))
         self._heights = np.zeros((places, first.robot.ground.heights.size))
@@ -156,13 +156,7 @@ class LaneBatch(Batch):
         self._places.constants[to, self._first_height] = to * self._heights.shape[1]
         self._prepared[to], self.failures[to] = self._prepared[place], self.failures[place]
 
-    def advance(
-        self,
-        until: np.ndarray | float = math.inf,
-        signals: np.ndarray | None = None,
-        *,
-        briefly: bool = False,
-    ) -> None:
+    def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         places, log = self._places, self._log
         log.until[:] = np.minimum(until, self._ends)
         goes = (self._status == loop.DONE) & (self._times < log.until)
@@ -199,9 +193,7 @@ class LaneBatch(Batch):
             return bool(self._times[place] >= self._ends[place])
         return bool(self._status[place] > loop.DONE)
 
-    def result(self, place: int) -> SimulationResult:
-        if failure := self.failures[place]:
-            raise failure
+    def _result(self, place: int) -> SimulationResult:
         prepared, state = self._prepared[place], self._places.states[place].copy()
         assert prepared is not None
         return make_result(
