@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
@@ -68,23 +69,20 @@ class Batch:
             until: times (s), for each place (N,) or for all. A robot that is not before its time
                 pauses.
             signals: signals (N, m) in N that controllers hold from now on. A change takes one
-                `cpg.listing_step`. Signals of robots that pause may be anything.
+                `cpg.listing_step`. Those of robots that pause, or have a gait or a command, may be
+                anything.
             briefly: returns earlier: as soon as a robot has ended, or after some 30 ms. An engine
                 without lanes simulates at least one robot to its time.
 
         Raises:
             InputError: if an argument has another shape.
         """
-        places, size = len(self.failures), self.signals
-        times = np.asarray(until, dtype=float)
-        if times.shape not in ((), (places,)):
-            problem = f"found the shape {times.shape}, expected a time for all, or {places}"
-            raise InputError("Batch", "until", problem)
-        held = None if signals is None else np.asarray(signals, dtype=float)
-        if held is not None and held.shape != (places, size):
-            problem = f"found the shape {held.shape}, expected {(places, size)}"
-            raise InputError("Batch", "signals", problem)
-        self._advance(np.broadcast_to(times, places), held, briefly)
+        places = len(self.failures)
+        times = checked_numbers(until, (), (places,), source="Batch", key="until")
+        if signals is not None:
+            shape = places, self.signals
+            signals = checked_numbers(signals, shape, source="Batch", key="signals")
+        self._advance(np.broadcast_to(times, places), signals, briefly)
 
     def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         raise NotImplementedError
@@ -118,6 +116,7 @@ class Batch:
 class LoneRobot(Protocol):
     """A robot that an engine without lanes simulates."""
 
+    driven: DrivenRobot
     wall_time: float
 
     def hold(self, signals: np.ndarray) -> None:
@@ -145,12 +144,14 @@ class SerialBatch(Batch):
         """Robots in the first of the places. `start` puts a robot at its start."""
         self.readings = Readings.empty(robots[0].robot.structure, places)
         self.failures, self.signals = [None] * places, robots[0].robot.structure.signals
-        self._start = start
+        self._start, self._sizes = start, _sizes(robots[0])
         self._robots: list[LoneRobot | None] = [None] * places
         self._reached, self._ends = np.zeros(places), np.zeros(places)
         self._begin_all(robots)
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
+        if _sizes(robot) != self._sizes:
+            return False
         self._robots[place] = self._start(robot)
         self.failures[place], self.readings.time[place] = None, 0.0
         self._reached[place], self._ends[place] = 0.0, robot.robot.scenario.simulation.duration
@@ -162,7 +163,7 @@ class SerialBatch(Batch):
             robot = self._robots[place]
             if robot is None or self.failures[place] is not None:
                 continue
-            if signals is not None:
+            if signals is not None and robot.driven.is_controlled:
                 robot.hold(signals[place])
             try:
                 robot.advance_to(float(until[place]))
@@ -192,3 +193,26 @@ class SerialBatch(Batch):
     def stop(self, place: int) -> float:
         robot, self._robots[place] = self._robots[place], None
         return 0.0 if robot is None else robot.wall_time
+
+
+def checked_numbers(
+    given: npt.ArrayLike, *shapes: tuple[int, ...], source: str, key: str
+) -> np.ndarray:
+    """Real numbers of one of these shapes, as floats. Raises InputError, naming source and key, for
+    anything else."""
+    found = ""
+    with contextlib.suppress(TypeError, ValueError):
+        numbers = np.asarray(given)
+        if numbers.dtype.kind in "iuf" and not np.ma.is_masked(given):
+            if numbers.shape in shapes:
+                return numbers.astype(float)
+            found = f"the shape {numbers.shape}"
+    problem = f"found {found or repr(given):.60}, expected real numbers of shape {shapes[0]}"
+    raise InputError(source, key, problem)
+
+
+def _sizes(robot: DrivenRobot) -> tuple[int, ...]:
+    """Sizes of a robot's signals and readings."""
+    structure = robot.robot.structure
+    contacts, nodes = len(structure.contacts), len(structure.node_names)
+    return structure.signals, len(structure.cables), contacts, len(structure.bodies), nodes

@@ -68,7 +68,7 @@ class _DiagramRobot(LoneRobot):
     """A robot in a diagram of its own. Given signals are held by a system in place of a network."""
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
-        self._driven, self._record, self._viewer = driven, record, viewer
+        self.driven, self._record, self._viewer = driven, record, viewer
         robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
         if isinstance(driven, DrivenByGait):
             diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
@@ -116,7 +116,7 @@ class _DiagramRobot(LoneRobot):
     def hold(self, signals: np.ndarray) -> None:
         context = self._simulator.get_mutable_context()
         if (signals != self._held).any():
-            end = context.get_time() + self._driven.robot.scenario.cpg.listing_step
+            end = context.get_time() + self.driven.robot.scenario.cpg.listing_step
             self._change_end = round(end, MARK_DECIMALS)
         self._held = signals.copy()
         holder = self._diagram.GetSubsystemByName("controller")
@@ -131,7 +131,7 @@ class _DiagramRobot(LoneRobot):
             return np.reshape(numbers, (-1, columns))
 
         return Readings.of(
-            self._driven.robot.structure,
+            self.driven.robot.structure,
             time=context.get_time(),
             state=self._state.Eval(context),
             cable_forces=table("cables", "cable_forces", CABLE_FORCE_COLUMNS),
@@ -139,7 +139,7 @@ class _DiagramRobot(LoneRobot):
         )
 
     def copied(self) -> _DiagramRobot:
-        copy = _DiagramRobot(self._driven, record=self._record, viewer=self._viewer)
+        copy = _DiagramRobot(self.driven, record=self._record, viewer=self._viewer)
         copy._marks, copy._change_end = self._marks.copy(), self._change_end
         copy._held, copy.wall_time = self._held, self.wall_time
         copy._work.follow(self._work)
@@ -156,7 +156,7 @@ class _DiagramRobot(LoneRobot):
     def result(self) -> SimulationResult:
         accuracy = self._simulator.get_integrator().get_target_accuracy()
         return make_result(
-            self._driven,
+            self.driven,
             self._sampler.motion(),
             totals=self._observer.totals(),
             work=self._work.total(self._engine.scheme, accuracy),
@@ -167,14 +167,14 @@ class _DiagramRobot(LoneRobot):
     def _after_step(self, context: Context) -> None:
         # Nothing here may change the simulation, whether it is recorded or watched or not.
         check_time()
-        robot, viewer = self._driven.robot, self._viewer
+        robot, viewer = self.driven.robot, self._viewer
         bodies, now = self._state.Eval(context), context.get_time()
         velocities = bodies[7 * len(robot.structure.bodies) :]
         self._check(now, velocities)
         self._aimer.aim(context, velocities)
         self._sampler.after_step(context)
         signals, drives = [self._signals.Eval(context)], self._drives_at(context)
-        if now == self._driven.start_up and self._diagram.HasSubsystemNamed("cpg"):
+        if now == self.driven.start_up and self._diagram.HasSubsystemNamed("cpg"):
             # The event that lets signals act is after this step.
             cpg = self._diagram.GetSubsystemByName("cpg")
             signals.append(cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context)))
@@ -188,7 +188,7 @@ class _DiagramRobot(LoneRobot):
         """Raises Diverged, if a body is beyond the speed limit, or StepBudgetExceeded."""
         speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
         used = self._work.derivative_evaluations()
-        budget = self._driven.robot.scenario.simulation.max_evaluations
+        budget = self.driven.robot.scenario.simulation.max_evaluations
         if not speed <= self._speed_limit:
             raise Diverged.too_fast(time=now, limit=self._speed_limit)
         if used > budget:

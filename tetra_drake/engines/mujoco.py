@@ -247,7 +247,7 @@ class _MujocoRobot(LoneRobot):
     def __init__(self, driven: DrivenRobot, *, record: bool) -> None:
         """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
         long."""
-        self._driven, self._record, robot = driven, record, driven.robot
+        self.driven, self._record, robot = driven, record, driven.robot
         settings, self.step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
         self.steps = max(1, round(settings.duration / self.step))
         if self.steps > settings.max_evaluations:
@@ -272,7 +272,7 @@ class _MujocoRobot(LoneRobot):
         self._began = self._paused = 0.0
 
     def copied(self) -> _MujocoRobot:
-        copy = _MujocoRobot(self._driven, record=self._record)
+        copy = _MujocoRobot(self.driven, record=self._record)
         observer = copy._observer
         observer.follow(self._observer)
         own = {name: value.copy() for name, value in vars(self).items() if isinstance(value, Array)}
@@ -292,8 +292,8 @@ class _MujocoRobot(LoneRobot):
     def _signals_at(self, times: Array) -> Array:
         """Signals (times, m) in N at times (s) after the latest pause."""
         if not self._is_held:
-            return self._driven.signals_at(times)
-        change = self._driven.robot.scenario.cpg.listing_step
+            return self.driven.signals_at(times)
+        change = self.driven.robot.scenario.cpg.listing_step
         left = 1.0 - np.clip((times - self._began) / change, 0.0, 1.0)[:, np.newaxis]
         return self._held - left * (self._held - self._before)
 
@@ -335,7 +335,7 @@ class _MujocoRobot(LoneRobot):
         )
         assert moment.ground_forces is not None
         return readings_at(
-            self._driven.robot,
+            self.driven.robot,
             time=float(now[0]),
             state=moment.states[0],
             modes=moment.modes[0],
@@ -345,9 +345,9 @@ class _MujocoRobot(LoneRobot):
         )
 
     def result(self) -> SimulationResult:
-        robot = self._driven.robot
+        robot = self.driven.robot
         return make_result(
-            self._driven,
+            self.driven,
             self._simulator.motion(self.times, self._kept, self.signals, self._drives_kept),
             totals=self._observer.totals(),
             work=IntegratorWork(

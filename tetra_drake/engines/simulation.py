@@ -12,7 +12,7 @@ from typing import Any, NoReturn, TypeGuard
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.engines.batch import Batch, Viewer
+from tetra_drake.engines.batch import Batch, Viewer, checked_numbers
 from tetra_drake.engines.engine import check_can_be_watched, engine_of
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
@@ -311,15 +311,7 @@ def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: s
     """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, naming
     `source`, if they have another shape, or are not real numbers."""
     least = shape[1:] if shape[0] == 1 else shape
-    found = ""
-    with contextlib.suppress(TypeError, ValueError):
-        given = np.asarray(actions)
-        if given.dtype.kind in "iuf" and not np.ma.is_masked(actions):
-            if given.shape in (shape, least):
-                return given.astype(float).reshape(shape)
-            found = f"the shape {given.shape}"
-    problem = f"found {found or repr(actions):.60}, expected real numbers of shape {least}"
-    raise InputError(source, "actions", problem)
+    return checked_numbers(actions, least, shape, source=source, key="actions").reshape(shape)
 
 
 def simulate_controlled(

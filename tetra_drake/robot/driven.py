@@ -32,7 +32,7 @@ class DrivenRobot:
     """Name of the source of the signals."""
     samples: np.ndarray
     """Given signals (k, m) in N at multiples of `cpg.listing_step`, linear in between. The last
-    ones are held."""
+    ones are held. A controller gives the first ones, a command at least two."""
     gait: Gait | None = None
 
     @property
@@ -44,6 +44,11 @@ class DrivenRobot:
     def steady_start(self) -> float:
         """Start (s) of the steady stretch. Mean values are over this stretch."""
         return max(self.robot.scenario.simulation.settling_time, self.start_up)
+
+    @property
+    def is_controlled(self) -> bool:
+        """True if a controller gives further signals."""
+        return len(self.samples) == 1
 
     @property
     def sample_count(self) -> int:

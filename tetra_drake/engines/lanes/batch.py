@@ -57,6 +57,7 @@ class LaneBatch(Batch):
         self.failures, self.signals = [None] * places, first.robot.structure.signals
         self._prepared: list[Prepared | None] = [None] * places
         self._ends, self._wall_times, self._tried = np.zeros((3, places))
+        self._controlled = np.zeros(places, dtype=bool)
         self._heights = np.zeros((places, first.robot.ground.heights.size))
         state, constants = numbered(first.start), numbered(first.constants)
         self._tally = int(state.tally.begins[0])
@@ -136,6 +137,7 @@ class LaneBatch(Batch):
         self._prepared[place], self._ends[place] = prepared, marks[-1]
         self.failures[place], self.readings.time[place] = None, 0.0
         self._wall_times[place] = self._tried[place] = 0.0
+        self._controlled[place] = prepared.driven.is_controlled
 
     def stop(self, place: int) -> float:
         for thread in self._threads:
@@ -151,6 +153,7 @@ class LaneBatch(Batch):
         tables += [self._places.states, self._places.constants]
         tables += [self._places.signals, self._places.holds]
         tables += [self._heights, self._ends, self._wall_times, self._tried, *self.readings]
+        tables.append(self._controlled)
         for table in tables:
             table[to] = table[place]
         self._places.constants[to, self._first_height] = to * self._heights.shape[1]
@@ -162,9 +165,10 @@ class LaneBatch(Batch):
         goes = (self._status == loop.DONE) & (self._times < log.until)
         if signals is not None:
             period = self._first.constants.period
-            changes = goes & (signals != places.signals).any(axis=1)
+            holds = goes & self._controlled
+            changes = holds & (signals != places.signals).any(axis=1)
             log.change_ends[changes] = (self._times[changes] + period).round(MARK_DECIMALS)
-            places.signals[goes], places.holds[goes] = signals[goes], 1
+            places.signals[holds], places.holds[holds] = signals[holds], 1
         self._status[goes] = loop.RUNNING
         work = places.states[:, loop.TRIED] - self._tried
         self._tried += work
