@@ -138,10 +138,9 @@ def felt(robot: Robot, gains: list[float], *, longer: float = 1.0, pushes: float
     p_WN = node_positions(structure, state)
     along = p_WN[structure.cables["node_a"]] - p_WN[structure.cables["node_b"]]
     forces, feedback = Forces.of(robot.model), np.empty(2 * structure.signals)
-    cable_forces, ground_forces = forces.cable_forces, forces.ground_forces
-    cable_forces[:, LENGTH] = longer * np.linalg.norm(along, axis=1)
-    ground_forces[:, NORMAL] = pushes * (p_WN[structure.contacts, 2] < 0.02)
-    sense(robot.senses, np.array(gains), state, cable_forces, ground_forces, feedback)
+    forces.cable_forces[:, LENGTH] = longer * np.linalg.norm(along, axis=1)
+    forces.ground_forces[:, NORMAL] = pushes * (p_WN[structure.contacts, 2] < 0.02)
+    sense(robot.senses, np.array(gains), state, np.zeros((0, MODE_COLUMNS)), forces, feedback)
     return feedback.reshape(-1, 2)
 
 

@@ -63,8 +63,8 @@ def check_mjcf(scenario: Scenario) -> None:
 
 
 def make_mjcf(robot: Robot, *, rest: Array | None = None, own_laws: bool = False) -> str:
-    """Model of a robot with a tendon for each cable and a motor for each driven one. If the
-    actuators have drives, tendons have no law, and a motor for each cable exerts its tension. With
+    """Model of a robot with a tendon for each cable and a motor for each driven one. If actuators
+    bear the whole tension, tendons have no law, and a motor for each cable exerts its tension. With
     `own_laws`, this is so wherever is_pulled() is true, and struts pass through each other: the
     engine computes tensions and contacts by its own laws.
 
@@ -75,7 +75,7 @@ def make_mjcf(robot: Robot, *, rest: Array | None = None, own_laws: bool = False
     scenario = robot.scenario
     check_mjcf(scenario)
     model = Element("mujoco", model=scenario.name)
-    pulled = is_pulled(robot) if own_laws else has_drive(robot.model.actuator)
+    pulled = is_pulled(robot) if own_laws else not scenario.actuation.keeps_spring
     integrator, step = integrator_of(robot, pulled=pulled), scenario.settings_of(Mujoco).step
     steps = {"integrator": integrator, "timestep": step}
     add_element(model, "compiler", inertiafromgeom="false")
@@ -112,7 +112,8 @@ def is_pulled(robot: Robot) -> bool:
 def loose_remark(robot: Robot) -> str:
     """What tendons do otherwise than the robot's cables, if these are damped and can go slack."""
     damped = np.flatnonzero(robot.structure.cables["damping"])
-    if has_drive(robot.model.actuator) or not (robot.structure.slack and damped.size):
+    keeps_spring = robot.scenario.actuation.keeps_spring
+    if not (keeps_spring and robot.structure.slack and damped.size):
         return ""
     names = [robot.structure.cable_names[i] for i in damped[:3].tolist()]
     some = ", ".join(names) + (f" and {damped.size - 3} more" if damped.size > 3 else "")

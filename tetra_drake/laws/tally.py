@@ -12,7 +12,8 @@ from typing import Annotated, NamedTuple, Self
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, minimum, select
-from tetra_drake.laws import actuator, cable
+from tetra_drake.laws import cable
+from tetra_drake.laws.actuator import exertion
 from tetra_drake.laws.clearance import least_strut_distance
 from tetra_drake.laws.contact import NORMAL
 from tetra_drake.laws.forces import Forces, sizes_of
@@ -44,22 +45,21 @@ class Effort(NamedTuple):
     peaks are over all steps."""
 
     left: Annotated[Table, "cables"]
-    """Length (m) of each driven cable at the latest step; its free length if a winch winds it."""
+    """Exertion.left of each driven cable at the latest step, in m."""
     peak_force: Annotated[Table, 1]
-    """Largest tension of a driven cable, in N."""
+    """Largest load of an actuator, in N; see actuator.Exertion."""
     peak_speed: Annotated[Table, 1]
     """Largest speed of an actuator in either direction, in m/s."""
     peak_power: Annotated[Table, 1]
     """Largest power of an actuator, in W."""
     impulse: Annotated[Table, 1]
-    """Integral of the tension, in N s."""
+    """Integral of the load, in N s."""
     wound: Annotated[Table, 1]
     """Length of cable wound and paid out, in m."""
     pulled: Annotated[Table, 1]
-    """Integral of the positive power of the tension, in J."""
+    """Integral of the positive power of the load, in J."""
     work: Annotated[Table, 1]
-    """Integral of max(0, -S dl/dt), in J. S is the signal, or the tension if actuators have
-    drives."""
+    """Integral of the positive power of Exertion.pull, in J."""
     limited: Annotated[Table, 1]
     """Time at a limit of an actuator, in s."""
 
@@ -68,40 +68,29 @@ class Effort(NamedTuple):
 def add_to_effort(effort: Effort, step: Step) -> None:
     """Adds a step."""
     signal, cable_forces = step.robot.cables.signal, step.forces.cable_forces
+    drives = step.forces.drives
     per_time, work = select(step.takes_time, 1.0 / step.duration, 0.0), 0.0 * step.duration
     drive = 0
     for i in range(effort.left.size):
         if signal[i] == cable.PASSIVE:
             continue
-        tension = cable_forces[i, cable.TENSION]
-        pull, left, limited = winding(step, i, drive)
+        tension, length = cable_forces[i, cable.TENSION], cable_forces[i, cable.LENGTH]
+        mean_signal = 0.5 * (step.signals_before[signal[i]] + step.signals[signal[i]])
+        own = exertion(step.robot.actuator, drives, drive, tension, length, mean_signal)
         drive += 1
-        wound = select(step.takes_time, effort.left[i] - left, 0.0)
-        effort.left[i] = left
+        wound = select(step.takes_time, effort.left[i] - own.left, 0.0)
+        effort.left[i] = own.left
         speed = wound * per_time
-        effort.peak_force[0] = maximum(effort.peak_force[0], tension)
+        effort.peak_force[0] = maximum(effort.peak_force[0], own.load)
         effort.peak_speed[0] = maximum(effort.peak_speed[0], abs(speed))
-        effort.peak_power[0] = maximum(effort.peak_power[0], tension * speed)
+        effort.peak_power[0] = maximum(effort.peak_power[0], own.load * speed)
         wound = select(step.counts, wound, 0.0)
-        work += maximum(pull * wound, 0.0)
-        effort.impulse[0] += step.counted * tension
+        work += maximum(own.pull * wound, 0.0)
+        effort.impulse[0] += step.counted * own.load
         effort.wound[0] += abs(wound)
-        effort.pulled[0] += maximum(tension * wound, 0.0)
-        effort.limited[0] += step.counted * limited
+        effort.pulled[0] += maximum(own.load * wound, 0.0)
+        effort.limited[0] += step.counted * own.limited
     effort.work[0] += work
-
-
-@inlined
-def winding(step: Step, i: int, drive: int) -> tuple[Real, Real, Real]:
-    """Actuator of cable `i`: the force (N) for its work, the length (m) for Effort.left, and 1 if a
-    limit binds, otherwise 0."""
-    length, of_robot = step.forces.cable_forces[i, cable.LENGTH], step.robot.actuator
-    if not actuator.has_drive(of_robot):
-        k = step.robot.cables.signal[i]
-        return 0.5 * (step.signals_before[k] + step.signals[k]), length, 0.0 * length
-    drives, tension = step.forces.drives, step.forces.cable_forces[i, cable.TENSION]
-    left = actuator.wound(of_robot, drives[drive, actuator.DRIVE], length)
-    return tension, left, drives[drive, actuator.LIMITED]
 
 
 class Roughness(NamedTuple):

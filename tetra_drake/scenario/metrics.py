@@ -243,12 +243,13 @@ class Metrics:
         most=True,
         is_cost=True,
     )
-    """Greatest tension of a driven cable at any time. It exceeds the `max_force` of a winch while
+    """Greatest load of an actuator at any time: the tension of its cable, without what the cable's
+    own spring exerts beside an actuator with limits. It exceeds the `max_force` of a winch while
     the robot stretches the cable faster than the stalled winch pays out."""
     mean_actuator_force: float = _metric(
         "N", "of all driven cables", lambda walk: walk.mean("impulse"), is_cost=True
     )
-    """Mean tension of the driven cables in the steady stretch."""
+    """Mean load of the actuators in the steady stretch."""
     peak_actuator_speed: float = _metric(
         "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True, is_cost=True
     )
@@ -261,7 +262,7 @@ class Metrics:
     peak_actuator_power: float = _metric(
         "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True, is_cost=True
     )
-    """Greatest product of an actuator's tension and winding speed, at any time."""
+    """Greatest product of an actuator's load and winding speed, at any time."""
     mean_actuator_power: float = _metric(
         "W", "effort of an actuator", lambda walk: walk.mean("pulled"), most=True, is_cost=True
     )
