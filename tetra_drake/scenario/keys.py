@@ -36,6 +36,7 @@ _INTRODUCTION = """\
 _LIMITS = {
     "gt": "> {}",
     "ge": "≥ {}",
+    "lt": "< {}",
     "le": "≤ {}",
     "min_length": "≥ {} items",
     "max_length": "≤ {} items",

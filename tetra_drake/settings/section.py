@@ -278,6 +278,7 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
 _LIMITS = {
     "greater_than": ("more than", "gt"),
     "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
     "too_short": ("at least", "min_length"),
     "too_long": ("at most", "max_length"),
