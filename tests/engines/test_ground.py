@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import xarray
 from helpers.converged import CONVERGED, shortly
+from helpers.laws import COULOMB, FIRM
 from helpers.states import energy_and_momenta
 from helpers.structures import poses_of, simulated
 from pydrake.systems.analysis import Simulator
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Incline, Rough
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import ground_frames
@@ -22,7 +22,6 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 INCH = 0.0254
-COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
 
 
 def trajectory(scenario: Scenario, engine: Drake | Compiled) -> xarray.Dataset:
