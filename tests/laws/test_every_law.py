@@ -20,7 +20,7 @@ from tetra_drake.laws.actuator import (
     exertion,
 )
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.laws.friction import Slide, TangentSlide
+from tetra_drake.laws.friction import FrictionLaw, Slide, TangentSlide
 from tetra_drake.laws.terrain import HeightField
 from tetra_drake.scenario.scenario import Scenario
 
@@ -62,23 +62,26 @@ def test_friction_takes_energy_where_no_bristle_gives_it_and_its_modes_follow(la
 
 @pytest.mark.parametrize("kind", WITH_DRIVE.values(), ids=WITH_DRIVE)
 def test_actuators_bear_what_the_cable_does_not_and_follow_their_commands(kind):
-    for length, signal in itertools.product((0.15, 0.25), (0.5, 3.0)):
-        cables = DrivenCables.at_rest(CableLaw(*np.array([[x] for x in CABLE])), [length], signal)
-        drive, actuator = float(kind.drives(cables)[0]), kind.actuator()
-        force = actuator_force(actuator, drive, length, 0.0, signal, CABLE)
-        assert force.tension == pytest.approx(cables.tension[0]), "at rest, as Eq. 6"
-        assert 0.0 <= force.beside <= force.tension
+    law, actuator = CableLaw(*np.array([[x] for x in CABLE])), kind.actuator()
+    for length in (0.15, 0.25):
+        cables = DrivenCables.at_rest(law, np.array([length]), np.zeros(1))
+        drive = float(kind.drives(cables)[0])
+        still, pulls = (
+            actuator_force(actuator, drive, length, 0.0, signal, CABLE) for signal in (0.0, 8.0)
+        )
+        assert still.tension == pytest.approx(cables.tension[0]) and still.rate == 0.0
+        assert pulls.rate != 0.0 and 0.0 <= pulls.beside <= pulls.tension
         drives = np.zeros((1, DRIVE_COLUMNS))
-        drives[0, [DRIVE, LIMITED, BESIDE]] = drive, force.limited, force.beside
-        own = exertion(actuator, drives, 0, force.tension, length, signal)
-        assert own.load == own.pull == force.tension - force.beside
+        drives[0, [DRIVE, LIMITED, BESIDE]] = drive, pulls.limited, pulls.beside
+        own = exertion(actuator, drives, 0, pulls.tension, length, 8.0)
+        assert own.load == own.pull == pulls.tension - pulls.beside
 
 
 @pytest.mark.parametrize(
     ("refused", "words"),
     [
         (
-            lambda: friction.friction_force(friction.FrictionLaw(99, np.zeros(9)), slides()[0]),
+            lambda: friction.friction_force(FrictionLaw(99, np.zeros(9)), slides()[0]),
             "law",
         ),
         (lambda: actuator_force(Actuator.of(99), 0.2, 0.3, 0.0, 0.0, CABLE), "kind of actuators"),

@@ -36,7 +36,7 @@ def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_ground_of_a_robot_ten_times_as_long_is_ten_times_as_large(terrain):
-    lengths = ("height", "depth", "amplitude", "wavelength", "radius", "spacing")
+    lengths = ("height", "depth", "amplitude", "wavelength", "radius", "spacing", "start")
     larger = {key: 10.0 * length for key, length in terrain if key in lengths}
     grid = grid_of(terrain)
     large = terrain.model_copy(update=larger).grid(ahead=10.0 * AHEAD, scale=10.0, source="file")
