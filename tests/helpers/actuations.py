@@ -12,9 +12,12 @@ ACTUATIONS: dict[str, ActuatorKind] = {
 FORCE, WINCH, MOTOR = ({"actuation": ACTUATIONS[name]} for name in ("force", "winch", "motor"))
 """Changes of a scenario."""
 
+_WEAK = {"max_force": 4.0, "max_speed": 0.1}
+
 LIMITED = {
-    name: kind.model_copy(update={"max_force": 6.0 if name == "winch" else 4.0, "max_speed": 0.1})
+    name: kind.model_copy(update={key: weak for key, weak in _WEAK.items() if hasattr(kind, key)})
     for name, kind in ACTUATIONS.items()
     if not kind.lacking
 }
+LIMITED["winch"] = LIMITED["winch"].model_copy(update={"max_force": 6.0})
 """Actuators whose limits bind in a walk, but for the force."""
