@@ -1,19 +1,22 @@
 """Tally of a simulation: sums and extremes over all steps, which metrics are computed from.
 
 A part of the tally is a NamedTuple of tables, with a kernel that adds a step to them. All engines
-call observe(), which calls these kernels. scenario.metrics computes metrics from the tables.
+call observe(), which calls these kernels. TalliedMetrics declares the metrics that are computed
+from the tables; scenario.metrics has all metrics.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple, Self
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Annotated, Any, NamedTuple, Self
 
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, minimum, select
 from tetra_drake.laws import cable
-from tetra_drake.laws.actuator import exertion
+from tetra_drake.laws.actuator import LIMITS, exertion
 from tetra_drake.laws.clearance import least_strut_distance
 from tetra_drake.laws.contact import NORMAL
 from tetra_drake.laws.forces import Forces, sizes_of
@@ -222,3 +225,114 @@ def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> 
     radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]
     least = least_strut_distance(robot.struts, radius, first_node, state, nodes, least)
     tally.clearance[0] = least
+
+
+@dataclass(frozen=True)
+class Metric:
+    """Declaration of a metric: its unit, its computation, and its use."""
+
+    unit: str
+    """SI unit; "" for none."""
+    note: str
+    """Short explanation for tables."""
+    compute: Callable[[Any], float]
+    """Function of a scenario.metrics.Walk, or of Poses."""
+    least: bool = False
+    """True if the least value of several simulations is recorded, not their mean."""
+    most: bool = False
+    """True if the greatest value of several simulations is recorded."""
+    is_cost: bool = False
+    """True if less is better. A requirement is then an upper limit."""
+    is_share: bool = False
+    """True for a share of time. It is shown in percent."""
+    of_pose: bool = False
+    """True if Poses are enough for it."""
+    needs: str = ""
+    """Property, such as LIMITS, that a robot must have for this metric; "" for no condition."""
+
+
+def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
+    """A field of a class of metrics, with its declaration as metadata; see Metric."""
+    return field(metadata={"metric": Metric(unit, note, compute, **more)})
+
+
+def _signal_rate(walk: Any) -> float:
+    mean_square = walk.per_steady_time * float(walk.tally.roughness.total[0])
+    return math.sqrt(mean_square / max(walk.signals.shape[1], 1))
+
+
+@dataclass(frozen=True)
+class TalliedMetrics:
+    """Metrics of every step of a simulation: functions of the tally."""
+
+    rolled: float = metric("rad", "forward positive", lambda walk: walk.tally.rolled.angle[0])
+    """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
+    turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
+    velocities best, so a change of shape alone does not count."""
+    actuator_work: float = metric(
+        "J", "of all actuators", lambda walk: walk.tally.effort.work[0], is_cost=True
+    )
+    """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
+    max(0, -S dl/dt) for driven cables with signal S and length l."""
+    signal_rate: float = metric("N/s", "how fast signals change", _signal_rate, is_cost=True)
+    """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
+    lifted: float = metric(
+        "",
+        "time off the ground",
+        lambda walk: sum(walk.lifted_shares) / len(walk.lifted_shares),
+        is_share=True,
+    )
+    """Share of the steady stretch during which a body is off the ground, mean over the bodies. A
+    body is off the ground if no contact node of it bears a normal force. In MuJoCo this metric says
+    little."""
+    clearance: float = metric(
+        "m", "smallest gap of struts' axes", lambda walk: walk.tally.clearance[0], least=True
+    )
+    """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
+    is less than their diameter: the model does not prevent this."""
+    tension: float = metric(
+        "N", "smallest of any cable", lambda walk: walk.tally.tension.of_all[0], least=True
+    )
+    """Least tension of any cable at any time. Below 0 the cable would have to push."""
+    peak_actuator_force: float = metric(
+        "N",
+        "at any time; a cable can pull a winch backward",
+        lambda walk: walk.tally.effort.peak_force[0],
+        most=True,
+        is_cost=True,
+    )
+    """Greatest load of an actuator at any time: the tension of its cable, without what the cable's
+    own spring exerts beside an actuator with limits. It exceeds the `max_force` of a winch while
+    the robot stretches the cable faster than the stalled winch pays out."""
+    mean_actuator_force: float = metric(
+        "N", "of all driven cables", lambda walk: walk.mean("impulse"), is_cost=True
+    )
+    """Mean load of the actuators in the steady stretch."""
+    peak_actuator_speed: float = metric(
+        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True, is_cost=True
+    )
+    """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
+    for a winch, otherwise of the cable's length."""
+    mean_actuator_speed: float = metric(
+        "m/s", "winding or paying out", lambda walk: walk.mean("wound"), is_cost=True
+    )
+    """Mean speed in the steady stretch, winding or paying out."""
+    peak_actuator_power: float = metric(
+        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True, is_cost=True
+    )
+    """Greatest product of an actuator's load and winding speed, at any time."""
+    mean_actuator_power: float = metric(
+        "W", "effort of an actuator", lambda walk: walk.mean("pulled"), most=True, is_cost=True
+    )
+    """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
+    actuator_limited: float = metric(
+        "",
+        "time at a limit of an actuator",
+        lambda walk: walk.mean("limited"),
+        most=True,
+        is_cost=True,
+        is_share=True,
+        needs=LIMITS,
+    )
+    """Share of the steady stretch during which a limit of an actuator binds, mean over the
+    actuators."""
