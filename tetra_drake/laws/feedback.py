@@ -16,8 +16,6 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-import numpy as np
-
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Table, named
 from tetra_drake.kernels.packed import Packed, unpacked
@@ -117,6 +115,5 @@ def compute_feedback(
     The robot has signals (m,) in N, and drives (drives,).
     """
     robot, forces, senses = unpacked(parts)
-    generalized = np.empty(6 * robot.bodies.mass.size)
-    compute_forces_at(robot, state, modes, signals, drives, forces, generalized)
+    compute_forces_at(robot, state, modes, signals, drives, forces)
     sense(senses, gains, state, modes, forces, feedback)

@@ -326,9 +326,8 @@ def forces_along(
     and drives (k, drives).
     """
     robot, forces = unpacked(parts)
-    generalized = np.empty(6 * robot.bodies.mass.size)
     for k in range(states.shape[0]):
-        compute_forces_at(robot, states[k], modes[k], signals[k], drives[k], forces, generalized)
+        compute_forces_at(robot, states[k], modes[k], signals[k], drives[k], forces)
         copy_rows(forces.nodes, nodes[k])
         copy_rows(forces.cable_forces, cable_forces[k])
         copy_rows(forces.ground_forces, ground_forces[k])
@@ -336,16 +335,11 @@ def forces_along(
 
 @inlined
 def compute_forces_at(
-    robot: Model,
-    state: Table,
-    modes: Table,
-    signals: Table,
-    drives: Table,
-    forces: Forces,
-    generalized: Table,
+    robot: Model, state: Table, modes: Table, signals: Table, drives: Table, forces: Forces
 ) -> None:
-    """Computes everything in Forces, and the generalized force, for a state (13 bodies,) and drives
-    (drives,); see compute_forces()."""
+    """Computes everything in Forces for a state (13 bodies,) and drives (drives,); see
+    compute_forces()."""
+    generalized = np.empty(6 * robot.bodies.mass.size)
     move_robot(robot, state, forces)
     for i in range(drives.size):
         forces.drives[i, actuator.DRIVE] = drives[i]

@@ -8,6 +8,7 @@ from the tables; scenario.metrics has all metrics.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, Self
@@ -256,6 +257,22 @@ def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -
     return field(metadata={"metric": Metric(unit, note, compute, **more)})
 
 
+def total(name: str) -> Callable[[Any], float]:
+    """Function of a Walk: a number of its tally, such as "effort.work"."""
+    number = operator.attrgetter(name)
+    return lambda walk: number(walk.tally)[0]
+
+
+def mean(name: str) -> Callable[[Any], float]:
+    """Function of a Walk: a total of Effort as mean over the steady stretch and the actuators."""
+    return lambda walk: walk.per_actuator_time * getattr(walk.tally.effort, name)[0]
+
+
+def greatest(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
+    """Declaration of a cost whose greatest value of several simulations counts."""
+    return metric(unit, note, compute, most=True, is_cost=True, **more)
+
+
 def _signal_rate(walk: Any) -> float:
     mean_square = walk.per_steady_time * float(walk.tally.roughness.total[0])
     return math.sqrt(mean_square / max(walk.signals.shape[1], 1))
@@ -265,13 +282,11 @@ def _signal_rate(walk: Any) -> float:
 class TalliedMetrics:
     """Metrics of every step of a simulation: functions of the tally."""
 
-    rolled: float = metric("rad", "forward positive", lambda walk: walk.tally.rolled.angle[0])
+    rolled: float = metric("rad", "forward positive", total("rolled.angle"))
     """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
     turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
     velocities best, so a change of shape alone does not count."""
-    actuator_work: float = metric(
-        "J", "of all actuators", lambda walk: walk.tally.effort.work[0], is_cost=True
-    )
+    actuator_work: float = metric("J", "of all actuators", total("effort.work"), is_cost=True)
     """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
     max(0, -S dl/dt) for driven cables with signal S and length l."""
     signal_rate: float = metric("N/s", "how fast signals change", _signal_rate, is_cost=True)
@@ -285,54 +300,30 @@ class TalliedMetrics:
     """Share of the steady stretch during which a body is off the ground, mean over the bodies. A
     body is off the ground if no contact node of it bears a normal force. In MuJoCo this metric says
     little."""
-    clearance: float = metric(
-        "m", "smallest gap of struts' axes", lambda walk: walk.tally.clearance[0], least=True
-    )
+    clearance: float = metric("m", "smallest gap of struts' axes", total("clearance"), least=True)
     """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
     is less than their diameter: the model does not prevent this."""
-    tension: float = metric(
-        "N", "smallest of any cable", lambda walk: walk.tally.tension.of_all[0], least=True
-    )
+    tension: float = metric("N", "smallest of any cable", total("tension.of_all"), least=True)
     """Least tension of any cable at any time. Below 0 the cable would have to push."""
-    peak_actuator_force: float = metric(
-        "N",
-        "at any time; a cable can pull a winch backward",
-        lambda walk: walk.tally.effort.peak_force[0],
-        most=True,
-        is_cost=True,
+    peak_actuator_force: float = greatest(
+        "N", "at any time; a cable can pull a winch backward", total("effort.peak_force")
     )
     """Greatest load of an actuator at any time: the tension of its cable, without what the cable's
     own spring exerts beside an actuator with limits. It exceeds the `max_force` of a winch while
     the robot stretches the cable faster than the stalled winch pays out."""
-    mean_actuator_force: float = metric(
-        "N", "of all driven cables", lambda walk: walk.mean("impulse"), is_cost=True
-    )
+    mean_actuator_force: float = metric("N", "of all driven cables", mean("impulse"), is_cost=True)
     """Mean load of the actuators in the steady stretch."""
-    peak_actuator_speed: float = metric(
-        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True, is_cost=True
-    )
+    peak_actuator_speed: float = greatest("m/s", "at any time", total("effort.peak_speed"))
     """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
     for a winch, otherwise of the cable's length."""
-    mean_actuator_speed: float = metric(
-        "m/s", "winding or paying out", lambda walk: walk.mean("wound"), is_cost=True
-    )
+    mean_actuator_speed: float = metric("m/s", "winding or paying out", mean("wound"), is_cost=True)
     """Mean speed in the steady stretch, winding or paying out."""
-    peak_actuator_power: float = metric(
-        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True, is_cost=True
-    )
+    peak_actuator_power: float = greatest("W", "at any time", total("effort.peak_power"))
     """Greatest product of an actuator's load and winding speed, at any time."""
-    mean_actuator_power: float = metric(
-        "W", "effort of an actuator", lambda walk: walk.mean("pulled"), most=True, is_cost=True
-    )
+    mean_actuator_power: float = greatest("W", "effort of an actuator", mean("pulled"))
     """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
-    actuator_limited: float = metric(
-        "",
-        "time at a limit of an actuator",
-        lambda walk: walk.mean("limited"),
-        most=True,
-        is_cost=True,
-        is_share=True,
-        needs=LIMITS,
+    actuator_limited: float = greatest(
+        "", "time at a limit of an actuator", mean("limited"), is_share=True, needs=LIMITS
     )
     """Share of the steady stretch during which a limit of an actuator binds, mean over the
     actuators."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -85,10 +85,10 @@ class Walk(Poses):
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
-    def mean(self, effort: str) -> float:
-        """A total of laws.tally.Effort as mean over the steady stretch and the actuators."""
-        per_actuator_time = self.per_steady_time / max(self.actuators, 1)
-        return per_actuator_time * float(getattr(self.tally.effort, effort)[0])
+    @property
+    def per_actuator_time(self) -> float:
+        """1 / duration of the steady stretch, divided by the number of actuators."""
+        return self.per_steady_time / max(self.actuators, 1)
 
     @property
     def lifted_shares(self) -> tuple[float, ...]:
@@ -102,45 +102,42 @@ def _cost_of_transport(walk: Walk) -> float:
     return float(walk.tally.effort.work[0]) / carried if carried else math.inf
 
 
+def _of_poses(unit: str, note: str, compute: Callable[[Poses], float], **more: Any) -> Any:
+    """Declaration of a metric that is a function of Poses."""
+    return metric(unit, note, compute, of_pose=True, **more)
+
+
 @dataclass(frozen=True)
 class WalkMetrics:
     """Metrics from positions and signals at a few times."""
 
-    distance: float = metric("m", "along x", lambda walk: walk.followed_way[0], of_pose=True)
+    distance: float = _of_poses("m", "along x", lambda walk: walk.followed_way[0])
     """Displacement of x₁ from the start to the end."""
-    steady_distance: float = metric(
-        "m",
-        "without the start",
-        lambda walk: walk.followed[2, 0] - walk.followed[1, 0],
-        of_pose=True,
+    steady_distance: float = _of_poses(
+        "m", "without the start", lambda walk: walk.followed[2, 0] - walk.followed[1, 0]
     )
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
-    speed: float = metric(
-        "m/s",
-        "of the centre",
-        lambda walk: walk.steady_centre_way[0] / walk.since_steady_from,
-        of_pose=True,
+    speed: float = _of_poses(
+        "m/s", "of the centre", lambda walk: walk.steady_centre_way[0] / walk.since_steady_from
     )
     """Mean speed of the centre along x from `simulation.steady_from` on."""
-    twist: float = metric(
+    twist: float = _of_poses(
         "m",
         "one rear foot ahead of the other",
         lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
-        of_pose=True,
         needs=ROW,
         is_cost=True,
     )
     """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
-    lead: float = metric(
+    lead: float = _of_poses(
         "m",
         "front tip ahead of rear foot",
         lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
-        of_pose=True,
         needs=ROW,
     )
     """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
-    lateral_drift: float = metric(
-        "m", "sideways", lambda walk: abs(walk.followed_way[1]), of_pose=True, is_cost=True
+    lateral_drift: float = _of_poses(
+        "m", "sideways", lambda walk: abs(walk.followed_way[1]), is_cost=True
     )
     """Sideways displacement, abs(y₁), at the end."""
     heading_change: float = metric(
