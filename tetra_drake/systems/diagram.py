@@ -42,15 +42,15 @@ def MakeTensegrityDiagram(
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is the scenario's start.
 
-        steering ──→ cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
-                      ↑                     ↑  │   │                       │
-                      │                     │  │  ground                   │
-                      │                     │  ↓   │ ↑                     │
-                      └───── feedback ←─────┼──────┘ │                     │
-                                ↑           │        │                     │
-                                └───────────┴────────┴─────────────────────┘
+        steering ──→ cpg ──→ start_up ─┬─→ cables ──┬──→ forces ──→ plant ──┬──→ state
+                      ↑                │      ↑     │                       │
+                      │                │      │   ground                    │
+                      │                ↓      │    │ ↑                      │
+                      └───────────── feedback ←────┘ │                      │
+                                       ↑      │      │                      │
+                                       └──────┴──────┴──────────────────────┘
 
-        cables_actuators ←──→ cables
+        cables_actuators ←──→ cables, and ──→ feedback
 
         state_forces ──→ forces
 
