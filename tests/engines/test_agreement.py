@@ -15,12 +15,12 @@ import pytest
 from helpers.actuations import LIMITED, MOTOR, WINCH
 from helpers.anchored import HUNG, floating_prism, scenario_of, supported_prism
 from helpers.converged import CONVERGED, shortly
+from helpers.laws import COULOMB, FRICTIONS, RESET, UNEVEN
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.laws.feedback import PATHWAYS
-from tetra_drake.laws.friction import Coulomb
-from tetra_drake.laws.terrain import Flat, Incline, Obstacles, Rough, Steps
+from tetra_drake.laws.terrain import Flat
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import WALKING_SEED, Gains, Gait, seeded_gait
@@ -32,7 +32,6 @@ from tetra_drake.scenario.scenario import Scenario
 
 Changes = Mapping[str, Any]
 Engine = Compiled | Drake | Mujoco
-INCH = 0.0254
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,20 +52,6 @@ ACCURATE = (Compiled(), Drake(accuracy=1e-3))
 DEFAULT = (Compiled(), Drake())
 NO_BRISTLES = {"friction.stiffness": "0 N/m"}
 """Coulomb friction as in MuJoCo."""
-
-COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
-KEPT = {"reset": "never", "breaks_free": "both", "stiffness": "0.3 lbf/in", "load": "0.1 lbf"}
-RESET = {"reset": {}, "kept": KEPT, "range": {"reset": "range"}}
-LAWS = RESET | {"coulomb": COULOMB, "firm": FIRM}
-TERRAINS = {
-    "incline": Incline(slope=np.radians(5.0)),
-    # Steps are where the robot meets them at once.
-    "steps": Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
-    "rough": Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
-    "obstacles": Obstacles(
-        height=0.25 * INCH, radius=1.0 * INCH, spacing=2.5 * INCH, start=14.0 * INCH
-    ),
-}
 
 
 def gait(seed: int = WALKING_SEED, **changes: Any) -> Callable[[Scenario], Changes]:
@@ -135,11 +120,11 @@ def rows() -> Iterable[Any]:
         changes = {"robot.tetrahedra": count}
         name = f"{count} tetrahedra"
         yield row(name, "thesis", duration, changes, CONVERGE, {"p_WN": 5e-6}, gait(seed), 1e-3)
-    laws = [("incline", "reset")] + [("rough", law) for law in LAWS]
-    laws += [(terrain, "firm") for terrain in ("steps", "obstacles")]
+    laws = [("incline", "reset")] + [("rough", law) for law in FRICTIONS]
+    laws += [(terrain, "firm") for terrain in UNEVEN if terrain not in ("incline", "rough")]
     for terrain, law in laws:
-        changes = {"robot.tetrahedra": 3, "robot.contacts": "all", "terrain": TERRAINS[terrain]}
-        changes["friction"] = LAWS[law]
+        changes = {"robot.tetrahedra": 3, "robot.contacts": "all", "terrain": UNEVEN[terrain]}
+        changes["friction"] = FRICTIONS[law]
         within = {"p_WN": 1e-5 if law in RESET else 1e-6}  # some forty mode changes
         cells = "thesis", 0.1, changes, CONVERGE, within, gait(2), 5e-4
         yield row(f"{terrain}, {law}", *cells)
@@ -227,7 +212,7 @@ def rows() -> Iterable[Any]:
         engines, name = (FINE[0], Limit(4e-5)), f"{count} tetrahedra in the air, MuJoCo"
         yield row(name, "thesis", 0.4, changes, engines, within, gait(), 1e-3)
     # The damping of the normal force differs, so that the robot lands a little differently.
-    changes = {"terrain": TERRAINS["incline"], "friction": COULOMB, "cpg.start_up": "0.105 s"}
+    changes = {"terrain": UNEVEN["incline"], "friction": COULOMB, "cpg.start_up": "0.105 s"}
     engines = Compiled(), Mujoco()
     yield row("incline, MuJoCo", "thesis", 1.0, changes, engines, {"p_WN": 2e-4}, gait(), 3e-3)
 
@@ -284,7 +269,7 @@ def sets() -> Iterable[Any]:
     # On Coulomb friction, where errors are below 0.001 in. Under the reset integrator, distances
     # hang on whether a foot just slips.
     diagram = Drake(accuracy=1e-4, max_step=2e-3)
-    for terrain, surface in {"flat": Flat(), **TERRAINS}.items():
+    for terrain, surface in {"flat": Flat(), **UNEVEN}.items():
         changes = {"terrain": surface, "simulation.max_evaluations": 10**8, "friction": COULOMB}
         changes |= {"robot.contacts": "all"} if terrain != "flat" else {}
         yield pytest.param(Set("thesis", changes, (FINE[0], diagram), 0.05, 0.2), id=terrain)

@@ -35,10 +35,8 @@ WALKS = {
     "witnessed": ("thesis", {"engine": Drake(mode_changes="witness")}, ["drake"]),
     "rough": ("thesis", ROUGH, ["compiled"]),
     "feedback": ("thesis", FEELS, ["drake", "compiled"]),
-    "winch": ("prism", {"actuation": LIMITED["winch"]}, ["drake", "compiled"]),
-    "motor": ("prism", {"actuation": LIMITED["motor"]}, ["compiled"]),
     "command": ("coulomb", {}, ["compiled"]),
-}
+} | {name: ("prism", {"actuation": kind}, ["drake", "compiled"]) for name, kind in LIMITED.items()}
 """A shipped scenario, its changes, and engines that simulate it."""
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import xarray
 from helpers.converged import CONVERGED, shortly
+from helpers.laws import COULOMB, FIRM, RESET
 from helpers.states import energy_and_momenta
 from helpers.structures import poses_of, simulated
 from pydrake.systems.analysis import Simulator
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Incline, Rough
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import ground_frames
@@ -22,7 +22,6 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 INCH = 0.0254
-COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
 
 
 def trajectory(scenario: Scenario, engine: Drake | Compiled) -> xarray.Dataset:
@@ -31,10 +30,10 @@ def trajectory(scenario: Scenario, engine: Drake | Compiled) -> xarray.Dataset:
     return result.trajectory
 
 
-@pytest.mark.parametrize("friction", ["reset", FIRM])
+@pytest.mark.parametrize("friction", [RESET["reset"], FIRM])
 @pytest.mark.parametrize("engine", ["compiled", "drake"])
 def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, engine):
-    slope, friction = np.radians(8.0), scenario.friction if friction == "reset" else friction
+    slope = np.radians(8.0)
     short = shortly(scenario, 0.3, friction=friction, engine=CONVERGED["drake"])
     inclined = short.with_changes({"terrain": Incline(slope=slope)})
     up_the_slope = trajectory(inclined, CONVERGED[engine])["p_WN"].values[-1].reshape(-1, 3)
@@ -52,11 +51,10 @@ def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, e
     np.testing.assert_allclose(up_the_slope, turned, atol=1e-6)
 
 
-@pytest.mark.parametrize("friction", ["reset", COULOMB, FIRM])
+@pytest.mark.parametrize("friction", [RESET["reset"], COULOMB, FIRM])
 def test_contact_never_gives_energy(scenario, friction):
     # Kinetic energy, weight, cables and the springs of contacts (k d^2 / 2); a bristle's spring
     # can only hold what it has taken.
-    friction = scenario.friction if friction == "reset" else friction
     fall = {"robot__offsets": [[0.0, 0.0, "5 mm"]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
     fall["simulation__sample_period"] = "2 ms"
     rough = Rough(amplitude=0.25 * INCH, wavelength=4.0 * INCH, seed=5)

@@ -26,8 +26,8 @@ from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
 from tetra_drake.experiment import evolve
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.cable import LENGTH, PASSIVE
-from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL
-from tetra_drake.laws.feedback import sense
+from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
+from tetra_drake.laws.feedback import Gains, sense
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.report import run_figures
@@ -131,17 +131,19 @@ def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
     assert np.ptp(left[:, 1]) > 5e-4, "it turns"
 
 
-def felt(robot: Robot, gains: list[float], *, longer: float = 1.0, pushes: float = 0.0):
+def felt(robot: Robot, *, longer: float = 1.0, pushes: float = 0.0, **gains: float):
     """(oscillators, 2): the feedback to extensor and flexor of a robot in its pose of rest, whose
     cables are longer by a factor, and whose contacts near the ground bear some force in N each."""
     structure, state = robot.structure, robot.structure.initial_state
     p_WN = node_positions(structure, state)
     along = p_WN[structure.cables["node_a"]] - p_WN[structure.cables["node_b"]]
     forces, feedback = Forces.of(robot.model), np.empty(2 * structure.signals)
-    cable_forces, ground_forces = forces.cable_forces, forces.ground_forces
-    cable_forces[:, LENGTH] = longer * np.linalg.norm(along, axis=1)
-    ground_forces[:, NORMAL] = pushes * (p_WN[structure.contacts, 2] < 0.02)
-    sense(robot.senses, np.array(gains), state, cable_forces, ground_forces, feedback)
+    forces.cable_forces[:, LENGTH] = longer * np.linalg.norm(along, axis=1)
+    forces.ground_forces[:, NORMAL] = pushes * (p_WN[structure.contacts, 2] < 0.02)
+    modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
+    modes[:, CONTACT] = forces.ground_forces[:, NORMAL] > 0.0
+    table = np.array([gain for _, gain in Gains(**gains)])
+    sense(robot.senses, table, state, modes, forces, feedback)
     return feedback.reshape(-1, 2)
 
 
@@ -151,10 +153,10 @@ def test_oscillators_feel_longer_cables_and_what_their_bodies_bear(name):
     robot = Robot.of(load_scenario(name).with_changes(live))
     # 10 % longer, times the gain: 0.05 on the extensor, however many cables a group has.
     for longer, expected in ((1.0, 0.0), (1.1, 0.05)):
-        found = felt(robot, [0.5, 0.0, 0.0], longer=longer)
+        found = felt(robot, length=0.5, longer=longer)
         np.testing.assert_allclose(found - [expected, -expected], 0.0, atol=1e-6)
     if name == "prism":  # each bar bears a third of the weight
-        loads = felt(robot, [0.0, 0.6, 0.0], pushes=robot.weight / 3.0)
+        loads = felt(robot, load=0.6, pushes=robot.weight / 3.0)
         np.testing.assert_allclose(loads, 0.6 / 3.0)
 
 

@@ -1,16 +1,23 @@
 """Actuators for tests."""
 
-from tetra_drake.laws.actuator import TensionMotor, Winch
+from tetra_drake.laws.actuator import ActuatorKind, Force, TensionMotor, Winch
 
-LAW = {"max_force": "10 N", "max_speed": "0.5 m/s", "time_constant": "20 ms"}
+ACTUATIONS: dict[str, ActuatorKind] = {
+    "force": Force(),
+    "winch": Winch(max_force=10.0, max_speed=0.5, time_constant=0.02),
+    "motor": TensionMotor(max_force=10.0, max_speed=0.5, time_constant=0.02),
+}
+"""An example of every kind."""
 
-FORCE = {"actuation": "!Force"}
-WINCH = {"actuation": {"_tag": "Winch", **LAW}}
-MOTOR = {"actuation": {"_tag": "TensionMotor", **LAW}}
+FORCE, WINCH, MOTOR = ({"actuation": ACTUATIONS[name]} for name in ("force", "winch", "motor"))
 """Changes of a scenario."""
 
+_WEAK = {"max_force": 4.0, "max_speed": 0.1}
+
 LIMITED = {
-    "winch": Winch(max_force=6.0, max_speed=0.1, time_constant=0.02),
-    "motor": TensionMotor(max_force=4.0, max_speed=0.1, time_constant=0.02),
+    name: kind.model_copy(update={key: weak for key, weak in _WEAK.items() if hasattr(kind, key)})
+    for name, kind in ACTUATIONS.items()
+    if not kind.lacking
 }
+LIMITED["winch"] = LIMITED["winch"].model_copy(update={"max_force": 6.0})
 """Actuators whose limits bind in a walk, but for the force."""

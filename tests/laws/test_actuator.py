@@ -95,7 +95,7 @@ def test_the_slope_is_the_derivative_of_the_tension_by_the_rate():
 )
 def test_a_tension_motor_by_hand(drive, length, rate, signal, winding, limited):
     found = pull(drive, length, rate=rate, signal=signal)
-    assert found == pytest.approx((drive, 0.0, winding, limited))
+    assert found == pytest.approx((drive, 0.0, winding, limited, 0.0))
 
 
 @pytest.mark.parametrize(("rate", "most"), [(-0.1, 15.0), (-0.3, 5.0), (-0.4, 0.0), (-0.7, 0.0)])

@@ -1,15 +1,8 @@
-"""The cable law and what a network of cables can and cannot do to free bodies."""
+"""The law of a cable."""
 
-import numpy as np
 import pytest
-from helpers.states import disturbed
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.cable import CableLaw, cable_tension, slack_tension
-from tetra_drake.laws.forces import Forces, compute_cable_forces
-from tetra_drake.robot.structure import AddBodies
 
 
 def test_tension_is_equation_6():
@@ -32,29 +25,3 @@ def test_a_cable_that_goes_slack_pulls_only_while_it_is_stretched(stretch, rate,
     found, per_rate = slack_tension(35.0 * stretch, rate, law)
     assert found == pytest.approx(tension, rel=1e-12)
     assert per_rate == (8.0 if tension == 11.0 else 0.0)
-
-
-def test_passive_cables_are_drakes_linear_spring_dampers(robot, structure):
-    # Near the start, every body turned, shifted and moving.
-    state = disturbed(structure, 1, pose=0.01, speed=1.0)
-
-    def acceleration(*, springs: bool, force: np.ndarray) -> np.ndarray:
-        plant = MultibodyPlant(time_step=0.0)
-        bodies = AddBodies(plant, structure)
-        for cable in structure.cables if springs else []:
-            ends = []
-            for node in (cable["node_a"], cable["node_b"]):
-                ends += [bodies[structure.carriers[node]], structure.p_BN[node]]
-            law = [cable[name] for name in ("free_length", "stiffness", "damping")]
-            plant.AddForceElement(LinearSpringDamper(*ends, *law))
-        plant.Finalize()
-        context = plant.CreateDefaultContext()
-        context.SetContinuousState(state)
-        plant.get_applied_generalized_force_input_port().FixValue(context, force)
-        return plant.EvalTimeDerivatives(context).get_generalized_velocity().CopyToVector()
-
-    ours = np.empty(30)
-    compute_cable_forces(Packed((robot.model, Forces.of(robot.model))), state, np.zeros(4), ours)
-    expected = acceleration(springs=True, force=np.zeros(30))
-    found = acceleration(springs=False, force=ours)
-    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-9)

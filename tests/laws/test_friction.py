@@ -8,13 +8,11 @@ import pytest
 from tetra_drake.laws.friction import (
     STICK,
     CoulombConstants,
-    FrictionLaw,
     ResetConstants,
     Slide,
     TangentSlide,
     coulomb_damping,
     coulomb_force,
-    friction_force,
     next_coulomb_mode,
     next_reset_mode,
     reset_force,
@@ -86,11 +84,6 @@ def test_the_deflection_starts_again_at_the_range_or_is_kept_at_a_reversal():
     for law, kept in ((RESET, 0.0), (RESET._replace(kept=1.0), P0)):
         due = next_reset_mode(reversed_slip, law)
         assert due.begins == (True, False) and due.bend == (kept, 0.0)
-
-
-def test_an_unknown_law_is_refused():
-    with pytest.raises(ValueError, match="unknown law"):
-        friction_force(FrictionLaw(2, np.array(RESET)), slide())
 
 
 # Coulomb friction.

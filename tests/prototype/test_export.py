@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.actuations import FORCE, MOTOR, WINCH
+from helpers.actuations import ACTUATIONS, FORCE, MOTOR, WINCH
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
+from tetra_drake.laws.actuator import LimitedActuator
 from tetra_drake.prototype.command_file import load_command
 from tetra_drake.prototype.export import COMMAND, EXPECTED, LIMITS_FILE, README, export
 from tetra_drake.robot.gait import load_gait, seeded_gait
@@ -80,11 +81,11 @@ def test_a_tension_motor_is_commanded_the_whole_law_of_the_cable(short, tmp_path
     assert samples.min() >= 0.0 and samples.max() <= 10.0
 
 
-@pytest.mark.parametrize("actuation", [FORCE, MOTOR, WINCH])
-def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
+@pytest.mark.parametrize("kind", ACTUATIONS.values(), ids=ACTUATIONS)
+def test_the_loads_are_those_of_the_metrics(short, kind, tmp_path):
     # The metrics look at every step; the file at every millisecond, which misses how the tension
     # overshoots for a tenth of that where forces jump at the end of a start-up.
-    driven = short.with_changes(actuation | {"cpg.start_up": "0 s"})
+    driven = short.with_changes({"actuation": kind, "cpg.start_up": "0 s"})
     export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
     metrics = simulate(scenario=driven, gait=seeded_gait(short)).metrics
     rows = rows_of(tmp_path / "lab" / LIMITS_FILE)
@@ -98,9 +99,10 @@ def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
     assert peak("peak_power_W") == pytest.approx(metrics.peak_actuator_power, rel=0.1)
     power = np.mean([float(row["mean_power_W"]) for row in rows])
     assert power == pytest.approx(metrics.mean_actuator_power, rel=0.05)
-    if actuation is not FORCE:
+    if isinstance(kind, LimitedActuator):
         # Half the greatest force at half the greatest speed: 5 N times 0.25 m/s.
         assert peak("limit_of_power_W") == 1.25
+    if not kind.lacking:
         shares = [float(row["time_at_a_limit_percent"]) for row in rows]
         limited = 100.0 * metrics.actuator_limited
         assert np.mean(shares) == pytest.approx(limited, abs=0.05 * limited)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.laws import EXAMPLES
 
 from tetra_drake.errors import InputError
 from tetra_drake.robot.gait import seeded_gait
@@ -11,11 +12,8 @@ from tetra_drake.scenario.load import dump_scenario, load_scenario
 ANY = {
     "cpg.signals": ["live", "listing"],
     "cpg.feedback": [[], ["length"], ["load", "pitch"]],
-    "friction": ["!ResetIntegrator", "!Coulomb {static: 0.9, lateral: 3}"],
-    "terrain": ["!Incline {slope: 20 deg}", "!Rough {amplitude: 1 mm, wavelength: 5 cm}"],
-    "actuation": ["!Force", "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}"],
     "engine": ["!Drake", "!Compiled"],
-}
+} | {key: list(laws.values()) for key, laws in EXAMPLES.items()}
 ROW = {
     "robot.tetrahedra": [2, 3, 9],
     "robot.contacts": ["all", "thesis"],

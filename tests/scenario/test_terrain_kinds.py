@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.laws import UNEVEN
 from scipy.interpolate import NdBSpline
 
 from tetra_drake.laws.terrain import (
@@ -21,13 +22,6 @@ from tetra_drake.scenario.scenario import Scenario
 IN = 0.0254
 AHEAD = 20.0 * IN
 
-KINDS: list[Terrain] = [
-    Incline(slope=0.1),
-    Steps(height=0.25 * IN, depth=12 * IN, count=4),
-    Rough(amplitude=0.25 * IN, wavelength=6 * IN),
-    Obstacles(height=0.01, radius=0.02, spacing=0.2),
-]
-
 
 def grid_of(terrain: Terrain) -> Grid:
     return terrain.grid(ahead=AHEAD, scale=1.0, source="file")
@@ -40,9 +34,9 @@ def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return NdBSpline(knots, grid.heights, k=2)(np.stack(np.broadcast_arrays(x, y), axis=-1))
 
 
-@pytest.mark.parametrize("terrain", KINDS, ids=repr)
+@pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_ground_of_a_robot_ten_times_as_long_is_ten_times_as_large(terrain):
-    lengths = ("height", "depth", "amplitude", "wavelength", "radius", "spacing")
+    lengths = ("height", "depth", "amplitude", "wavelength", "radius", "spacing", "start")
     larger = {key: 10.0 * length for key, length in terrain if key in lengths}
     grid = grid_of(terrain)
     large = terrain.model_copy(update=larger).grid(ahead=10.0 * AHEAD, scale=10.0, source="file")
@@ -50,7 +44,7 @@ def test_the_ground_of_a_robot_ten_times_as_long_is_ten_times_as_large(terrain):
     np.testing.assert_allclose(large.corner + large.cell, 10.0 * np.array(grid.corner + grid.cell))
 
 
-@pytest.mark.parametrize("terrain", KINDS, ids=repr)
+@pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_a_grid_covers_the_way_and_more(terrain):
     # Half a cell within its outermost heights, the surface has all the heights it is made of.
     grid = grid_of(terrain)

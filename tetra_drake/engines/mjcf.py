@@ -15,7 +15,7 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.actuator import has_drive
-from tetra_drake.laws.cable import PASSIVE
+from tetra_drake.laws.cable import tendon_faults
 from tetra_drake.laws.contact import NormalForce
 from tetra_drake.laws.inertia import XX
 from tetra_drake.robot.robot import Robot
@@ -55,14 +55,14 @@ def check_mjcf(scenario: Scenario) -> None:
     """Raises InputError, naming the key, if MuJoCo does not know the terrain or the friction."""
     if scenario.terrain.plane_slope is None:
         kind = type(scenario.terrain).__name__
-        problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline, or !Nothing"
+        problem = f"found !{kind}, but mujoco simulates only planes, or no ground"
         raise InputError(scenario.name, "terrain", problem)
     scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
 
 def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = False) -> str:
-    """Model of a robot with a tendon for each cable and a motor for each driven one. If the
-    actuators have drives, tendons have no law, and a motor for each cable exerts its tension. With
+    """Model of a robot with a tendon for each cable and a motor for each driven one. If actuators
+    bear the whole tension, tendons have no law, and a motor for each cable exerts its tension. With
     `own_laws`, this is so wherever is_pulled() is true, and struts pass through each other: the
     engine computes tensions and contacts by its own laws.
 
@@ -73,7 +73,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     scenario = robot.scenario
     check_mjcf(scenario)
     model = Element("mujoco", model=scenario.name)
-    pulled = is_pulled(robot) if own_laws else has_drive(robot.model.actuator)
+    pulled = is_pulled(robot) if own_laws else not scenario.actuation.keeps_spring
     integrator, step = integrator_of(robot, pulled=pulled), scenario.settings_of(Mujoco).step
     steps = {"integrator": integrator, "timestep": step}
     add_element(model, "compiler", inertiafromgeom="false")
@@ -100,21 +100,24 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
 
 
 def is_pulled(robot: Robot) -> bool:
-    """True if MuJoCo's tendons lack the law of the cables: where actuators have drives, and where
-    damped or driven cables go slack."""
-    cables, can_slacken = robot.structure.cables, robot.structure.slack
-    is_more = (cables["damping"] != 0.0) | (cables["signal"] != PASSIVE)
-    return has_drive(robot.model.actuator) or bool(can_slacken and is_more.any())
+    """True if MuJoCo's tendons lack the law of the cables: where actuators have drives, where
+    driven cables go slack, and with tendon_faults()."""
+    structure = robot.structure
+    faults = tendon_faults(structure.cables, slack=structure.slack).values()
+    loosens = structure.slack and robot.driven.size > 0
+    return has_drive(robot.model.actuator) or loosens or any(cables.any() for cables in faults)
 
 
 def loose_remark(robot: Robot) -> str:
-    """What tendons do otherwise than the robot's cables, if these are damped and can go slack."""
-    damped = np.flatnonzero(robot.structure.cables["damping"])
-    if has_drive(robot.model.actuator) or not (robot.structure.slack and damped.size):
+    """What tendons do otherwise than the robot's cables; see tendon_faults()."""
+    structure, remarks = robot.structure, []
+    if not robot.scenario.actuation.keeps_spring:
         return ""
-    names = [robot.structure.cable_names[i] for i in damped[:3].tolist()]
-    some = ", ".join(names) + (f" and {damped.size - 3} more" if damped.size > 3 else "")
-    return f"the dampers of MuJoCo's tendons also act where a cable is slack: {some}"
+    for fault, cables in tendon_faults(structure.cables, slack=structure.slack).items():
+        names = [name for name, has_it in zip(structure.cable_names, cables, strict=True) if has_it]
+        some = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+        remarks += [f"{fault}: {some}"] if names else []
+    return "; ".join(remarks)
 
 
 def integrator_of(robot: Robot, *, pulled: bool) -> str:

@@ -7,6 +7,9 @@
 
 The state of an actuator is called its *drive*: the free length (m) of a winch, or the tension (N)
 of a tension motor. A direct force has no drive.
+
+To add a kind with a drive: a number for it, its force, a line in actuator_force(), and a section.
+Its force says which part of the tension the cable itself exerts beside the actuator.
 """
 
 from __future__ import annotations
@@ -35,9 +38,9 @@ LIMITS = "limited actuators"
 DIRECT, WINCH, TENSION_MOTOR = range(3)
 """Kinds of actuators."""
 
-DRIVE, RATE, LIMITED, DRIVE_COLUMNS = range(4)
-"""Columns of the table `drives`, and their number: the drive, its rate per s, and 1 if a limit
-binds or 0. There is a row for each actuator with a drive."""
+DRIVE, RATE, LIMITED, BESIDE, DRIVE_COLUMNS = range(5)
+"""Columns of the table `drives`, and their number: the drive, its rate per s, 1 if a limit binds or
+0, and ActuatorForce.beside. There is a row for each actuator with a drive."""
 
 
 class Limits(NamedTuple):
@@ -73,6 +76,23 @@ class ActuatorForce(NamedTuple):
     """Rate of the drive, per s."""
     limited: Real
     """1 if a limit binds, otherwise 0."""
+    beside: Real
+    """Part of the tension (N) that the cable's own spring and damper exert beside the actuator; 0
+    if the actuator bears the whole tension."""
+
+
+class Exertion(NamedTuple):
+    """What an actuator does at an instant."""
+
+    load: Real
+    """Force (N) that it bears. For a direct force this is the tension, as for a motor in its
+    place."""
+    pull: Real
+    """Force (N) whose work is the actuator's: the load, or the signal of a direct force."""
+    left: Real
+    """Length (m) of its cable; the free length if a winch winds it."""
+    limited: Real
+    """1 if a limit binds, otherwise 0."""
 
 
 @inlined
@@ -91,6 +111,18 @@ def wound(actuator: Actuator, drive: Table, otherwise: Table) -> Table:
 
 
 @inlined
+def exertion(
+    actuator: Actuator, drives: Table, drive: int, tension: Real, length: Real, signal: Real
+) -> Exertion:
+    """Exertion of an actuator. `drive` is its row in the table `drives`, if it has a drive;
+    `tension` (N) and `length` (m) are of its cable."""
+    if not has_drive(actuator):
+        return Exertion(load=tension, pull=signal, left=length, limited=0.0 * length)
+    load, left = tension - drives[drive, BESIDE], wound(actuator, drives[drive, DRIVE], length)
+    return Exertion(load=load, pull=load, left=left, limited=drives[drive, LIMITED])
+
+
+@inlined
 def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
 ) -> ActuatorForce:
@@ -99,7 +131,9 @@ def actuator_force(
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
         return winch_force(drive, length, rate, signal, law, limits)
-    return motor_force(drive, length, rate, signal, law, limits)
+    if actuator.kind == TENSION_MOTOR:
+        return motor_force(drive, length, rate, signal, law, limits)
+    raise ValueError("unknown kind of actuators")
 
 
 @inlined
@@ -132,6 +166,7 @@ def winch_force(
         tension_per_rate=select(slowed, tension_per_rate / stiffening, tension_per_rate),
         rate=winds,
         limited=select(winds != wanted, 1.0, 0.0),
+        beside=0.0 * drive,
     )
 
 
@@ -156,6 +191,7 @@ def motor_force(
         tension_per_rate=select(on_line, limits.max_force / limits.max_speed, 0.0),
         rate=(target - drive) / limits.time_constant,
         limited=select(limited, 1.0, 0.0),
+        beside=0.0 * drive,
     )
 
 
@@ -191,6 +227,8 @@ class ActuatorKind(Section):
     """Commanded quantity with its unit: the end of a column's name in command files."""
     command_unit: ClassVar[float] = 1.0
     """Size of the unit of `commanded` in SI."""
+    keeps_spring: ClassVar[bool] = False
+    """True if the cable's own spring and damper act beside the actuator."""
     plays_cable: ClassVar[bool] = False
     """True if software imitates the spring and damper of the cable. A command then contains their
     effect."""
@@ -223,6 +261,7 @@ class Force(ActuatorKind):
 
     lacking = (LIMITS,)
     commanded = "force_N"
+    keeps_spring = True
 
     def actuator(self) -> Actuator:
         return Actuator.of(DIRECT)

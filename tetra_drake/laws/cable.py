@@ -15,12 +15,27 @@ from __future__ import annotations
 from typing import NamedTuple, Self
 
 import numpy as np
+from pydantic import Field
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, select
+from tetra_drake.settings.quantities import Damping
+from tetra_drake.settings.section import Section
 
 PASSIVE = -1
 """Value of `signal` for a cable without actuation."""
+
+
+class CableConstants(Section):
+    """Settings that the cables of all kinds of robots have."""
+
+    damping: Damping = Field(ge=0)
+    """Tension per rate of the length."""
+
+    def constants(self, *, stiffness: float, free_length: float) -> dict[str, float]:
+        """Constants of a cable by the names of CableLaw: the settings here, and the given ones."""
+        own = {name: getattr(self, name) for name in CableConstants.model_fields}
+        return own | {"stiffness": stiffness, "free_length": free_length}
 
 
 class CableLaw(NamedTuple):
@@ -85,6 +100,16 @@ def elastic_stretch(tension: Real, law: CableLaw) -> Real:
     return tension / law.stiffness
 
 
+def elastic_stiffness(stretch: Real, law: CableLaw) -> Real:
+    """Derivative of elastic_tension() by the stretch, in N/m."""
+    return law.stiffness + 0.0 * stretch
+
+
+def elastic_energy(stretch: Real, law: CableLaw) -> Real:
+    """Integral of elastic_tension() from 0 to a stretch (m), in J."""
+    return 0.5 * law.stiffness * stretch**2
+
+
 @inlined
 def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
     """Tension (N) of a cable by Eq. 6.
@@ -109,3 +134,10 @@ def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]
     linear = elastic + law.damping * rate
     tension = minimum(maximum(linear, 0.0), most_tension(elastic))
     return tension, select(tension == linear, law.damping, 0.0)
+
+
+def tendon_faults(cables: Table, *, slack: bool) -> dict[str, Table]:
+    """What MuJoCo's tendons do otherwise than the cables in an array of dtype CABLE, in words, with
+    True for each cable (cables,) that it concerns. `slack` is true if cables go slack."""
+    is_damped = slack & (cables["damping"] != 0.0)
+    return {"the dampers of MuJoCo's tendons also act where a cable is slack": is_damped}

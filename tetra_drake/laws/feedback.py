@@ -1,47 +1,55 @@
 """Feedback to the oscillators: the term f of Eq. 7, from the robot's state and forces.
 
-There are three pathways, each with a gain. Feedback with opposite signs on extensor and flexor
-shifts the signal to one side. Feedback with equal signs excites or calms both neurons. In Taga
-(1991), angles act with opposite signs and loads with equal signs.
+Each pathway has a gain. Feedback with opposite signs on extensor and flexor shifts the signal to
+one side. Feedback with equal signs excites or calms both neurons. In Taga (1991), angles act with
+opposite signs and loads with equal signs.
 
-    length  relative elongation of the oscillator's cables from their lengths in equilibrium, mean
-            over the cables: + on the extensor, - on the flexor
-    load    share of the robot's weight on the feet of the body in front (the last body that the
-            oscillator's cables join): + on both
-    pitch   sine of the angle by which the x axis of that body points up: + on the extensor, - on
-            the flexor
+What a sense reads must be smooth within a step of an integrator. Forces are smooth, and modes are
+constant there. The sign of a gap jumps.
 
-The input of a sense must be smooth within a step of an integrator. Contact with the ground jumps;
-normal forces do not.
-
-To add a pathway: name it in Pathway and Gains, in the same order, and add its part to sense().
-A constant of the robot is a field of Senses, which robot.robot fills in.
+To add a pathway: a field of Gains, and its part of sense(). All engines have the state, the modes
+and Forces. A constant of the robot is a field of Senses, which robot.robot fills in.
 """
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, get_args
+from collections import namedtuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from tetra_drake.kernels.compiling import compiled
-from tetra_drake.kernels.lanes import Table
+from tetra_drake.kernels.compiling import compiled, inlined
+from tetra_drake.kernels.lanes import Table, named
+from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws import cable, contact
+from tetra_drake.laws.forces import Forces, compute_forces_at
+from tetra_drake.laws.model import Model
 from tetra_drake.settings.section import Section
-
-Pathway = Literal["length", "load", "pitch"]
-"""A signal that can be fed back to the oscillators; as described above."""
-
-PATHWAYS: tuple[str, ...] = get_args(Pathway)
-
-LENGTH, LOAD, PITCH = range(len(PATHWAYS))
-"""Indices of the pathways in tables of gains."""
 
 
 class Gains(Section):
-    """Gain of each pathway of feedback in a gait, in units of the input u0."""
+    """Gain of each pathway of feedback in a gait, in units of the input u0.
+
+    The *body in front* is the last body that the oscillator's cables join.
+    """
 
     length: float = 0.0
+    """Relative elongation of the oscillator's cables from their lengths in equilibrium, mean over
+    the cables: + on the extensor, - on the flexor."""
     load: float = 0.0
+    """Share of the robot's weight on the feet of the body in front: + on both."""
     pitch: float = 0.0
+    """Sine of the angle by which the x axis of the body in front points up: + on the extensor, - on
+    the flexor."""
+
+
+PATHWAYS = tuple(Gains.model_fields)
+"""Names of the pathways, in the order of tables of gains."""
+
+if TYPE_CHECKING:
+    Pathway = str
+    NamedGains: Any
+else:
+    Pathway = Literal[PATHWAYS]
+    NamedGains = namedtuple("NamedGains", PATHWAYS)
 
 
 class Senses(NamedTuple):
@@ -65,35 +73,47 @@ class Senses(NamedTuple):
     """Weight of a normal force (1,), in 1/N."""
 
 
-@compiled
+@inlined
 def sense(
-    senses: Senses,
-    gains: Table,
-    state: Table,
-    cable_forces: Table,
-    ground_forces: Table,
-    feedback: Table,
+    senses: Senses, gains: Table, state: Table, modes: Table, forces: Forces, feedback: Table
 ) -> None:
-    """Writes the feedback of each neuron (2m,), from the state of the bodies and its forces.
-
-    `gains` are in the order of PATHWAYS. `cable_forces` and `ground_forces` are the
-    tables of `cable` and `contact`.
-    """
+    """Writes the feedback of each neuron (2m,), from the state of the bodies, the modes of
+    `contact`, and the forces. `gains` are in the order of PATHWAYS."""
+    gain = named(NamedGains, gains)
     for i in range(feedback.size):
         feedback[i] = 0.0
     for i in range(senses.drivers.size):
-        k, length = senses.drivers[i], cable_forces[i, cable.LENGTH]
+        k, length = senses.drivers[i], forces.cable_forces[i, cable.LENGTH]
         if k != cable.PASSIVE:
             feedback[2 * k] += senses.per_length[i] * (length - senses.neutral_length[i])
     for k in range(feedback.size // 2):
         body, load = senses.ahead[k], 0.0
         for c in range(senses.carriers.size):
             if senses.carriers[c] == body:
-                load += ground_forces[c, contact.NORMAL]
+                load += forces.ground_forces[c, contact.NORMAL]
         q = 7 * body
         pitch = 2.0 * (state[q + 1] * state[q + 3] - state[q] * state[q + 2])
-        differs = gains[LENGTH] * feedback[2 * k]
-        differs += gains[PITCH] * pitch
-        same = gains[LOAD] * (senses.per_load[0] * load)
+        differs = gain.length * feedback[2 * k]
+        differs += gain.pitch * pitch
+        same = gain.load * (senses.per_load[0] * load)
         feedback[2 * k] = same + differs
         feedback[2 * k + 1] = same - differs
+
+
+@compiled
+def compute_feedback(
+    parts: Packed[tuple[Model, Forces, Senses]],
+    gains: Table,
+    state: Table,
+    modes: Table,
+    signals: Table,
+    drives: Table,
+    feedback: Table,
+) -> None:
+    """Computes the forces of a robot, and then its feedback; see sense().
+
+    The robot has signals (m,) in N, and drives (drives,).
+    """
+    robot, forces, senses = unpacked(parts)
+    compute_forces_at(robot, state, modes, signals, drives, forces)
+    sense(senses, gains, state, modes, forces, feedback)

@@ -91,8 +91,8 @@ def pull_of_cable(
     """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the index of
     the next drive.
 
-    `drive` is the index of the cable's drive, if it has one; then its rate and limit are written to
-    `drives`. The length is in m, its rate in m/s, `signals` (signals,) in N. An
+    `drive` is the index of the cable's drive, if it has one; then the other columns of
+    `drives` are written. The length is in m, its rate in m/s, `signals` (signals,) in N. An
     actuation force acts beside the spring and the damper of a cable that goes slack.
     """
     driver, signal = robot.cables.signal[i], 0.0
@@ -111,6 +111,7 @@ def pull_of_cable(
     )
     drives[drive, actuator.RATE] = driven.rate
     drives[drive, actuator.LIMITED] = driven.limited
+    drives[drive, actuator.BESIDE] = driven.beside
     return driven.tension, driven.tension_per_rate, drive + 1
 
 
@@ -325,15 +326,24 @@ def forces_along(
     and drives (k, drives).
     """
     robot, forces = unpacked(parts)
-    generalized = np.empty(6 * robot.bodies.mass.size)
     for k in range(states.shape[0]):
-        move_robot(robot, states[k], forces)
-        for i in range(drives.shape[1]):
-            forces.drives[i, actuator.DRIVE] = drives[k, i]
-        compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
+        compute_forces_at(robot, states[k], modes[k], signals[k], drives[k], forces)
         copy_rows(forces.nodes, nodes[k])
         copy_rows(forces.cable_forces, cable_forces[k])
         copy_rows(forces.ground_forces, ground_forces[k])
+
+
+@inlined
+def compute_forces_at(
+    robot: Model, state: Table, modes: Table, signals: Table, drives: Table, forces: Forces
+) -> None:
+    """Computes everything in Forces for a state (13 bodies,) and drives (drives,); see
+    compute_forces()."""
+    generalized = np.empty(6 * robot.bodies.mass.size)
+    move_robot(robot, state, forces)
+    for i in range(drives.size):
+        forces.drives[i, actuator.DRIVE] = drives[i]
+    compute_forces(robot, state, modes, signals, True, forces, generalized)
 
 
 @inlined

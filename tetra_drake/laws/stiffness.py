@@ -59,7 +59,9 @@ def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     direction = parts[:, cable.DIRECTION : cable.DIRECTION + 3]
     along = np.einsum("ci,cj->cij", direction, direction)
     tension = parts[:, cable.TENSION]
-    lengthwise = np.where((tension > 0.0) | (not robot.slack), cables.law.stiffness, 0.0)
+    stretch = parts[:, cable.LENGTH] - cables.law.free_length
+    stiffness = cable.elastic_stiffness(stretch, cables.law)
+    lengthwise = np.where((tension > 0.0) | (not robot.slack), stiffness, 0.0)
     sideways = tension / parts[:, cable.LENGTH]
     return Springs(
         carriers[cables.node_a],

@@ -2,19 +2,23 @@
 
 A part of the tally is a NamedTuple of tables, with a kernel that adds a step to them. All engines
 call observe(), which calls these kernels, at every step. On MuJoCo, which has its own contact, the
-forces of the ground here are the law's at MuJoCo's states. scenario.metrics computes metrics from
-the tables.
+forces of the ground here are the law's at MuJoCo's states. TalliedMetrics declares the metrics that
+are computed from the tables; scenario.metrics has all metrics.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple, Self
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Annotated, Any, NamedTuple, Self
 
 from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, minimum, select
-from tetra_drake.laws import actuator, cable
+from tetra_drake.laws import cable
+from tetra_drake.laws.actuator import LIMITS, exertion
 from tetra_drake.laws.clearance import least_strut_distance
 from tetra_drake.laws.contact import NORMAL
 from tetra_drake.laws.forces import Forces, sizes_of
@@ -46,22 +50,21 @@ class Effort(NamedTuple):
     peaks are over all steps."""
 
     left: Annotated[Table, "cables"]
-    """Length (m) of each driven cable at the latest step; its free length if a winch winds it."""
+    """Exertion.left of each driven cable at the latest step, in m."""
     peak_force: Annotated[Table, 1]
-    """Largest tension of a driven cable, in N."""
+    """Largest load of an actuator, in N; see actuator.Exertion."""
     peak_speed: Annotated[Table, 1]
     """Largest speed of an actuator in either direction, in m/s."""
     peak_power: Annotated[Table, 1]
     """Largest power of an actuator, in W."""
     impulse: Annotated[Table, 1]
-    """Integral of the tension, in N s."""
+    """Integral of the load, in N s."""
     wound: Annotated[Table, 1]
     """Length of cable wound and paid out, in m."""
     pulled: Annotated[Table, 1]
-    """Integral of the positive power of the tension, in J."""
+    """Integral of the positive power of the load, in J."""
     work: Annotated[Table, 1]
-    """Integral of max(0, -S dl/dt), in J. S is the signal, or the tension if actuators have
-    drives."""
+    """Integral of the positive power of Exertion.pull, in J."""
     limited: Annotated[Table, 1]
     """Time at a limit of an actuator, in s."""
 
@@ -70,40 +73,29 @@ class Effort(NamedTuple):
 def add_to_effort(effort: Effort, step: Step) -> None:
     """Adds a step."""
     signal, cable_forces = step.robot.cables.signal, step.forces.cable_forces
+    drives = step.forces.drives
     per_time, work = select(step.takes_time, 1.0 / step.duration, 0.0), 0.0 * step.duration
     drive = 0
     for i in range(effort.left.size):
         if signal[i] == cable.PASSIVE:
             continue
-        tension = cable_forces[i, cable.TENSION]
-        pull, left, limited = winding(step, i, drive)
+        tension, length = cable_forces[i, cable.TENSION], cable_forces[i, cable.LENGTH]
+        mean_signal = 0.5 * (step.signals_before[signal[i]] + step.signals[signal[i]])
+        own = exertion(step.robot.actuator, drives, drive, tension, length, mean_signal)
         drive += 1
-        wound = select(step.takes_time, effort.left[i] - left, 0.0)
-        effort.left[i] = left
+        wound = select(step.takes_time, effort.left[i] - own.left, 0.0)
+        effort.left[i] = own.left
         speed = wound * per_time
-        effort.peak_force[0] = maximum(effort.peak_force[0], tension)
+        effort.peak_force[0] = maximum(effort.peak_force[0], own.load)
         effort.peak_speed[0] = maximum(effort.peak_speed[0], abs(speed))
-        effort.peak_power[0] = maximum(effort.peak_power[0], tension * speed)
+        effort.peak_power[0] = maximum(effort.peak_power[0], own.load * speed)
         wound = select(step.counts, wound, 0.0)
-        work += maximum(pull * wound, 0.0)
-        effort.impulse[0] += step.counted * tension
+        work += maximum(own.pull * wound, 0.0)
+        effort.impulse[0] += step.counted * own.load
         effort.wound[0] += abs(wound)
-        effort.pulled[0] += maximum(tension * wound, 0.0)
-        effort.limited[0] += step.counted * limited
+        effort.pulled[0] += maximum(own.load * wound, 0.0)
+        effort.limited[0] += step.counted * own.limited
     effort.work[0] += work
-
-
-@inlined
-def winding(step: Step, i: int, drive: int) -> tuple[Real, Real, Real]:
-    """Actuator of cable `i`: the force (N) for its work, the length (m) for Effort.left, and 1 if a
-    limit binds, otherwise 0."""
-    length, of_robot = step.forces.cable_forces[i, cable.LENGTH], step.robot.actuator
-    if not actuator.has_drive(of_robot):
-        k = step.robot.cables.signal[i]
-        return 0.5 * (step.signals_before[k] + step.signals[k]), length, 0.0 * length
-    drives, tension = step.forces.drives, step.forces.cable_forces[i, cable.TENSION]
-    left = actuator.wound(of_robot, drives[drive, actuator.DRIVE], length)
-    return tension, left, drives[drive, actuator.LIMITED]
 
 
 class Roughness(NamedTuple):
@@ -235,3 +227,104 @@ def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> 
     radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]
     least = least_strut_distance(robot.struts, radius, first_node, state, nodes, least)
     tally.clearance[0] = least
+
+
+@dataclass(frozen=True)
+class Metric:
+    """Declaration of a metric: its unit, its computation, and its use."""
+
+    unit: str
+    """SI unit; "" for none."""
+    note: str
+    """Short explanation for tables."""
+    compute: Callable[[Any], float]
+    """Function of a scenario.metrics.Walk, or of Poses."""
+    least: bool = False
+    """True if the least value of several simulations is recorded, not their mean."""
+    most: bool = False
+    """True if the greatest value of several simulations is recorded."""
+    is_cost: bool = False
+    """True if less is better. A requirement is then an upper limit."""
+    is_share: bool = False
+    """True for a share of time. It is shown in percent."""
+    of_pose: bool = False
+    """True if Poses are enough for it."""
+    needs: str = ""
+    """Property, such as LIMITS, that a robot must have for this metric; "" for no condition."""
+
+
+def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
+    """A field of a class of metrics, with its declaration as metadata; see Metric."""
+    return field(metadata={"metric": Metric(unit, note, compute, **more)})
+
+
+def total(name: str) -> Callable[[Any], float]:
+    """Function of a Walk: a number of its tally, such as "effort.work"."""
+    number = operator.attrgetter(name)
+    return lambda walk: number(walk.tally)[0]
+
+
+def mean(name: str) -> Callable[[Any], float]:
+    """Function of a Walk: a total of Effort as mean over the steady stretch and the actuators."""
+    return lambda walk: walk.per_actuator_time * getattr(walk.tally.effort, name)[0]
+
+
+def greatest(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
+    """Declaration of a cost whose greatest value of several simulations counts."""
+    return metric(unit, note, compute, most=True, is_cost=True, **more)
+
+
+def _signal_rate(walk: Any) -> float:
+    mean_square = walk.per_steady_time * float(walk.tally.roughness.total[0])
+    return math.sqrt(mean_square / max(walk.signals.shape[1], 1))
+
+
+@dataclass(frozen=True)
+class TalliedMetrics:
+    """Metrics of every step of a simulation: functions of the tally."""
+
+    rolled: float = metric("rad", "forward positive", total("rolled.angle"))
+    """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
+    turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
+    velocities best, so a change of shape alone does not count."""
+    actuator_work: float = metric("J", "of all actuators", total("effort.work"), is_cost=True)
+    """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
+    max(0, -S dl/dt) for driven cables with signal S and length l."""
+    signal_rate: float = metric("N/s", "how fast signals change", _signal_rate, is_cost=True)
+    """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
+    lifted: float = metric(
+        "",
+        "time off the ground",
+        lambda walk: sum(walk.lifted_shares) / len(walk.lifted_shares),
+        is_share=True,
+    )
+    """Share of the steady stretch during which a body is off the ground, mean over the bodies. A
+    body is off the ground if no contact node of it bears a normal force. In MuJoCo this metric says
+    little."""
+    clearance: float = metric("m", "smallest gap of struts' axes", total("clearance"), least=True)
+    """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
+    is less than their diameter: the model does not prevent this."""
+    tension: float = metric("N", "smallest of any cable", total("tension.of_all"), least=True)
+    """Least tension of any cable at any time. Below 0 the cable would have to push."""
+    peak_actuator_force: float = greatest(
+        "N", "at any time; a cable can pull a winch backward", total("effort.peak_force")
+    )
+    """Greatest load of an actuator at any time: the tension of its cable, without what the cable's
+    own spring exerts beside an actuator with limits. It exceeds the `max_force` of a winch while
+    the robot stretches the cable faster than the stalled winch pays out."""
+    mean_actuator_force: float = metric("N", "of all driven cables", mean("impulse"), is_cost=True)
+    """Mean load of the actuators in the steady stretch."""
+    peak_actuator_speed: float = greatest("m/s", "at any time", total("effort.peak_speed"))
+    """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
+    for a winch, otherwise of the cable's length."""
+    mean_actuator_speed: float = metric("m/s", "winding or paying out", mean("wound"), is_cost=True)
+    """Mean speed in the steady stretch, winding or paying out."""
+    peak_actuator_power: float = greatest("W", "at any time", total("effort.peak_power"))
+    """Greatest product of an actuator's load and winding speed, at any time."""
+    mean_actuator_power: float = greatest("W", "effort of an actuator", mean("pulled"))
+    """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
+    actuator_limited: float = greatest(
+        "", "time at a limit of an actuator", mean("limited"), is_share=True, needs=LIMITS
+    )
+    """Share of the steady stretch during which a limit of an actuator binds, mean over the
+    actuators."""

@@ -29,8 +29,8 @@ class Loads(NamedTuple):
     """1 where a limit binds, otherwise 0 (times, driven cables); NaN without limits."""
     table: pandas.DataFrame
     """A row per driven cable, with units in the names of the columns: peaks, and means over the
-    steady stretch. Limits that do not exist are NaN. Lengths and speeds are as in
-    laws.actuator.wound()."""
+    steady stretch. Limits that do not exist are NaN. Forces and lengths are as in
+    laws.actuator.Exertion."""
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
@@ -45,7 +45,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
 
     driven = DrivenCables(law, signal, length, rate, tension, walk.free_length.values)
-    left, limited, drives = length, np.full_like(length, math.nan), kind.drives(driven)
+    load, left, limited = tension, length, np.full_like(length, math.nan)
+    drives = kind.drives(driven)
 
     @np.vectorize
     def pull(
@@ -54,12 +55,12 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         return actuator.actuator_force(constants, drive, length, rate, signal, CableLaw(*law))
 
     if actuator.has_drive(constants):
-        _, _, drive_rate, limited = pull(drives + _TOLERANCE, length, rate, signal, *law)
-        left = actuator.wound(constants, drives, length)
+        _, _, drive_rate, limited, beside = pull(drives + _TOLERANCE, length, rate, signal, *law)
+        load, left = tension - beside, actuator.wound(constants, drives, length)
         rate = actuator.wound(constants, drive_rate, rate)
-    power, steady = -tension * rate, trajectory.time.values >= steady_start(robot.scenario)
+    power, steady = -load * rate, trajectory.time.values >= steady_start(robot.scenario)
     columns = {
-        "peak_force_N": tension.max(axis=0),
+        "peak_force_N": load.max(axis=0),
         "limit_of_force_N": limits.max_force,
         "peak_speed_mm_per_s": 1e3 * np.abs(rate).max(axis=0),
         "limit_of_speed_mm_per_s": 1e3 * limits.max_speed,

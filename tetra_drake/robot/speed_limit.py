@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from tetra_drake.laws.actuator import Limits
+from tetra_drake.laws.cable import CableLaw, elastic_energy, elastic_tension
 from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.structure import node_positions
 
@@ -44,12 +45,13 @@ def _cable_energy(driven: DrivenRobot, p_WN: np.ndarray) -> float:
     """
     robot = driven.robot
     cables, cpg = robot.structure.cables, robot.scenario.cpg
+    law = CableLaw.of(cables)
     length = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
-    stretch = length - cables["free_length"]
+    stretch = length - law.free_length
     if robot.structure.slack:
         stretch = np.maximum(stretch, 0.0)
     pull = Limits(*robot.model.actuator.limits).max_force
     if math.isnan(pull):  # actuators without limits
         pull = max(abs(cpg.gain * cpg.external_input), np.abs(driven.samples).max(initial=0.0))
-    pulls = np.minimum(pull, cables["stiffness"] * length) * length
-    return float(0.5 * cables["stiffness"] @ stretch**2 + pulls[robot.driven].sum())
+    pulls = np.minimum(pull, elastic_tension(length, law)) * length
+    return float(np.sum(elastic_energy(stretch, law)) + pulls[robot.driven].sum())

@@ -7,18 +7,15 @@ import itertools
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
 from tetra_drake.files import json_number
 from tetra_drake.formatting import TextTable
-from tetra_drake.laws.actuator import LIMITS
 from tetra_drake.laws.curves import curvature, travelling_index
+from tetra_drake.laws.tally import Metric, TalliedMetrics, Tally, metric
 from tetra_drake.settings.units import INCH, INCHES, Units, current
-
-if TYPE_CHECKING:
-    from tetra_drake.laws.tally import Tally
 
 STRAIGHT = 0.01
 """Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
@@ -27,7 +24,7 @@ by a fifth of a millimetre."""
 LEAST_WAY = 1e-3
 """Least way (m) of a robot in the computation of its cost of transport."""
 ROW = "row of tetrahedra"
-"""Properties of robots that some metrics need."""
+"""Property of robots that some metrics need."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,44 +85,15 @@ class Walk(Poses):
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
-    def mean(self, effort: str) -> float:
-        """A total of laws.tally.Effort as mean over the steady stretch and the actuators."""
-        per_actuator_time = self.per_steady_time / max(self.actuators, 1)
-        return per_actuator_time * float(getattr(self.tally.effort, effort)[0])
+    @property
+    def per_actuator_time(self) -> float:
+        """1 / duration of the steady stretch, divided by the number of actuators."""
+        return self.per_steady_time / max(self.actuators, 1)
 
     @property
     def lifted_shares(self) -> tuple[float, ...]:
         """Share of the steady stretch during which each body is off the ground."""
         return tuple((self.per_steady_time * self.tally.lifted.time).tolist())
-
-
-@dataclass(frozen=True)
-class Metric:
-    """Declaration of a metric: its unit, its computation, and its use."""
-
-    unit: str
-    """SI unit; "" for none."""
-    note: str
-    """Short explanation for tables."""
-    compute: Callable[[Any], float]
-    """Function of a Walk."""
-    least: bool = False
-    """True if the least value of several simulations is recorded, not their mean."""
-    most: bool = False
-    """True if the greatest value of several simulations is recorded."""
-    is_cost: bool = False
-    """True if less is better. A requirement is then an upper limit."""
-    is_share: bool = False
-    """True for a share of time. It is shown in percent."""
-    of_pose: bool = False
-    """True if Poses are enough for it."""
-    needs: str = ""
-    """Property (ROW or LIMITS) that a robot must have for this metric; "" for no condition."""
-
-
-def _metric(unit: str, note: str, compute: Callable[[Walk], float], **more: Any) -> Any:
-    """A field of Metrics, with its declaration as metadata."""
-    return field(metadata={"metric": Metric(unit, note, compute, **more)})
 
 
 def _cost_of_transport(walk: Walk) -> float:
@@ -134,13 +102,68 @@ def _cost_of_transport(walk: Walk) -> float:
     return float(walk.tally.effort.work[0]) / carried if carried else math.inf
 
 
-def _signal_rate(walk: Walk) -> float:
-    mean_square = walk.per_steady_time * float(walk.tally.roughness.total[0])
-    return math.sqrt(mean_square / max(walk.signals.shape[1], 1))
+def _of_poses(unit: str, note: str, compute: Callable[[Poses], float], **more: Any) -> Any:
+    """Declaration of a metric that is a function of Poses."""
+    return metric(unit, note, compute, of_pose=True, **more)
 
 
 @dataclass(frozen=True)
-class Metrics:
+class WalkMetrics:
+    """Metrics from positions and signals at a few times."""
+
+    distance: float = _of_poses("m", "along x", lambda walk: walk.followed_way[0])
+    """Displacement of x₁ from the start to the end."""
+    steady_distance: float = _of_poses(
+        "m", "without the start", lambda walk: walk.followed[2, 0] - walk.followed[1, 0]
+    )
+    """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
+    speed: float = _of_poses(
+        "m/s", "of the centre", lambda walk: walk.steady_centre_way[0] / walk.since_steady_from
+    )
+    """Mean speed of the centre along x from `simulation.steady_from` on."""
+    twist: float = _of_poses(
+        "m",
+        "one rear foot ahead of the other",
+        lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
+        needs=ROW,
+        is_cost=True,
+    )
+    """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
+    lead: float = _of_poses(
+        "m",
+        "front tip ahead of rear foot",
+        lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
+        needs=ROW,
+    )
+    """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
+    lateral_drift: float = _of_poses(
+        "m", "sideways", lambda walk: abs(walk.followed_way[1]), is_cost=True
+    )
+    """Sideways displacement, abs(y₁), at the end."""
+    heading_change: float = metric(
+        "rad", "left positive", lambda walk: walk.heading[-1] - walk.heading[0], needs=ROW
+    )
+    """Angle by which the robot has turned to the left at the end. Whole turns count. See
+    robot.path."""
+    path_curvature: float = metric(
+        "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path, scale=walk.scale)
+    )
+    """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
+    the path bends left as seen along the motion, even if the robot walks backward."""
+    cost_of_transport: float = metric(
+        "", "work / (weight x distance)", _cost_of_transport, is_cost=True
+    )
+    """Actuator work divided by weight and by the centre's displacement over the ground, in the
+    steady stretch. The displacement counts as at least 1 mm. Infinite without gravity."""
+    travelling_index: float = metric(
+        "", "0: standing wave, 1: travelling", lambda walk: travelling_index(walk.signals)
+    )
+    """Travelling index of the signals in the steady stretch: 0 for a standing wave along the robot,
+    1 for a travelling wave."""
+
+
+@dataclass(frozen=True)
+class Metrics(TalliedMetrics, WalkMetrics):
     """Metrics of a simulation, in SI units.
 
     T1's bottom left node is at x₁ and y₁, its bottom right node at x₂. The tip of the front
@@ -150,133 +173,6 @@ class Metrics:
     NaN.
     """
 
-    distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0], of_pose=True)
-    """Displacement of x₁ from the start to the end."""
-    steady_distance: float = _metric(
-        "m",
-        "without the start",
-        lambda walk: walk.followed[2, 0] - walk.followed[1, 0],
-        of_pose=True,
-    )
-    """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
-    speed: float = _metric(
-        "m/s",
-        "of the centre",
-        lambda walk: walk.steady_centre_way[0] / walk.since_steady_from,
-        of_pose=True,
-    )
-    """Mean speed of the centre along x from `simulation.steady_from` on."""
-    twist: float = _metric(
-        "m",
-        "one rear foot ahead of the other",
-        lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
-        of_pose=True,
-        needs=ROW,
-        is_cost=True,
-    )
-    """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
-    lead: float = _metric(
-        "m",
-        "front tip ahead of rear foot",
-        lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
-        of_pose=True,
-        needs=ROW,
-    )
-    """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
-    lateral_drift: float = _metric(
-        "m", "sideways", lambda walk: abs(walk.followed_way[1]), of_pose=True, is_cost=True
-    )
-    """Sideways displacement, abs(y₁), at the end."""
-    heading_change: float = _metric(
-        "rad", "left positive", lambda walk: walk.heading[-1] - walk.heading[0], needs=ROW
-    )
-    """Angle by which the robot has turned to the left at the end. Whole turns count. See
-    robot.path."""
-    rolled: float = _metric("rad", "forward positive", lambda walk: walk.tally.rolled.angle[0])
-    """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
-    turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
-    velocities best, so a change of shape alone does not count."""
-    path_curvature: float = _metric(
-        "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path, scale=walk.scale)
-    )
-    """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
-    the path bends left as seen along the motion, even if the robot walks backward."""
-    actuator_work: float = _metric(
-        "J", "of all actuators", lambda walk: walk.tally.effort.work[0], is_cost=True
-    )
-    """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
-    max(0, -S dl/dt) for driven cables with signal S and length l."""
-    cost_of_transport: float = _metric(
-        "", "work / (weight x distance)", _cost_of_transport, is_cost=True
-    )
-    """Actuator work divided by weight and by the centre's displacement over the ground, in the
-    steady stretch. The displacement counts as at least 1 mm. Infinite without gravity."""
-    signal_rate: float = _metric("N/s", "how fast signals change", _signal_rate, is_cost=True)
-    """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
-    lifted: float = _metric(
-        "",
-        "time off the ground",
-        lambda walk: sum(walk.lifted_shares) / len(walk.lifted_shares),
-        is_share=True,
-    )
-    """Share of the steady stretch during which a body is off the ground, mean over the bodies. A
-    body is off the ground if no contact node of it bears a normal force. In MuJoCo this metric says
-    little."""
-    clearance: float = _metric(
-        "m", "smallest gap of struts' axes", lambda walk: walk.tally.clearance[0], least=True
-    )
-    """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
-    is less than their diameter: the model does not prevent this."""
-    tension: float = _metric(
-        "N", "smallest of any cable", lambda walk: walk.tally.tension.of_all[0], least=True
-    )
-    """Least tension of any cable at any time. Below 0 the cable would have to push."""
-    travelling_index: float = _metric(
-        "", "0: standing wave, 1: travelling", lambda walk: travelling_index(walk.signals)
-    )
-    """Travelling index of the signals in the steady stretch: 0 for a standing wave along the robot,
-    1 for a travelling wave."""
-    peak_actuator_force: float = _metric(
-        "N",
-        "at any time; a cable can pull a winch backward",
-        lambda walk: walk.tally.effort.peak_force[0],
-        most=True,
-        is_cost=True,
-    )
-    """Greatest tension of a driven cable at any time. It exceeds the `max_force` of a winch while
-    the robot stretches the cable faster than the stalled winch pays out."""
-    mean_actuator_force: float = _metric(
-        "N", "of all driven cables", lambda walk: walk.mean("impulse"), is_cost=True
-    )
-    """Mean tension of the driven cables in the steady stretch."""
-    peak_actuator_speed: float = _metric(
-        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True, is_cost=True
-    )
-    """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
-    for a winch, otherwise of the cable's length."""
-    mean_actuator_speed: float = _metric(
-        "m/s", "winding or paying out", lambda walk: walk.mean("wound"), is_cost=True
-    )
-    """Mean speed in the steady stretch, winding or paying out."""
-    peak_actuator_power: float = _metric(
-        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True, is_cost=True
-    )
-    """Greatest product of an actuator's tension and winding speed, at any time."""
-    mean_actuator_power: float = _metric(
-        "W", "effort of an actuator", lambda walk: walk.mean("pulled"), most=True, is_cost=True
-    )
-    """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
-    actuator_limited: float = _metric(
-        "",
-        "time at a limit of an actuator",
-        lambda walk: walk.mean("limited"),
-        most=True,
-        is_cost=True,
-        is_share=True,
-        needs=LIMITS,
-    )
-    """Share of the steady stretch during which a limit of an actuator binds, mean over the
-    actuators."""
     lifted_shares: tuple[float, ...] = ()
     """Share of the steady stretch during which each body is off the ground, from T1 on."""
     units: Units = field(default=INCHES, repr=False, compare=False)

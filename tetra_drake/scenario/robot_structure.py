@@ -17,6 +17,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch, elastic_tension
 from tetra_drake.laws.model import WORLD
 from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.scenario.blueprint import Blueprint
@@ -30,7 +31,6 @@ from tetra_drake.scenario.robot_tetrahedra import (
 )
 from tetra_drake.settings.quantities import (
     Acceleration,
-    Damping,
     Density,
     ForceQuantity,
     Length,
@@ -120,11 +120,9 @@ class Sphere(NamedTuple):
     """Radius with which it touches the ground by default."""
 
 
-class CableGroup(Section):
+class CableGroup(CableConstants):
     """Cables of one make, which never push."""
 
-    damping: Damping = Field(ge=0)
-    """Tension per rate of the length."""
     pairs: Pairs
     """The nodes that each cable joins."""
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
@@ -143,18 +141,14 @@ class CableGroup(Section):
 
     def law(self, free_length: float) -> dict[str, float]:
         """The constants of a cable, by the names of laws.cable.CableLaw."""
-        return dict(stiffness=self.stiffness, damping=self.damping, free_length=free_length)
+        return self.constants(stiffness=self.stiffness, free_length=free_length)
 
     def greatest_tension(self, length: float) -> float:
         """Tension (N) of a cable of this length (m) with a free length of 0."""
-        from tetra_drake.laws.cable import CableLaw, elastic_tension
-
         return elastic_tension(length, CableLaw(**self.law(0.0)))
 
     def free_length_at(self, length: float) -> float:
         """Free length (m) of a cable. `length` (m) is the distance of its nodes in the file."""
-        from tetra_drake.laws.cable import CableLaw, elastic_stretch
-
         if self.free_length is not None:
             return self.free_length
         return length - elastic_stretch(self.tension or 0.0, CableLaw(**self.law(length)))

@@ -10,10 +10,10 @@ from typing import Annotated, ClassVar, Literal, get_args
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.settings.quantities import (
     Acceleration,
-    Damping,
     Density,
     Length,
     Mass,
@@ -92,11 +92,9 @@ def check_strut(key: str, *, length: float, diameter: float, density: float) -> 
         refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
 
-class RowCables(Section):
+class RowCables(CableConstants):
     """The cables of a row (Table 3)."""
 
-    damping: Damping = Field(ge=0)
-    """Tension per rate of the length."""
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of outer cables, which join base nodes of the same name."""
     inner_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
@@ -109,7 +107,7 @@ class RowCables(Section):
     def law(self, cable: str) -> dict[str, float]:
         """Constants of a cable of a junction, by the names of laws.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
-        return dict(stiffness=stiffness, damping=self.damping, free_length=self.free_length)
+        return self.constants(stiffness=stiffness, free_length=self.free_length)
 
 
 class Tetrahedra(Section):
@@ -264,8 +262,6 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
     neglected: twice the density moves T1 by less than 0.003 in. Refuses cables that balance at no
     spacing.
     """
-    from tetra_drake.laws.cable import CableLaw, elastic_tension
-
     height = strut_length * math.sqrt(2.0 / 3.0)
     radius = strut_length / math.sqrt(3.0)
     outer, inner = CableLaw(**cables.law("outer top")), CableLaw(**cables.law("inner top"))
@@ -287,7 +283,7 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
     return far
 
 
-def _deciding_numbers(robot: Tetrahedra) -> tuple[float, ...]:
-    """Numbers that determine the balanced spacing."""
-    cables = robot.cables
-    return cables.outer_stiffness, cables.inner_stiffness, cables.free_length, robot.strut_length
+def _deciding_numbers(robot: Tetrahedra) -> tuple[object, ...]:
+    """Numbers that determine the balanced spacing: all constants of the law of a cable at rest."""
+    laws = [robot.cables.law(cable) | {"damping": 0.0} for cable in ("outer top", "inner top")]
+    return robot.strut_length, *laws

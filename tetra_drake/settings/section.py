@@ -271,6 +271,7 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
 LIMIT_WORDS = {
     "greater_than": ("gt", "more than", "> {}"),
     "greater_than_equal": ("ge", "at least", "≥ {}"),
+    "less_than": ("lt", "less than", "< {}"),
     "less_than_equal": ("le", "at most", "≤ {}"),
     "too_short": ("min_length", "at least", "≥ {} items"),
     "too_long": ("max_length", "at most", "≤ {} items"),

@@ -42,15 +42,15 @@ def MakeTensegrityDiagram(
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is the scenario's start.
 
-        steering ──→ cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
-                      ↑                     ↑  │   │                       │
-                      │                     │  │  ground                   │
-                      │                     │  ↓   │ ↑                     │
-                      └───── feedback ←─────┼──────┘ │                     │
-                                ↑           │        │                     │
-                                └───────────┴────────┴─────────────────────┘
+        steering ──→ cpg ──→ start_up ─┬─→ cables ──┬──→ forces ──→ plant ──┬──→ state
+                      ↑                │      ↑     │                       │
+                      │                │      │   ground                    │
+                      │                ↓      │    │ ↑                      │
+                      └───────────── feedback ←────┘ │                      │
+                                       ↑      │      │                      │
+                                       └──────┴──────┴──────────────────────┘
 
-        cables_actuators ←──→ cables
+        cables_actuators ←──→ cables, and ──→ feedback
 
         state_forces ──→ forces
 
@@ -133,8 +133,10 @@ def MakeTensegrityDiagram(
         gains = [gain for _, gain in gait.gains]
         feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))
         builder.Connect(state, feedback.GetInputPort("state"))
-        for source, name in ((cables, "cable_forces"), (ground, "ground_forces")):
-            builder.Connect(source.GetOutputPort(name), feedback.GetInputPort(name))
+        builder.Connect(signals, feedback.GetInputPort("signals"))
+        builder.Connect(ground.GetOutputPort("mode_table"), feedback.GetInputPort("mode_table"))
+        if feedback.HasInputPort("drives"):
+            builder.Connect(actuators.get_output_port(), feedback.GetInputPort("drives"))
         cpg = builder.GetSubsystemByName("cpg")
         builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
 

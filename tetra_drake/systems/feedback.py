@@ -6,44 +6,50 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
-from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
-from tetra_drake.laws.feedback import sense
+from tetra_drake.kernels.compiling import machine_code
+from tetra_drake.kernels.packed import Packed
+from tetra_drake.laws.contact import MODE_COLUMNS
+from tetra_drake.laws.feedback import compute_feedback
+from tetra_drake.laws.forces import Forces
 from tetra_drake.robot.robot import Robot
 
 
 class Feedback(LeafSystem):
-    """Feedback from cables, ground and bodies to the oscillators (see laws.feedback). It has no
+    """Feedback from all that acts on a robot to its oscillators (see laws.feedback). It has no
     state.
 
-    | port          | shape         | unit | meaning                                               |
-    |---------------|---------------|------|-------------------------------------------------------|
-    | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
-    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables      |
-    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground    |
-    | feedback      | (2m,)         | 1    | f of Eq. 7 for the neurons of m oscillators           |
+    | port       | shape          | unit   | meaning                                           |
+    |------------|----------------|--------|---------------------------------------------------|
+    | state      | (13 n,)        | SI     | [q; v] of n free bodies, from the plant           |
+    | signals    | (m,)           | N      | signals of the cables                             |
+    | drives     | (drives,)      | m or N | states of the actuators                           |
+    | mode_table | (12 contacts,) | SI     | table of laws.contact, row by row, of the ground  |
+    | feedback   | (2m,)          | 1      | f of Eq. 7 for the neurons of m oscillators       |
+
+    The port `drives` exists only if the kind of actuators has states.
     """
 
     def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
         """`gains` are in the order of Gains. Raises InputError if the robot has no equilibrium."""
         super().__init__()
-        structure = robot.structure
-        self._senses = robot.senses
-        self._gains = np.array(gains, dtype=float)
-        self._neurons = 2 * structure.signals
-        self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
-        cables, contacts = len(structure.cables), len(structure.contacts)
-        self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
-        self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
-        inputs = {self._state.ticket(), self._cables.ticket(), self._ground.ticket()}
-        self.DeclareVectorOutputPort("feedback", self._neurons, self._calc_feedback, inputs)
+        forces, signals = Forces.of(robot.model), robot.structure.signals
+        self._parts = Packed((robot.model, forces, robot.senses))
+        self._gains, self._no_drives = np.array(gains, dtype=float), np.zeros(0)
+        sizes = {"state": 13 * len(robot.structure.bodies), "signals": signals}
+        sizes["mode_table"] = len(robot.structure.contacts) * MODE_COLUMNS
+        if drives := len(forces.drives):
+            sizes["drives"] = drives
+        self._ports = {name: self.DeclareVectorInputPort(name, sizes[name]) for name in sizes}
+        tickets = {port.ticket() for port in self._ports.values()}
+        self.DeclareVectorOutputPort("feedback", 2 * signals, self._calc_feedback, tickets)
+        state, modes = np.empty(sizes["state"]), np.empty((0, MODE_COLUMNS))
+        given = self._gains, state, modes, self._gains, self._no_drives, np.empty(2 * signals)
+        self._compute = machine_code(compute_feedback, self._parts, *given)
 
     def _calc_feedback(self, context: Context, output: BasicVector) -> None:
-        sense(
-            self._senses,
-            self._gains,
-            self._state.Eval(context),
-            self._cables.Eval(context).reshape(-1, CABLE_FORCE_COLUMNS),
-            self._ground.Eval(context).reshape(-1, GROUND_FORCE_COLUMNS),
-            output.get_mutable_value(),
+        given = {name: port.Eval(context) for name, port in self._ports.items()}
+        modes = given["mode_table"].reshape(-1, MODE_COLUMNS)
+        drives, feedback = given.get("drives", self._no_drives), output.get_mutable_value()
+        self._compute(
+            self._parts, self._gains, given["state"], modes, given["signals"], drives, feedback
         )

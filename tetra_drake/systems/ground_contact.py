@@ -47,6 +47,7 @@ class GroundContact(LeafSystem):
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
     |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
+    | mode_table        | (12 m,) | SI     | table `modes` of laws.contact, row by row         |
     | ground_forces     | (3 m,)  | N      | table of laws.contact, row by row                 |
 
     On flat ground t1 and t2 are x and y; otherwise see `laws.terrain`; `laws.friction`
@@ -89,6 +90,9 @@ class GroundContact(LeafSystem):
         self.DeclareVectorOutputPort("normal_forces", count, self._calc_normal, sources)
         self.DeclareVectorOutputPort("friction_forces", 2 * count, self._calc_friction, sources)
         self.DeclareVectorOutputPort("modes", 3 * count, self._calc_modes, {self.xd_ticket()})
+        self.DeclareVectorOutputPort(
+            "mode_table", modes.size, self._calc_mode_table, {self.xd_ticket()}
+        )
         self.DeclareVectorOutputPort("ground_forces", 3 * count, self._calc_table, sources)
 
     def NextModeChange(
@@ -146,6 +150,9 @@ class GroundContact(LeafSystem):
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._modes(context)[:, : contact.STICK_POINT].ravel())
+
+    def _calc_mode_table(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._modes(context).ravel())
 
 
 def AddGroundContact(

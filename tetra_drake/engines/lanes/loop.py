@@ -350,8 +350,7 @@ def keep_outputs(constants: Constants, lanes: LaneState, log: Log) -> None:
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
     """Writes the inputs of a live network at a time (s), from a state and its forces."""
     steer(constants, lanes, log, time / constants.period[0])
-    cable_forces, ground_forces = lanes.forces.cable_forces, lanes.forces.ground_forces
-    sense(constants.senses, constants.gains, state, cable_forces, ground_forces, lanes.inputs)
+    sense(constants.senses, constants.gains, state, lanes.modes, lanes.forces, lanes.inputs)
     for i in range(lanes.inputs.size):
         lanes.inputs[i] += lanes.tonic[i]
 
