@@ -28,7 +28,7 @@ class DaskExecutors:
         self._client = client
 
     def __call__(self, workers: int) -> Executor:
-        # Dask refuses a key that has killed its worker. Without `pure`, a second try has a new key.
+        # Dask refuses a key that has killed its worker. Without `pure`, a resumed run has new keys.
         return self._client.get_executor(pure=False)
 
     @property

@@ -10,14 +10,12 @@ An evaluator stores no results. After a crash, a run is resumed from its record.
 from __future__ import annotations
 
 import contextlib
-import functools
 import multiprocessing
 import os
 import pickle
 import signal
 import sys
 import threading
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -101,24 +99,28 @@ class InLanes(contextlib.AbstractContextManager["InLanes"]):
 
 
 class InProcesses(contextlib.AbstractContextManager["InProcesses"]):
-    """Evaluates in worker processes. They are spawned, not forked, and end with this process.
-
-    Each worker process has its own executor, because all processes of one executor die together.
-    """
+    """Evaluates in worker processes. They are spawned, not forked, and end with this process."""
 
     def __init__(self, evaluate: Evaluate, workers: int) -> None:
         self._evaluate = evaluate
-        self._threads = futures.ThreadPoolExecutor(workers)
-        self._idle: deque[Executor] = deque()
         self._lifeline, self._holder = multiprocessing.Pipe(duplex=False)
+        self._processes = futures.ProcessPoolExecutor(
+            workers,
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_end_with,
+            initargs=(self._lifeline,),
+            max_tasks_per_child=TASKS_PER_WORKER,
+        )
+        # An executor with more tasks than processes does not replace its processes
+        # (https://github.com/python/cpython/issues/115634). So tasks wait in front of threads.
+        self._threads = futures.ThreadPoolExecutor(workers)
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
         if kind is not None:
             self._holder.close()
         self._threads.shutdown()
-        for executor in self._idle:
-            executor.shutdown()
+        self._processes.shutdown()
         self._holder.close()
         self._lifeline.close()
 
@@ -128,27 +130,7 @@ class InProcesses(contextlib.AbstractContextManager["InProcesses"]):
             return self._threads.submit(self._in_process, task)
 
     def _in_process(self, task: Task) -> Evaluation:
-        executor = self._idle.pop() if self._idle else self._started()
-        evaluation = executor.submit(self._evaluate, task).result()
-        self._idle.append(executor)  # unless its process has died
-        return evaluation
-
-    def _started(self) -> Executor:
-        """A new executor with one process, which has loaded the evaluation."""
-        executor = futures.ProcessPoolExecutor(
-            max_workers=1,
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=_end_with,
-            initargs=(self._lifeline,),
-            max_tasks_per_child=TASKS_PER_WORKER,
-        )
-        try:
-            executor.submit(_load, self._evaluate).result()
-        except BrokenExecutor as error:
-            cause = f"it may be that {_UNGUARDED}, or that memory is short"
-            problem = f"do not start, as they say above; {cause}"
-            raise InputError(_SOURCE, "", problem) from error
-        return executor
+        return self._processes.submit(self._evaluate, task).result()
 
 
 def _end_with(lifeline: Connection) -> None:
@@ -160,10 +142,6 @@ def _end_with(lifeline: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _load(evaluate: Evaluate) -> None:
-    """First task of a worker process. It does nothing, but the function is loaded for it."""
 
 
 @contextlib.contextmanager
@@ -179,11 +157,10 @@ def deaf_to_ctrl_c() -> Iterator[None]:
 
 
 class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
-    """Evaluates on an executor of concurrent.futures. A broken executor is replaced."""
+    """Evaluates on an executor of concurrent.futures."""
 
     def __init__(self, evaluate: Evaluate, make: MakeExecutor, workers: int) -> None:
-        self._evaluate, self._make = evaluate, functools.partial(make, workers)
-        self._executor = self._make()
+        self._evaluate, self._executor = evaluate, make(workers)
         self._submitted: set[Future[Evaluation]] = set()
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -192,20 +169,19 @@ class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
         self._executor.shutdown(wait=kind is None)
 
     def submit(self, task: Task) -> Future[Evaluation]:
-        """See Evaluator.submit()."""
+        """See Evaluator.submit(). Raises InputError if the executor is broken or shut down."""
         try:
             future = self._executor.submit(self._evaluate, task)
-        except BrokenExecutor:
-            self._executor.shutdown(wait=False)
-            self._executor = self._make()
-            future = self._executor.submit(self._evaluate, task)
+        except RuntimeError as error:
+            problem = f"takes no more tasks; the run can be resumed: {error}"
+            raise InputError("executor", "", problem) from error
         self._submitted.add(future)
         future.add_done_callback(self._submitted.discard)
         return future
 
 
 class Lent(Executor):
-    """An executor of the user, as a MakeExecutor: it is neither shut down nor replaced."""
+    """An executor of the user, as a MakeExecutor: it is not shut down."""
 
     workers = "its executor's"
 
@@ -216,71 +192,39 @@ class Lent(Executor):
         return self
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **more: Any) -> Future[Any]:
-        """Submits a task. Raises InputError if the executor is broken or shut down."""
-        try:
-            return self._executor.submit(function, *args, **more)
-        except RuntimeError as error:
-            problem = f"takes no more tasks; the run can be resumed: {error}"
-            raise InputError("executor", "", problem) from error
+        """See Executor.submit()."""
+        return self._executor.submit(function, *args, **more)
 
 
 class Evaluations:
-    """Queue of tasks in front of an evaluator.
-
-    If a worker dies, its task is tried once more, alone, because memory may have been short. If the
-    second worker dies, too, an InputError names the task.
-    """
+    """Queue of tasks in front of an evaluator."""
 
     def __init__(self, evaluator: Evaluator) -> None:
         self._evaluator = evaluator
-        self._waiting: deque[Task] = deque()
         self._running: dict[Future[Evaluation], Task] = {}
-        self._died: deque[Task] = deque()
-        """Tasks whose workers died. While it is not empty, no other task begins."""
 
     @property
     def busy(self) -> bool:
-        """True if a task is running or waiting."""
-        return any((self._waiting, self._running, self._died))
+        """True if a task is not finished."""
+        return bool(self._running)
 
     def add(self, tasks: Iterable[Task]) -> None:
         """Adds tasks to the queue."""
-        self._waiting.extend(tasks)
+        for task in tasks:
+            self._running[self._evaluator.submit(task)] = task
 
     def wait(self, timeout: float | None = None) -> list[tuple[Task, Evaluation]]:
         """Finished tasks and their evaluations. Returns when at least one is finished, or after
-        `timeout` seconds."""
-        if self._died and not self._running:
-            return [self._tried_alone(self._died.popleft())]
-        while self._waiting and not self._died:
-            task = self._waiting.popleft()
-            self._running[self._evaluator.submit(task)] = task
-        done, _ = futures.wait(self._running, timeout, return_when=futures.FIRST_COMPLETED)
-        evaluated, failed = [], None
-        for future in done:
-            try:
-                evaluated.append((self._running[future], _result(future)))
-            except BrokenExecutor:
-                self._died.append(self._running[future])
-            except Exception:
-                failed = future
-                continue
-            del self._running[future]
-        if failed is not None and not evaluated:
-            _result(failed)  # raises its error, but only after all finished tasks were returned
-        return evaluated
+        `timeout` seconds. An error of a task is raised after all finished tasks were returned.
 
-    def _tried_alone(self, task: Task) -> tuple[Task, Evaluation]:
-        try:
-            return task, _result(self._evaluator.submit(task))
-        except BrokenExecutor as error:
-            died = "its worker died, and once more when nothing else ran, as if memory is short"
-            problem = f"{died}; it is not recorded, and the run can be resumed"
-            raise InputError(task, "", problem) from error
+        Raises InputError if a worker has died.
+        """
+        done, _ = futures.wait(self._running, timeout, return_when=futures.FIRST_COMPLETED)
+        finished = [f for f in done if not f.cancelled() and f.exception() is None]
+        return [(self._running.pop(f), _result(f)) for f in finished or done]
 
 
 def _result(future: Future[Evaluation]) -> Evaluation:
-    """The result of a future. The death of a worker is BrokenExecutor for every executor."""
     try:
         return future.result()
     except futures.CancelledError as error:
@@ -288,8 +232,10 @@ def _result(future: Future[Evaluation]) -> Evaluation:
         raise InputError("executor", "", problem) from error
     except Exception as error:
         dask = sys.modules.get("distributed")
-        if dask and isinstance(error, dask.KilledWorker):
-            raise BrokenExecutor from error
+        if isinstance(error, BrokenExecutor) or (dask and isinstance(error, dask.KilledWorker)):
+            cause = f"it may be that memory is short, or that {_UNGUARDED}"
+            problem = f"do not start or have died, as they may say above; {cause}"
+            raise InputError(_SOURCE, "", f"{problem}; a run can be resumed") from error
         raise
 
 
