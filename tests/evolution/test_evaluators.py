@@ -9,7 +9,6 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 from helpers import analytic
 
-from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
 from tetra_drake.evolution.run import load_run
 
@@ -17,14 +16,6 @@ from tetra_drake.evolution.run import load_run
 def on_processes(evaluate, workers):
     """An executor whose processes die together."""
     return OnExecutor(evaluate, ProcessPoolExecutor, workers)
-
-
-def test_every_task_is_evaluated_though_workers_are_replaced(tasks, monkeypatch):
-    monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 4)
-    with InProcesses(analytic.Bowl(), 2) as evaluator:
-        evaluations = analytic.evaluated(evaluator, tasks)
-        assert analytic.evaluated(evaluator, []) == {}
-    assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
 
 
 @pytest.mark.parametrize("make", [InProcesses, on_processes])

@@ -101,7 +101,8 @@ def compare(
     Args:
         directories: folders of runs.
         reach: a distance (m); the result says at which cost it was reached.
-        labels: a name for each run; by default the names of the folders.
+        labels: a name for each run; by default the names of the folders, or the paths if two
+            folders have the same name.
 
     Raises:
         InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
@@ -109,7 +110,14 @@ def compare(
     import pandas
 
     _check_labels(labels, len(directories))
-    runs = _labelled([load_run(directory) for directory in directories], labels)
+    loaded = [load_run(directory) for directory in directories]
+    names = list(labels or [run.directory.resolve().name for run in loaded])
+    if not labels and len({*names}) < len(names):
+        names = [str(run.directory) for run in loaded]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(name, "", "is given twice, expected different runs")
+    runs = dict(zip(names, loaded, strict=True))
     notes = _differences(runs)
     searches = {label: _progress(run) for label, run in runs.items()}
     common = min(_end(progress) for progress in searches.values())
@@ -281,18 +289,6 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     row["reached_low"], row["reached"], row["reached_high"] = _quartiles(reached)
     row["share"] = float(np.isfinite(reached).mean())
     return row
-
-
-def _labelled(runs: Sequence[Run], given: Sequence[str] | None) -> dict[str, Run]:
-    """Runs by their given labels; otherwise by the name of the folder, or by path if two folders
-    have the same name."""
-    labels = list(given or [run.directory.resolve().name for run in runs])
-    if given is None and len({*labels}) < len(labels):
-        labels = [str(run.directory) for run in runs]
-    for label in labels:
-        if labels.count(label) > 1:
-            raise InputError(label, "", "is given twice, expected different runs")
-    return dict(zip(labels, runs, strict=True))
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tetra_drake.analysis.robustness import by_gait, robustness
 from tetra_drake.evolution.entries import ELITES, RecordFile
@@ -49,20 +48,15 @@ def elites(run: Run) -> pandas.DataFrame:
     judged = pandas.DataFrame(run.file(ELITES).read(), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
-        table[CELLS] = _cells(table, kind)
+        low, high = np.array(list(kind.measures.values())).T
+        count, measured = np.array(kind.cells), table[list(kind.measures)].to_numpy()
+        cells = (count * (measured - low) + _EPSILON) / (high - low)  # as pyribs does
+        table[CELLS] = cells.clip(0, count - 1).astype(np.int64)
         table = table.sort_values(["fitness", *_KEY], ascending=[False, True, True])
         table = table.drop_duplicates(CELLS)
     else:
         table = table.iloc[:0].assign(**dict.fromkeys(CELLS, 0))
     return table.merge(judged.astype(dict.fromkeys(_JUDGED, float)), on=_KEY, how="left")
-
-
-def _cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> npt.NDArray[np.int64]:
-    """Numbers (gaits, 2) of the cell of each gait, computed as pyribs does."""
-    low, high = np.array(list(kind.measures.values())).T
-    count = np.array(kind.cells)
-    cells = (count * (gaits[list(kind.measures)].to_numpy() - low) + _EPSILON) / (high - low)
-    return cells.clip(0, count - 1).astype(np.int64)
 
 
 def judge_elites(directory: Path, *, workers: int | None = None) -> None:
@@ -104,13 +98,7 @@ def notable_gaits(run: Run) -> dict[str, pandas.Series]:
     gaits, kind = kept_gaits(elites(run)), run.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
-    return {"fittest of the map": gaits.iloc[0]} | _corners(gaits, kind)
-
-
-def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:
-    """The gait nearest to each corner of the map, by the name of the corner."""
-    named = {}
-    count = np.array(kind.cells)
+    named, count = {"fittest of the map": gaits.iloc[0]}, np.array(kind.cells)
     first, second = (name.replace("_", " ") for name in kind.measures)
     for (i, one), (j, other) in itertools.product(enumerate(("low", "high")), repeat=2):
         corner = np.array([i, j]) * (count - 1)

@@ -19,7 +19,7 @@ from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 
 if TYPE_CHECKING:
@@ -81,54 +81,44 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         InputError: if the robot has no equilibrium.
     """
     import pandas
+    from scipy import linalg
 
     robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium
-    unactuated = Unactuated(robot.model)
+    unactuated, p_WN = Unactuated(robot.model), node_positions(structure, equilibrium.state)
     force_at_rest(unactuated, equilibrium.state)
-    loads = np.zeros(len(structure.node_names))
-    loads[structure.contacts] = unactuated.forces.ground_forces[:, NORMAL]
-    ends = np.column_stack([structure.cables["node_a"], structure.cables["node_b"]])
-    p_WN = node_positions(structure, equilibrium.state)
     nodes = pandas.DataFrame(p_WN, list(structure.node_names), ["x", "y", "z"])
     nodes.insert(0, "body", structure.body_of_node)
-    nodes["load"] = loads
-    nodes[[f"anchor_{axis}" for axis in "xyz"]] = _anchor_forces(structure, unactuated, p_WN)
+    nodes["load"] = 0.0
+    nodes.iloc[structure.contacts, -1] = unactuated.forces.ground_forces[:, NORMAL]
+    fixed, anchors, forces = structure.first_node[-1], structure.anchors, np.zeros_like(p_WN)
+    forces[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
+    forces[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
+    nodes[[f"anchor_{axis}" for axis in "xyz"]] = forces
     cables = {
         "group": structure.cable_groups,
         "length": equilibrium.lengths,
         "free_length": structure.cables["free_length"],
         "tension": unactuated.forces.cable_forces[:, TENSION],
     }
+    nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(structure.node_load)
+    lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)
+    weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
+    alone = equilibrium_of(weightless, lifted, equilibrium.state)
+    vibration = _Vibration.of(robot)
+    squares = linalg.eigvalsh(vibration.stiffness, vibration.mass)
     return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
-            p_WN=_weightless_nodes(robot),
+            p_WN=node_positions(lifted, alone.state),
             body_of_node=structure.carriers,
-            cable_ends=ends,
+            cable_ends=structure.cable_ends,
             held=structure.held,
         ),
         nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-        frequencies=_frequencies(robot),
+        frequencies=np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi),
     )
-
-
-def _anchor_forces(structure: Structure, unactuated: Unactuated, p_WN: np.ndarray) -> np.ndarray:
-    """Forces (nodes, 3) of the anchors on the structure at rest, at the last computed state."""
-    fixed, anchors = structure.first_node[-1], structure.anchors
-    forces = np.zeros_like(p_WN)
-    forces[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
-    forces[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
-    return forces
-
-
-def _weightless_nodes(robot: Robot) -> np.ndarray:
-    """p_WN (nodes, 3) in the equilibrium without weight, loads and ground."""
-    nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(robot.structure.node_load)
-    structure = dataclasses.replace(robot.structure, contacts=nowhere, node_load=no_load)
-    weightless, start = robot.scenario.with_numbers({"robot.gravity": 0.0}), robot.equilibrium.state
-    return node_positions(structure, equilibrium_of(weightless, structure, start).state)
 
 
 class _Vibration(NamedTuple):
@@ -145,12 +135,3 @@ class _Vibration(NamedTuple):
         force_at_rest(unactuated, state)
         stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
         return cls(stiffness, mass_matrix(unactuated), unactuated.radius)
-
-
-def _frequencies(robot: Robot) -> np.ndarray:
-    """Natural frequencies (Hz) above LEAST_FREQUENCY."""
-    from scipy import linalg
-
-    vibration = _Vibration.of(robot)
-    squares = linalg.eigvalsh(vibration.stiffness, vibration.mass)
-    return np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,13 +45,12 @@ def share_interval(count: int, total: int) -> tuple[float, float]:
     "Probable inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22,
     1927.
     """
+    from scipy.stats import binomtest
+
     if total == 0:
         return math.nan, math.nan
-    z = NormalDist().inv_cdf(0.975)
-    share, scale = count / total, 1.0 / (1.0 + z * z / total)
-    centre = scale * (share + 0.5 * z * z / total)
-    reach = scale * z * math.sqrt(share * (1.0 - share) / total + 0.25 * (z / total) ** 2)
-    return max(0.0, centre - reach), min(1.0, centre + reach)
+    ends = binomtest(count, total).proportion_ci(method="wilson")
+    return float(ends.low), float(ends.high)
 
 
 def interquartile_mean(values: npt.ArrayLike, axis: int = -1) -> Any:

@@ -28,7 +28,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NamedTuple, NoReturn
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -51,12 +51,6 @@ REMEDY = (
 
 _CHECKSUM = re.compile(rb'(.*), "crc": "([0-9a-f]{8})"\}')
 """Pattern of a line: its content, then the CRC-32 of the content in hexadecimal digits."""
-
-_COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
-"""Key of the number of a line, by file name."""
-
-_UNIQUE = {IN_PROGRESS: ("index",), REEVALUATIONS: ("index",), ELITES: ("trial", "index")}
-"""Keys whose values are unique among the lines of a file, by file name."""
 
 
 def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
@@ -117,12 +111,24 @@ class _EliteLine(_Line):
     mean_distance: float | None
 
 
-_LINES: dict[str, type[_Line]] = {
-    **dict.fromkeys((EVALUATIONS, IN_PROGRESS, REEVALUATIONS), _EvaluationLine),
-    ITERATIONS: _IterationLine,
-    ELITES: _EliteLine,
+class _Schema(NamedTuple):
+    """Schema of the lines of a file."""
+
+    line: type[_Line]
+    keys: tuple[str, ...]
+    """Keys whose values together are unique among the lines."""
+    is_counted: bool = False
+    """True if the single key is the number of the line, from 0."""
+
+
+_SCHEMAS = {
+    EVALUATIONS: _Schema(_EvaluationLine, ("index",), is_counted=True),
+    ITERATIONS: _Schema(_IterationLine, ("iteration",), is_counted=True),
+    IN_PROGRESS: _Schema(_EvaluationLine, ("index",)),
+    REEVALUATIONS: _Schema(_EvaluationLine, ("index",)),
+    ELITES: _Schema(_EliteLine, ("trial", "index")),
 }
-"""What a line is, by file name."""
+"""Schemas by file name."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -182,33 +188,28 @@ class RecordFile:
         Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
         to another run or trial.
         """
-        packed, entries = compressed(self.path), []
+        packed, schema = compressed(self.path), _SCHEMAS[self.path.name]
         earlier = _parse(_unpacked(packed), packed, is_packed=True)
         later = _parse(_read(self.path), self.path, is_packed=False)
-        counter, unique = _COUNTERS.get(self.path.name), _UNIQUE.get(self.path.name, ())
-        seen = set()
+        entries: dict[tuple[int, ...], dict[str, Any]] = {}
         for row, entry in enumerate(itertools.chain(earlier, later)):
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
                     self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
-            self._check_types(row, entry)
-            if counter is not None and entry.get(counter) != row:
-                problem = f"is damaged: {counter} is {entry.get(counter)}, expected {row}"
+            try:
+                schema.line.model_validate(entry)
+            except ValidationError as error:
+                first = error.errors(include_url=False)[0]
+                key = ".".join(str(part) for part in first["loc"])
+                self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
+            values, keys = tuple(entry[key] for key in schema.keys), " and ".join(schema.keys)
+            if schema.is_counted and values != (row,):
+                problem = f"is damaged: {keys} is {values[0]}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
-            values = tuple(entry[key] for key in unique)
-            if unique and values in seen:
-                self.refuse(row, f"has {' and '.join(unique)} of a line before it; {REMEDY}")
-            seen.add(values)
-            entries.append(entry)
-        return entries
-
-    def _check_types(self, row: int, entry: Mapping[str, Any]) -> None:
-        try:
-            _LINES[self.path.name].model_validate(entry)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            key = ".".join(str(part) for part in first["loc"])
-            self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
+            if values in entries:
+                self.refuse(row, f"has {keys} of a line before it; {REMEDY}")
+            entries[values] = entry
+        return list(entries.values())
 
     def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
         """Appends lines; creates the folder if it is missing. On return the operating system has

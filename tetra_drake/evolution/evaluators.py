@@ -183,10 +183,8 @@ class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
 class Lent(Executor):
     """An executor of the user, as a MakeExecutor: it is not shut down."""
 
-    workers = "its executor's"
-
-    def __init__(self, executor: Executor) -> None:
-        self._executor = executor
+    def __init__(self, executor: Executor, workers: int | str = "its executor's") -> None:
+        self._executor, self.workers = executor, workers
 
     def __call__(self, workers: int) -> Executor:
         return self
@@ -196,32 +194,24 @@ class Lent(Executor):
         return self._executor.submit(function, *args, **more)
 
 
-class Evaluations:
-    """Queue of tasks in front of an evaluator."""
+Running = dict[Future[Evaluation], Task]
+"""Submitted tasks, by the futures of their evaluations."""
 
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
-        self._running: dict[Future[Evaluation], Task] = {}
 
-    @property
-    def busy(self) -> bool:
-        """True if a task is not finished."""
-        return bool(self._running)
+def submitted(evaluator: Evaluator, tasks: Iterable[Task]) -> Running:
+    """Submits tasks to an evaluator."""
+    return {evaluator.submit(task): task for task in tasks}
 
-    def add(self, tasks: Iterable[Task]) -> None:
-        """Adds tasks to the queue."""
-        for task in tasks:
-            self._running[self._evaluator.submit(task)] = task
 
-    def wait(self, timeout: float | None = None) -> list[tuple[Task, Evaluation]]:
-        """Finished tasks and their evaluations. Returns when at least one is finished, or after
-        `timeout` seconds. An error of a task is raised after all finished tasks were returned.
+def finished(running: Running, timeout: float | None = None) -> list[tuple[Task, Evaluation]]:
+    """Removes finished tasks from `running`; returns them with their evaluations.
 
-        Raises InputError if a worker has died.
-        """
-        done, _ = futures.wait(self._running, timeout, return_when=futures.FIRST_COMPLETED)
-        finished = [f for f in done if not f.cancelled() and f.exception() is None]
-        return [(self._running.pop(f), _result(f)) for f in finished or done]
+    Returns when at least one is finished, or after `timeout` seconds. An error of a task is raised
+    after all finished tasks were returned. Raises InputError if a worker has died.
+    """
+    done, _ = futures.wait(running, timeout, return_when=futures.FIRST_COMPLETED)
+    evaluated = [f for f in done if not f.cancelled() and f.exception() is None]
+    return [(running.pop(future), _result(future)) for future in evaluated or done]
 
 
 def _result(future: Future[Evaluation]) -> Evaluation:
@@ -241,10 +231,9 @@ def _result(future: Future[Evaluation]) -> Evaluation:
 
 def evaluate_all(evaluator: Evaluator, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:
     """Evaluates tasks. Yields each task with its evaluation as soon as it is finished."""
-    evaluations = Evaluations(evaluator)
-    evaluations.add(tasks)
-    while evaluations.busy:
-        yield from evaluations.wait()
+    running = submitted(evaluator, tasks)
+    while running:
+        yield from finished(running)
 
 
 _SOURCE = "worker processes"

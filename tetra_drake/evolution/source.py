@@ -37,7 +37,8 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
     Raises:
         InputError: if a file cannot be used.
     """
-    folder = _run_folder(source)
+    folders = (source, *source.absolute().parents[:2])  # such as of run/trial_00/best_gait.json
+    folder = next((folder for folder in folders if os.path.isfile(folder / MANIFEST)), None)
     if scenario is not None or folder is None:
         chosen = load_scenario(scenario or "thesis")
     else:
@@ -53,10 +54,3 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
         made = f"made for scenario {best.scenario}"
         warn(f"{source}: {made}, simulated on scenario {chosen.name}")
     return GaitSource(chosen, best, gaits)
-
-
-def _run_folder(source: Path) -> Path | None:
-    """The run that contains a path, or is the path; such as `run` of run/trial_00/best_gait.json.
-    None if there is no run."""
-    folders = (source, *source.absolute().parents[:2])
-    return next((folder for folder in folders if os.path.isfile(folder / MANIFEST)), None)

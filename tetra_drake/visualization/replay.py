@@ -58,6 +58,7 @@ LONG_ARROW = 0.8
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
 """Pattern of the asynchronous commands in Meshcat's page that add parts of the scene. The film runs
 them at once, because it needs the whole scene."""
+_SCRIPT = re.compile("<script[^>]*>(.+?)</script>", re.DOTALL)
 _IN_HEAD = (
     '<meta name="viewport" content="width=device-width, initial-scale=1">'
     '<link rel="icon" href="data:,">'
@@ -92,7 +93,11 @@ def save_replay(
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
     page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
     if viewer is not None:
-        _write_once(Path(viewer), script)
+        if not os.path.exists(viewer):
+            write_whole(viewer, script)
+        elif not os.path.isfile(viewer) or Path(viewer).read_bytes() != script.encode("utf-8"):
+            problem = "is not the viewer of this version of Drake; delete it or name another file"
+            raise InputError(viewer, "", problem)
     write_whole(path, page)
 
 
@@ -108,7 +113,10 @@ def replay_page(
     set_surroundings(meshcat, robot, p_WN, seen=p_WN[0])
     page, script = meshcat.StaticHtml(), ""
     if address:
-        page, script = _without_viewer(page, address=address)
+        before, script, after = _SCRIPT.split(page, maxsplit=1)
+        reader = render("visualization/viewer.html.jinja", address=address)
+        # The reader is before the body, so that nothing of it is shown if the file is missing.
+        page = (before + after).replace("</head>", f"{reader}</head>", 1)
     page = _with_overlay(page, title, film_of(robot, frames))
     return pack_page(page, title=title), script
 
@@ -262,20 +270,3 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
     return "</main></body>".join(page.rsplit("</body>", 1))
-
-
-def _without_viewer(page: str, *, address: str) -> tuple[str, str]:
-    """Splits Meshcat's page into a page that reads the script from `address`, and the script."""
-    before, script, after = re.split(r"<script[^>]*>(.+?)</script>", page, maxsplit=1, flags=re.S)
-    reader = render("visualization/viewer.html.jinja", address=address)
-    # The reader is before the body, so that nothing of the body is shown if the file is missing.
-    return (before + after).replace("</head>", f"{reader}</head>", 1), script
-
-
-def _write_once(path: Path, text: str) -> None:
-    """Writes a file that does not exist yet. Raises InputError if it exists with another text."""
-    if not path.exists():
-        write_whole(path, text)
-    elif not path.is_file() or path.read_bytes() != text.encode("utf-8"):
-        problem = "is not the viewer of this version of Drake; delete it or name another file"
-        raise InputError(path, "", problem)
