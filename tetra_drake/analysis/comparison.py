@@ -23,7 +23,7 @@ from tetra_drake.analysis.statistics import (
     json_rows,
     resampled,
 )
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.evolution.manifest import FITNESS, read_manifest
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.scenario.scenario import Scenario
@@ -109,7 +109,8 @@ def compare(
     """
     import pandas
 
-    _check_labels(labels, len(directories))
+    _check_lists(directories, labels)
+    check_type("compare", "reach", reach or 0.0, int, float)
     loaded = [load_run(directory) for directory in directories]
     names = list(labels or [run.directory.resolve().name for run in loaded])
     if not labels and len({*names}) < len(names):
@@ -155,7 +156,7 @@ def compare_scenarios(
 
     Raises InputError also if no scenario has two of the runs.
     """
-    _check_labels(labels, len(directories))
+    _check_lists(directories, labels)
     groups: dict[str, list[int]] = {}
     for place, directory in enumerate(directories):
         name = read_manifest(Path(directory)).scenario.name
@@ -212,9 +213,13 @@ def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
     return pandas.DataFrame(rows, columns=columns).set_index(["run", "other"])
 
 
-def _check_labels(labels: Sequence[str] | None, count: int) -> None:
-    if labels and len(labels) != count:
-        raise InputError("compare", "labels", f"found {len(labels)}, expected {count}")
+def _check_lists(directories: Sequence[str | Path], labels: Sequence[str] | None) -> None:
+    check_type("compare", "directories", directories, list, tuple)
+    check_type("compare", "labels", labels or [], list, tuple)
+    if not directories:
+        raise InputError("compare", "directories", "found none, expected a run at least")
+    if labels and len(labels) != len(directories):
+        raise InputError("compare", "labels", f"found {len(labels)}, expected {len(directories)}")
 
 
 def _progress(run: Run) -> pandas.DataFrame:

@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -52,11 +52,11 @@ class EquilibriumStudy:
         one."""
         from scipy import linalg
 
-        vibration, structure = _Vibration.of(self.robot), self.robot.structure
-        squares, motions = linalg.eigh(vibration.stiffness, vibration.mass)
+        structure, unactuated = self.robot.structure, Unactuated(self.robot.model)
+        squares, motions = linalg.eigh(*_vibration(self.robot, unactuated))
         motions = motions[:, squares > _LEAST_SQUARE]
         by_body = motions.reshape(len(structure.bodies), 6, -1)
-        by_body[:, :3] /= vibration.radius
+        by_body[:, :3] /= unactuated.radius
         p_WB = self.robot.equilibrium.state[: 7 * len(by_body)].reshape(-1, 7)[:, 4:]
         p_WN = self.nodes[["x", "y", "z"]].to_numpy()
         modes = np.zeros((motions.shape[1], *p_WN.shape))
@@ -105,8 +105,7 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)
     weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
     alone = equilibrium_of(weightless, lifted, equilibrium.state)
-    vibration = _Vibration.of(robot)
-    squares = linalg.eigvalsh(vibration.stiffness, vibration.mass)
+    squares = linalg.eigvalsh(*_vibration(robot, Unactuated(robot.model)))
     return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
@@ -121,17 +120,10 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     )
 
 
-class _Vibration(NamedTuple):
-    """Equation of motion M x'' = -K x about the equilibrium, without damping."""
-
-    stiffness: np.ndarray
-    mass: np.ndarray
-    radius: float
-    """Length (m) that turns rotations into the displacements x; see displaced()."""
-
-    @classmethod
-    def of(cls, robot: Robot) -> _Vibration:
-        unactuated, state = Unactuated(robot.model), robot.equilibrium.state
-        force_at_rest(unactuated, state)
-        stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
-        return cls(stiffness, mass_matrix(unactuated), unactuated.radius)
+def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
+    """K and M of the motion M x'' = -K x about the equilibrium, without damping. For x see
+    displaced()."""
+    state = robot.equilibrium.state
+    force_at_rest(unactuated, state)
+    stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
+    return stiffness, mass_matrix(unactuated)

@@ -9,6 +9,7 @@ An evaluator stores no results. After a crash, a run is resumed from its record.
 
 from __future__ import annotations
 
+import abc
 import contextlib
 import multiprocessing
 import os
@@ -21,7 +22,7 @@ from concurrent import futures
 from concurrent.futures import BrokenExecutor, Executor, Future
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say
@@ -40,14 +41,11 @@ TASKS_PER_WORKER = 150
 diagram with Python systems."""
 
 
-class Evaluator(Protocol):
+class Evaluator(contextlib.AbstractContextManager["Evaluator"]):
     """Evaluates tasks in any order. It is used in a `with` block; the end of the block cancels the
     evaluations that are not done."""
 
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None: ...
-
+    @abc.abstractmethod
     def submit(self, task: Task) -> Future[Evaluation]:
         """Future of a task's evaluation. If the worker dies, the future raises the error of its
         executor, such as BrokenExecutor."""
@@ -81,7 +79,7 @@ def evaluator_of(
     return InProcesses(evaluate, workers)
 
 
-class InLanes(contextlib.AbstractContextManager["InLanes"]):
+class InLanes(Evaluator):
     """Evaluates gaits in the lanes of the compiled engine, in several threads."""
 
     def __init__(self, evaluate: GaitEvaluation, workers: int) -> None:
@@ -98,7 +96,7 @@ class InLanes(contextlib.AbstractContextManager["InLanes"]):
         return self._evaluate.on_queue(task, self._queue)
 
 
-class InProcesses(contextlib.AbstractContextManager["InProcesses"]):
+class InProcesses(Evaluator):
     """Evaluates in worker processes. They are spawned, not forked, and end with this process."""
 
     def __init__(self, evaluate: Evaluate, workers: int) -> None:
@@ -156,7 +154,7 @@ def deaf_to_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
+class OnExecutor(Evaluator):
     """Evaluates on an executor of concurrent.futures."""
 
     def __init__(self, evaluate: Evaluate, make: MakeExecutor, workers: int) -> None:

@@ -155,8 +155,7 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
         "seed": manifest.seed,
         "versions": dict(manifest.versions),
         "scenario_sha256": _sha256(text),
-        "objective": manifest.method.objective,
-        "optimizer": manifest.method.optimizer,
+        **vars(manifest.method),
         "sha256": _digest(manifest),
     }
     if not manifest.reevaluate:

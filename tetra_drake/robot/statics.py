@@ -46,7 +46,7 @@ def find_statics(
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
     wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
     bodies, nodes = body_of_node.max() + 1, np.arange(len(p_WN))
-    motions = np.zeros((nodes.size, 3, bodies + 1, 6))  # of the nodes, for those of each body
+    motions = np.zeros((nodes.size, 3, bodies + 1, 6))  # of nodes, by body and its motions
     motions[nodes, :, body_of_node] = rigid_motions(p_WN)
     motions = motions[:, :, :bodies].reshape(nodes.size, 3, 6 * bodies)
     allowed = null_space(motions[held], TOLERANCE)
