@@ -81,8 +81,8 @@ def evolve(
             elites/.
 
     Raises:
-        InputError: An argument cannot be used. Also if a gait ends its worker process twice: the
-            run can then be resumed.
+        InputError: An argument cannot be used. Also if a worker process dies, for example because
+            memory is short: the run can then be resumed.
     """
     check_guard()
     for name, value, least in (("seed", seed, 0), ("workers", workers, 1)):

@@ -63,15 +63,6 @@ def test_the_probability_of_improvement_counts_pairs_of_trials(run):
     assert "0.62 (0.00 to 1.00)" in comparison_text(found)
 
 
-def test_the_interval_of_separated_trials_has_no_width_and_a_single_trial_has_none(run):
-    paths = [run("a", trial(4.0), trial(3.0)), run("b", trial(1.0), trial(None))]
-    found = compare([*paths, run("c", trial(2.0))])
-    assert found.improvement.loc["a", "b"].tolist() == [1.0, 1.0, 1.0]
-    assert found.improvement.loc["b", "a"].tolist() == [0.0, 0.0, 0.0]
-    single = found.improvement.loc["a", "c"]
-    assert single["probability"] == 1.0 and single[["low", "high"]].isna().all()
-
-
 def ends(**fitnesses):
     """Table of trials, by run."""
     rows = [(run, fitness) for run, numbers in fitnesses.items() for fitness in numbers]
@@ -80,8 +71,12 @@ def ends(**fitnesses):
 
 def test_the_interval_of_a_mean_over_scenarios_draws_within_each():
     """Trials of one scenario never meet those of another: 1 and 2 exceed 0, 11 and 12 exceed 10."""
-    low, high = ends(a=[1.0, 2.0], b=[0.0, 0.0]), ends(a=[11.0, 12.0], b=[10.0, 10.0])
-    assert improvement_over([low, high]).loc["a", "b"].tolist() == [1.0, 1.0, 1.0]
+    low, high = ends(a=[1.0, 2.0], b=[0.0, -math.inf]), ends(a=[11.0, 12.0], b=[10.0, 10.0])
+    found = improvement_over([low, high])
+    assert found.loc["a", "b"].tolist() == [1.0, 1.0, 1.0]
+    assert found.loc["b", "a"].tolist() == [0.0, 0.0, 0.0]
+    single = improvement_over([ends(a=[1.0, 2.0], c=[0.0])]).loc["a", "c"]
+    assert single["probability"] == 1.0 and single[["low", "high"]].isna().all()
     # A scenario with equal trials halves the width: from 0..1 to 1/4..3/4.
     even, wide = ends(a=[1.0, 1.0], b=[1.0, 1.0]), ends(a=[0.0, 2.0], b=[1.0, 1.0])
     assert improvement_over([wide]).loc["a", "b"].tolist() == [0.5, 0.0, 1.0]

@@ -76,12 +76,12 @@ def test_two_values_that_are_known_but_hardly_apart_are_named_together():
 
 @pytest.mark.parametrize(("limit", "slope"), [(math.inf, 2.0), (1.0005, 1.999)])
 def test_derivatives_are_central_and_one_sided_where_a_neighbour_fails(limit, slope):
-    class Square(measurements.Measured):
-        def predict(self, scenarios):
-            x = [each.robot.cables["line"].stiffness / 200.0 for each in scenarios]
-            return [Prediction(np.array([each**2 if each < limit else math.nan])) for each in x]
+    def predict(scenarios):
+        x = [each.robot.cables["line"].stiffness / 200.0 for each in scenarios]
+        return [Prediction(np.array([each**2 if each < limit else math.nan])) for each in x]
 
-    square = Square("", pandas.DataFrame({"measured": [0.0], "uncertainty": [1.0]}))
+    numbers = pandas.DataFrame({"measured": [0.0], "uncertainty": [1.0]})
+    square = measurements.Measured("", numbers, predict)
     stiffness = Parameter(STIFFNESS, "N/m", 200.0, 100.0, 400.0)
     problem = _Problem(hung(), [stiffness], [square], "", None, silent)
     assert problem.jacobian(np.ones(1)) == pytest.approx(slope, rel=1e-9)
@@ -135,7 +135,7 @@ def add_waves(monkeypatch):
     """add_waves(height, number): adds a wave over the stiffness, 0 at 310 N/m, to predictions."""
 
     def add(height, number):
-        predict = measurements._MeasuredRest.predict
+        predict = Rest.predict
 
         def predict_wavy(self, scenarios):
             stiffness = np.array([each.robot.cables["line"].stiffness for each in scenarios])
@@ -143,7 +143,7 @@ def add_waves(monkeypatch):
             found = zip(predict(self, scenarios), waves, strict=True)
             return [each._replace(values=each.values + wave) for each, wave in found]
 
-        monkeypatch.setattr(measurements._MeasuredRest, "predict", predict_wavy)
+        monkeypatch.setattr(Rest, "predict", predict_wavy)
 
     return add
 
@@ -168,7 +168,7 @@ def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
 
 
 def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
-    cases, predict = pulled_down(210.0, 0.39, np.zeros(4)), measurements._MeasuredRest.predict
+    cases, predict = pulled_down(210.0, 0.39, np.zeros(4)), Rest.predict
     cases, predicted, stop = cases[:: len(PULLS) - 1], [], math.inf
 
     def counted(self, scenarios):
@@ -177,7 +177,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
         predicted.append(len(scenarios))
         return predict(self, scenarios)
 
-    monkeypatch.setattr(measurements._MeasuredRest, "predict", counted)
+    monkeypatch.setattr(Rest, "predict", counted)
     monkeypatch.setattr("tetra_drake.analysis.fit.MOST", 16)
     whole = fit(hung(), cases, BOUNDS, search=True)
     needed = len(predicted)

@@ -35,12 +35,12 @@ def cluster(one_cluster):
 
 
 @pytest.mark.slow
-def test_what_ends_its_worker_is_named(cluster, tasks, tmp_path, monkeypatch, refused):
+def test_a_gait_that_ends_its_worker_ends_the_run(cluster, tasks, monkeypatch, refused):
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 1)
     with (
-        refused(tasks[12], "", "died"),
+        refused("worker processes", "", "died"),
         dask_cluster(cluster) as make,
-        OnExecutor(analytic.Dying(tmp_path, always=(12,)), make, 2) as evaluator,
+        OnExecutor(analytic.Dying(12), make, 2) as evaluator,
     ):
         for task, evaluation in evaluate_all(evaluator, tasks):
             assert evaluation == analytic.Bowl()(task)

@@ -11,7 +11,6 @@ from helpers.converged import shortly
 from helpers.quantities import with_unit
 from pytest import approx
 
-from tetra_drake.engines.lanes.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.draws import combine_metrics, worst_mean
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -126,7 +125,7 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, 
     tasks = [Task(vector, index=i, seed=(1, 0, i)) for i in range(4)]
     evaluate = GaitEvaluation(scenario)
     alone = [dataclasses.replace(evaluate(task), wall_time=0.0) for task in tasks]
-    with InLanes(evaluate, LanePool(1)) as lanes:
+    with InLanes(evaluate, 1) as lanes:
         beside = analytic.evaluated(lanes, tasks)
     for i, evaluation in enumerate(alone):
         assert dataclasses.replace(beside[i], wall_time=0.0) == evaluation

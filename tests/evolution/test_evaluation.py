@@ -8,7 +8,6 @@ import pytest
 from helpers.analytic import evaluated, small_scenario, tasks_of
 from helpers.converged import shortly
 
-from tetra_drake.engines.lanes.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -75,7 +74,7 @@ def test_failures_say_why_and_are_the_worst(tiny, vectors, lanes, changes, objec
     engine = {"engine": "!Compiled" if lanes else "!Drake"}
     evaluate = GaitEvaluation(tiny.with_changes(engine | changes), objective)
     if lanes:
-        with InLanes(evaluate, LanePool(1)) as evaluator:
+        with InLanes(evaluate, 1) as evaluator:
             failed = evaluator.submit(Task(vectors[0])).result()
     else:
         failed = evaluate(Task(vectors[0]))
@@ -101,7 +100,7 @@ def test_an_error_of_an_objective_in_lanes_ends_the_run(tiny, vectors):
         raise ZeroDivisionError("mine")
 
     evaluate = GaitEvaluation(tiny.with_changes({"engine": "!Compiled"}), objective)
-    with InLanes(evaluate, LanePool(1)) as lanes, pytest.raises(ZeroDivisionError, match="mine"):
+    with InLanes(evaluate, 1) as lanes, pytest.raises(ZeroDivisionError, match="mine"):
         evaluated(lanes, tasks_of(vectors))
 
 

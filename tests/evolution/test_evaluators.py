@@ -9,7 +9,6 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 from helpers import analytic
 
-from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
 from tetra_drake.evolution.run import load_run
 
@@ -19,28 +18,12 @@ def on_processes(evaluate, workers):
     return OnExecutor(evaluate, ProcessPoolExecutor, workers)
 
 
-@pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
-def test_every_task_is_evaluated_though_workers_end(tasks, tmp_path, monkeypatch, make, once):
-    monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 4)
-    with make(analytic.Dying(tmp_path, once=once), 2) as evaluator:
-        evaluations = analytic.evaluated(evaluator, tasks)
-        assert analytic.evaluated(evaluator, []) == {}
-    assert evaluations == {i: analytic.Bowl()(task) for i, task in enumerate(tasks)}
-
-
 @pytest.mark.parametrize("make", [InProcesses, on_processes])
-def test_a_task_whose_worker_dies_twice_is_named(tasks, tmp_path, make, refused):
-    dying = analytic.Dying(tmp_path, always=(4,))
-    with refused("trial 0, evaluation 4", "", "died"), make(dying, 2) as evaluator:
-        analytic.evaluated(evaluator, tasks)
-
-
-def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, refused):
+def test_a_run_whose_worker_dies_says_so_and_is_resumed(make, tmp_path, refused):
     run, scenario = tmp_path / "run", analytic.small_scenario(trials=1)
     analytic.record_run(tmp_path / "whole", scenario)
-    with refused("trial 0, evaluation 17", "", "died"):
-        dying = analytic.Dying(tmp_path, always=(17,))
-        analytic.record_run(run, scenario, evaluator=InProcesses(dying, 2))
+    with refused("worker processes", "", "died"):
+        analytic.record_run(run, scenario, evaluator=make(analytic.Dying(17), 2))
     assert load_run(run).evaluations["failure"].isin([None, "fell off the table"]).all()
     analytic.record_run(run)
     assert analytic.read_record(run) == analytic.read_record(tmp_path / "whole")

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import re
 from unittest.mock import Mock
 
 import numpy as np
@@ -44,16 +43,12 @@ CHANGED = {"run": "x", "seed": 6, "versions": {}, "objective": "x", "optimizer":
 def test_a_damaged_or_changed_manifest_is_reported(tmp_path, refused, key, value, named):
     with create(tmp_path):
         pass
-    manifest = tmp_path / "manifest.json"
-    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {key: value}))
+    manifest, scenario = tmp_path / "manifest.json", tmp_path / "scenario.yaml"
+    whole = manifest.read_text()
+    manifest.write_text(json.dumps(json.loads(whole) | {key: value}))
     with refused(manifest, named):
         RunRecord.resume(tmp_path)
-
-
-def test_a_changed_scenario_is_reported(tmp_path, refused):
-    with create(tmp_path):
-        pass
-    scenario = tmp_path / "scenario.yaml"
+    manifest.write_text(whole)
     scenario.write_text(scenario.read_text().replace("population: 12", "population: 3"))
     with refused(scenario, "", "manifest.json"):
         RunRecord.resume(tmp_path)
@@ -106,66 +101,45 @@ def test_a_torn_end_is_made_good(run_small, name, lost):
     assert read_record(run) == whole
 
 
-@pytest.fixture
-def refused_line(run_small, refused):
-    """refused_line(path, number, problem): that a line is neither read nor resumed from."""
+def holding(**changes):
+    """A damage: the line with other values, and with a checksum that fits them."""
 
-    def check(path, number, problem):
-        for read in (lambda: load_run(path.parents[1]), lambda: run_small(resume=True)):
-            with refused(path, f"line {number}", problem):
-                read()
+    def change(line):
+        entry = json.loads(line)
+        del entry["crc"]
+        return json_line(entry | changes).encode()
 
-    return check
-
-
-def test_lines_of_another_run_or_trial_are_refused(run_small, refused_line):
-    run = run_small()
-    other = run_small("other", changes={"simulation.duration": "14 s"})
-    path = run / "trial_00" / "iterations.jsonl"
-    ours = path.read_bytes().splitlines(keepends=True)
-    for whose, folder in (("run ", other / "trial_00"), ("trial 1", run / "trial_01")):
-        theirs = (folder / path.name).read_bytes().splitlines(keepends=True)
-        path.write_bytes(b"".join([*ours[:8], theirs[8], *ours[9:]]))
-        refused_line(path, 9, whose)
+    return change
 
 
-@pytest.mark.parametrize(
-    ("pattern", "other"),
-    [(rb'"index": 3', b'"index": 4'), (rb', "crc": "\w+"', b""), (rb"{.*", b"{nonsense")],
-)
-def test_a_line_without_its_checksum_is_refused(run_small, refused_line, pattern, other):
-    path = run_small(trials=1) / "trial_00" / "evaluations.jsonl"
-    lines = path.read_bytes().splitlines(keepends=True)
-    lines[3] = re.sub(pattern, other, lines[3])
-    path.write_bytes(b"".join(lines))
-    refused_line(path, 4, "checksum")
+DAMAGES = [
+    ("evaluations", 4, lambda line: line.replace(b'"index": 3', b'"index": 4'), "checksum"),
+    ("evaluations", 4, lambda line: line.partition(b', "crc"')[0] + b"}\n", "checksum"),
+    ("evaluations", 4, lambda line: b"{nonsense\n", "checksum"),
+    ("iterations", 9, holding(run="another"), "run another"),
+    ("iterations", 9, holding(trial=1), "trial 1"),
+    ("evaluations", 7, holding(index=7), "index"),
+    ("evaluations", 7, holding(genome=[2.0] * 20), "genome"),
+    ("evaluations", 7, holding(metrics={"distance": []}), "metrics"),
+    ("iterations", 5, holding(best_fitness=1.0), "best_fitness"),
+    ("iterations", 5, holding(best_evaluation=41), "best_evaluation"),
+    # What only a search that is repeated can tell
+    ("evaluations", 20, holding(genome=[2.0] * 26), "genome"),
+    ("evaluations", 20, holding(placed=7), "placed"),
+]
 
 
-@pytest.mark.parametrize(
-    ("name", "number", "key", "value"),
-    [
-        ("evaluations", 7, "index", 7),
-        ("evaluations", 7, "genome", [2.0] * 20),
-        ("evaluations", 7, "metrics", {"distance": []}),
-        ("iterations", 5, "best_fitness", 1.0),
-        ("iterations", 5, "best_evaluation", 41),
-        # What only a search that is repeated can tell
-        ("evaluations", 20, "genome", [2.0] * 26),
-        ("evaluations", 20, "placed", 7),
-    ],
-)
-def test_a_contradicting_line_is_reported(run_small, refused, name, number, key, value):
+@pytest.mark.parametrize(("name", "number", "damage", "problem"), DAMAGES)
+def test_a_damaged_line_is_named(run_small, refused, name, number, damage, problem):
     run = run_small(trials=1)
     path = run / "trial_00" / f"{name}.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
-    entry = json.loads(lines[number - 1])
-    del entry["crc"]
-    lines[number - 1] = json_line(entry | {key: value}).encode()
+    lines[number - 1] = damage(lines[number - 1])
     path.write_bytes(b"".join(lines))
-    with refused(path, f"line {number}", key):
+    with refused(path, f"line {number}", problem):
         run_small(resume=True)
     if number < 20:
-        with refused(path, f"line {number}", key):
+        with refused(path, f"line {number}", problem):
             load_run(run)
 
 

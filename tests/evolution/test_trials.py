@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.analytic import Bowl, read_record, record_run, small_scenario
 
-from tetra_drake.evolution.evaluators import InProcesses
+from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Evaluation, Task
 
@@ -42,10 +42,13 @@ def test_every_evaluation_has_its_line_and_those_of_the_iterations_follow(run_sm
     assert [row["stop"] for row in iterations] == [None] * 15 + ["all evaluations done"]
 
 
-def test_neither_workers_nor_executor_nor_timing_change_the_record(run_small, tmp_path):
+def test_neither_workers_nor_executor_nor_timing_change_the_record(
+    run_small, tmp_path, monkeypatch
+):
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
-    record_run(tmp_path / "pool", small_scenario(), evaluator=InProcesses(Bowl(), 2))
+    monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 20)
+    record_run(tmp_path / "pool", small_scenario(), evaluator=evaluators.InProcesses(Bowl(), 2))
     assert read_record(tmp_path / "pool") == reference
 
 

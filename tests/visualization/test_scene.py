@@ -23,13 +23,9 @@ UNEVEN = {
 }
 
 
-def robot_on(terrain):
-    return Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
-
-
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
-def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
-    robot = robot_on(terrain)
+def test_the_drawn_floor_is_the_ground_a_node_radius_lower_as_fine_and_bounded(terrain):
+    robot = Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
     ground, radius = robot.ground, scene.drawn_radii(robot.structure)[1].min()
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     points = make_walk().p_WN.values
@@ -50,12 +46,8 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
         assert (p_WV[:, :2].min(axis=0) < points.min(axis=(0, 1))[:2] - 6.0 * INCH).all()
         assert (p_WV[:, :2].max(axis=0) > points.max(axis=(0, 1))[:2] + 6.0 * INCH).all()
 
-
-@pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
-def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
-    ground = robot_on(terrain).ground
-    corners = np.array([[-6, -9], [60, 9]])
-    floor = scene.floor_points(ground, corners, INCHES)
+    # The floor is as fine as the ground.
+    floor = scene.floor_points(ground, np.array([[-6, -9], [60, 9]]), INCHES)
     assert floor.shape[0] * floor.shape[1] <= scene.MOST_POINTS
     inches = floor[:, 0, 0] / INCH
     assert set(range(-6, 61)) <= set(inches.round(9))  # the grid's lines lie on its edges

@@ -23,7 +23,7 @@ from tetra_drake.analysis.statistics import (
     json_rows,
     resampled,
 )
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.evolution.manifest import FITNESS, read_manifest
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.scenario.scenario import Scenario
@@ -97,15 +97,24 @@ def compare(
     Args:
         directories: folders of runs.
         reach: a distance (m); the result says at which cost it was reached.
-        labels: a name for each run; by default the names of the folders.
+        labels: a name for each run; by default the names of the folders, or the paths if two
+            folders have the same name.
 
     Raises:
         InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
     """
     import pandas
 
-    _check_labels(labels, len(directories))
-    runs = _labelled([load_run(directory) for directory in directories], labels)
+    _check_lists(directories, labels)
+    check_type("compare", "reach", reach or 0.0, int, float)
+    loaded = [load_run(directory) for directory in directories]
+    names = list(labels or [run.directory.resolve().name for run in loaded])
+    if not labels and len({*names}) < len(names):
+        names = [str(run.directory) for run in loaded]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(name, "", "is given twice, expected different runs")
+    runs = dict(zip(names, loaded, strict=True))
     notes = _differences(runs)
     searches = {label: _progress(run) for label, run in runs.items()}
     common = min(_end(progress) for progress in searches.values())
@@ -143,7 +152,7 @@ def compare_scenarios(
 
     Raises InputError also if no scenario has two of the runs.
     """
-    _check_labels(labels, len(directories))
+    _check_lists(directories, labels)
     groups: dict[str, list[int]] = {}
     for place, directory in enumerate(directories):
         name = read_manifest(Path(directory)).scenario.name
@@ -200,9 +209,13 @@ def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
     return pandas.DataFrame(rows, columns=columns).set_index(["run", "other"])
 
 
-def _check_labels(labels: Sequence[str] | None, count: int) -> None:
-    if labels and len(labels) != count:
-        raise InputError("compare", "labels", f"found {len(labels)}, expected {count}")
+def _check_lists(directories: Sequence[str | Path], labels: Sequence[str] | None) -> None:
+    check_type("compare", "directories", directories, list, tuple)
+    check_type("compare", "labels", labels or [], list, tuple)
+    if not directories:
+        raise InputError("compare", "directories", "found none, expected a run at least")
+    if labels and len(labels) != len(directories):
+        raise InputError("compare", "labels", f"found {len(labels)}, expected {len(directories)}")
 
 
 def _progress(run: Run) -> pandas.DataFrame:
@@ -277,18 +290,6 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     row["reached_low"], row["reached"], row["reached_high"] = _quartiles(reached)
     row["share"] = float(np.isfinite(reached).mean())
     return row
-
-
-def _labelled(runs: Sequence[Run], given: Sequence[str] | None) -> dict[str, Run]:
-    """Runs by their given labels; otherwise by the name of the folder, or by path if two folders
-    have the same name."""
-    labels = list(given or [run.directory.resolve().name for run in runs])
-    if given is None and len({*labels}) < len(labels):
-        labels = [str(run.directory) for run in runs]
-    for label in labels:
-        if labels.count(label) > 1:
-            raise InputError(label, "", "is given twice, expected different runs")
-    return dict(zip(labels, runs, strict=True))
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:

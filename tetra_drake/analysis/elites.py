@@ -98,13 +98,7 @@ def notable_gaits(run: Run) -> dict[str, pandas.Series]:
     gaits, kind = kept_gaits(elites(run)), run.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
-    return {"fittest of the map": gaits.iloc[0]} | _corners(gaits, kind)
-
-
-def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:
-    """The gait nearest to each corner of the map, by the name of the corner."""
-    named = {}
-    count = np.array(kind.cells)
+    named, count = {"fittest of the map": gaits.iloc[0]}, np.array(kind.cells)
     first, second = (name.replace("_", " ") for name in kind.measures)
     for (i, one), (j, other) in itertools.product(enumerate(("low", "high")), repeat=2):
         corner = np.array([i, j]) * (count - 1)

@@ -52,12 +52,11 @@ class EquilibriumStudy:
         one."""
         from scipy import linalg
 
-        structure = self.robot.structure
-        stiffness, mass, radius = _vibration(self.robot)
-        squares, motions = linalg.eigh(stiffness, mass)
+        structure, unactuated = self.robot.structure, Unactuated(self.robot.model)
+        squares, motions = linalg.eigh(*_vibration(self.robot, unactuated))
         motions = motions[:, squares > _LEAST_SQUARE]
         by_body = motions.reshape(len(structure.bodies), 6, -1)
-        by_body[:, :3] /= radius
+        by_body[:, :3] /= unactuated.radius
         p_WB = self.robot.equilibrium.state[: 7 * len(by_body)].reshape(-1, 7)[:, 4:]
         p_WN = self.nodes[["x", "y", "z"]].to_numpy()
         modes = np.zeros((motions.shape[1], *p_WN.shape))
@@ -86,33 +85,33 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
 
     robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium
-    stiffness, mass, _ = _vibration(robot)
-    squares = linalg.eigvalsh(stiffness, mass)
-    unactuated = Unactuated(robot.model)
+    unactuated, p_WN = Unactuated(robot.model), node_positions(structure, equilibrium.state)
     force_at_rest(unactuated, equilibrium.state)
-    loads = np.zeros(len(structure.node_names))
-    loads[structure.contacts] = unactuated.forces.ground_forces[:, NORMAL]
-    ends = np.column_stack([structure.cables["node_a"], structure.cables["node_b"]])
-    p_WN = node_positions(structure, equilibrium.state)
     nodes = pandas.DataFrame(p_WN, list(structure.node_names), ["x", "y", "z"])
     nodes.insert(0, "body", structure.body_of_node)
-    nodes["load"] = loads
-    fixed, anchors, on_structure = structure.first_node[-1], structure.anchors, np.zeros_like(p_WN)
-    on_structure[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
-    on_structure[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
-    nodes[[f"anchor_{axis}" for axis in "xyz"]] = on_structure
+    nodes["load"] = 0.0
+    nodes.iloc[structure.contacts, -1] = unactuated.forces.ground_forces[:, NORMAL]
+    fixed, anchors, forces = structure.first_node[-1], structure.anchors, np.zeros_like(p_WN)
+    forces[fixed:] = -unactuated.forces.nodes[fixed : len(p_WN), FORCE : FORCE + 3]
+    forces[anchors.nodes] = anchors.stiffness * (anchors.places - p_WN[anchors.nodes])
+    nodes[[f"anchor_{axis}" for axis in "xyz"]] = forces
     cables = {
         "group": structure.cable_groups,
         "length": equilibrium.lengths,
         "free_length": structure.cables["free_length"],
         "tension": unactuated.forces.cable_forces[:, TENSION],
     }
+    nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(structure.node_load)
+    lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)
+    weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
+    alone = equilibrium_of(weightless, lifted, equilibrium.state)
+    squares = linalg.eigvalsh(*_vibration(robot, Unactuated(robot.model)))
     return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
-            p_WN=_weightless_nodes(robot),
+            p_WN=node_positions(lifted, alone.state),
             body_of_node=structure.carriers,
-            cable_ends=ends,
+            cable_ends=structure.cable_ends,
             held=structure.held,
         ),
         nodes=nodes,
@@ -121,18 +120,10 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     )
 
 
-def _weightless_nodes(robot: Robot) -> np.ndarray:
-    """p_WN (nodes, 3) in the equilibrium without weight, loads and ground."""
-    nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(robot.structure.node_load)
-    structure = dataclasses.replace(robot.structure, contacts=nowhere, node_load=no_load)
-    weightless, start = robot.scenario.with_numbers({"robot.gravity": 0.0}), robot.equilibrium.state
-    return node_positions(structure, equilibrium_of(weightless, structure, start).state)
-
-
-def _vibration(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
-    """Stiffness K and mass M of the equation of motion M x'' = -K x about the equilibrium, without
-    damping; and the length (m) that turns rotations into the displacements x; see displaced()."""
-    unactuated, state = Unactuated(robot.model), robot.equilibrium.state
+def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
+    """K and M of the motion M x'' = -K x about the equilibrium, without damping. For x see
+    displaced()."""
+    state = robot.equilibrium.state
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
-    return stiffness, mass_matrix(unactuated), unactuated.radius
+    return stiffness, mass_matrix(unactuated)

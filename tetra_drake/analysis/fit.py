@@ -133,20 +133,15 @@ class Fit:
         """Values and intervals."""
         rows = []
         for key, row in self.parameters.iterrows():
-            value = _with_uncertainty(row["value"], row["high"] - row["value"])
-            rows.append([str(key), value, rounded(row["start"]), row["unit"] or "1"])
+            value, half = row["value"], row["high"] - row["value"]
+            text = f"{rounded(value)} ± ?"
+            if half > 0.0:
+                digits = max(0, 1 - math.floor(math.log10(half)))  # two of the half width
+                text = f"{fixed(value, digits)} ± {fixed(half, digits)}"
+            rows.append([str(key), text, rounded(row["start"]), row["unit"] or "1"])
         return TextTable(
             ["key", "value, 95 % interval", "start", "unit"], rows, text_columns=(0, 3)
         )
-
-
-def _with_uncertainty(value: float, half: float) -> str:
-    """A number and the half width of its interval, with two digits of the latter; "?" if the width
-    is unknown."""
-    if not half > 0.0:
-        return f"{rounded(value)} ± ?"
-    digits = max(0, 1 - math.floor(math.log10(half)))
-    return f"{fixed(value, digits)} ± {fixed(half, digits)}"
 
 
 def fit_values(
@@ -360,7 +355,10 @@ class _Problem:
         by_measurement = [each.predict(scenarios) for each in self.measured]
         for name, predictions in zip(unknown, zip(*by_measurement, strict=True), strict=True):
             self._known[name] = list(predictions)
-            self._save(name)
+            if file := self._file(name):
+                numbers = [[*each.values, each.clock_offset] for each in predictions]
+                content = np.concatenate(numbers).tobytes()
+                write_whole(file, _seal(name, content) + content)
 
     def _name(self, x: np.ndarray) -> str:
         """Name of an evaluation: a digest of the data, keys and values."""
@@ -370,12 +368,6 @@ class _Problem:
 
     def _file(self, name: str) -> Path | None:
         return self.folder and self.folder / KEPT_EVALUATIONS / f"{name}.bin"
-
-    def _save(self, name: str) -> None:
-        if file := self._file(name):
-            numbers = [[*each.values, each.clock_offset] for each in self._known[name]]
-            content = np.concatenate(numbers).tobytes()
-            write_whole(file, _seal(name, content) + content)
 
     def _restore(self, name: str) -> bool:
         """Takes an evaluation from the folder. Returns False if it is not there, or damaged."""

@@ -5,12 +5,13 @@ Each kind of measurement has its settings, reads its numbers, and predicts them 
 
 from __future__ import annotations
 
+import functools
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pandas
@@ -34,9 +35,6 @@ from tetra_drake.settings.quantities import ForceQuantity, Length, Time, Unit
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of
 from tetra_drake.settings.units import given_quantity
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicHermiteSpline
 
 SAMPLE_PERIOD = 5e-3
 """Time (s) between samples of simulated motion. Cubic curves join the samples."""
@@ -74,10 +72,8 @@ class Measured:
     numbers: pandas.DataFrame
     """A row per number in SI: label, such as "n3 z"; along, its time (s) or its place in the list;
     measured; uncertainty, its standard deviation."""
-
-    def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
-        """What the scenarios predict; NaN if a scenario cannot be simulated."""
-        raise NotImplementedError
+    predict: Callable[[Sequence[Scenario]], list[Prediction]]
+    """What scenarios predict; NaN if a scenario cannot be simulated."""
 
 
 class MotionCapture(Section):
@@ -117,7 +113,18 @@ class MotionCapture(Section):
             driver = load_gait(str(self.gait), scenario)
         nodes = Robot.of(scenario).structure.node_names
         table = _log(self.log, nodes)
-        _check_length(table.index.to_numpy(), driver, scenario, self.log)
+        found, duration = table.index[-1] - table.index[0], scenario.simulation.duration
+        if found > duration + ROUNDING:
+            expected = f"expected at most the duration, {duration:g}"
+            problem = f"found {found:g} s, {expected} s; give simulation.duration more"
+            raise InputError(self.log, TIME_S, problem)
+        least = 0.0
+        if isinstance(driver, Command):
+            least = min(duration, driver.period * (len(driver.samples) - 1))
+        if found < (1.0 - CUT) * least:
+            expected = f"expected at least the command's {least:g} s"
+            problem = f"found {found:g} s, {expected}; give simulation.duration less to fit a part"
+            raise InputError(self.log, TIME_S, problem)
         row, column = np.nonzero(np.isfinite(table.to_numpy()))
         numbers = {
             "label": table.columns.to_numpy()[column],
@@ -125,16 +132,47 @@ class MotionCapture(Section):
             "measured": table.to_numpy()[row, column],
             "uncertainty": self.uncertainty,
         }
-        return _MeasuredMotion(
-            name=f"{name}, {Path(self.log).name}",
-            numbers=pandas.DataFrame(numbers),
-            driver=driver,
-            times=table.index.to_numpy(),
-            places=[_coordinates(nodes).index(name) for name in table.columns],
-            row=row,
-            column=column,
-            clock=self.clock,
-        )
+        predict = functools.partial(self.predict, driver=driver, log=table)
+        return Measured(f"{name}, {Path(self.log).name}", pandas.DataFrame(numbers), predict)
+
+    def predict(
+        self, scenarios: Sequence[Scenario], *, driver: Driver, log: pandas.DataFrame
+    ) -> list[Prediction]:
+        """Predictions for a log, a table of coordinates in m by time in s."""
+        often = {"simulation.sample_period": SAMPLE_PERIOD}
+        finely = [each.with_numbers(often) for each in scenarios]
+        outcomes = simulate_many(finely, [driver] * len(finely), record=True)
+        return [self._prediction(outcome, log) for outcome in outcomes]
+
+    def _prediction(self, outcome: Outcome, log: pandas.DataFrame) -> Prediction:
+        from scipy.interpolate import CubicHermiteSpline
+        from scipy.optimize import minimize_scalar
+
+        is_there = np.isfinite(log.to_numpy())
+        measured = log.to_numpy()[is_there]
+        if isinstance(outcome, SimulationFailure):
+            return Prediction(np.full(measured.size, np.nan))
+        moved = outcome.trajectory
+        places = [_coordinates(moved.node.values).index(name) for name in log]
+        p, v = (each.values.reshape(len(each), -1) for each in (moved.p_WN, moved.v_WN))
+        curves = CubicHermiteSpline(moved.time.values, p[:, places], v[:, places])
+
+        def numbers(offset: float) -> np.ndarray:
+            # The robot stands still before and after the simulation.
+            times = np.clip(log.index.to_numpy() - offset, curves.x[0], curves.x[-1])
+            return np.asarray(curves(times)[is_there])
+
+        def misfit(offset: float) -> float:
+            return float(((numbers(offset) - measured) ** 2).sum())
+
+        if not self.clock:
+            return Prediction(numbers(0.0))
+        tried = np.linspace(-self.clock, self.clock, OFFSETS)
+        nearest = tried[np.argmin([misfit(each) for each in tried])]
+        step = tried[1] - tried[0]
+        bounds = max(nearest - step, -self.clock), min(nearest + step, self.clock)
+        best = minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS})
+        return Prediction(numbers(float(best.x)), float(best.x))
 
 
 class Rest(Section):
@@ -183,14 +221,30 @@ class Rest(Section):
             "measured": [*self.positions.values(), *self.tensions.values(), *self.frequencies],
             "uncertainty": np.repeat(spread, counts),
         }
-        return _MeasuredRest(
-            name=name,
-            numbers=pandas.DataFrame(numbers),
-            changes=self.changes,
-            places=[places.index(label) for label in self.positions],
-            cables=[structure.cable_names.index(label) for label in self.tensions],
-            modes=len(self.frequencies),
-        )
+        return Measured(name, pandas.DataFrame(numbers), self.predict)
+
+    def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
+        """Predictions of the numbers: positions, tensions, frequencies."""
+        return [self._prediction(scenario) for scenario in scenarios]
+
+    def _prediction(self, scenario: Scenario) -> Prediction:
+        modes = len(self.frequencies)
+        try:
+            robot = Robot.of(scenario.with_changes(self.changes))
+            rest = robot.equilibrium
+        except InputError:  # there may be no equilibrium with such values
+            return Prediction(np.full(len(self.positions) + len(self.tensions) + modes, np.nan))
+        structure, unactuated = robot.structure, Unactuated(robot.model)
+        places = [_coordinates(structure.node_names).index(label) for label in self.positions]
+        cables = [structure.cable_names.index(label) for label in self.tensions]
+        p_WN = node_positions(structure, rest.state).ravel()[places]
+        force_at_rest(unactuated, rest.state)
+        forces = unactuated.forces.cable_forces[cables, TENSION]
+        frequencies = np.full(modes, np.nan)
+        if modes:
+            found = study_equilibrium(robot).frequencies[:modes]
+            frequencies[: len(found)] = found
+        return Prediction(np.concatenate([p_WN, forces, frequencies]))
 
 
 _Pair = Annotated[list[str | float], Field(min_length=2, max_length=2)]
@@ -218,89 +272,6 @@ def load_fit_file(path: str | Path) -> FitFile:
     return given.model_copy(update={"measurements": placed})
 
 
-@dataclass(frozen=True)
-class _MeasuredMotion(Measured):
-    driver: Driver
-    times: np.ndarray
-    """Times (s) of the log."""
-    places: list[int]
-    """Places of the log's columns among all coordinates of the nodes."""
-    row: np.ndarray
-    """Row of each number in the log."""
-    column: np.ndarray
-    """Column of each number in the log."""
-    clock: float
-
-    def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
-        often = {"simulation.sample_period": SAMPLE_PERIOD}
-        finely = [each.with_numbers(often) for each in scenarios]
-        outcomes = simulate_many(finely, [self.driver] * len(finely), record=True)
-        return [self._prediction(outcome) for outcome in outcomes]
-
-    def _prediction(self, outcome: Outcome) -> Prediction:
-        from scipy.interpolate import CubicHermiteSpline
-
-        if isinstance(outcome, SimulationFailure):
-            return Prediction(np.full(len(self.numbers), np.nan))
-        moved = outcome.trajectory
-        p, v = (each.values.reshape(len(each), -1) for each in (moved.p_WN, moved.v_WN))
-        curves = CubicHermiteSpline(moved.time.values, p[:, self.places], v[:, self.places])
-        offset = self._best_offset(curves) if self.clock else 0.0
-        return Prediction(self._numbers(curves, offset), offset)
-
-    def _best_offset(self, curves: CubicHermiteSpline) -> float:
-        """Offset (s) of the clock with the least squares of differences to the curves."""
-        from scipy.optimize import minimize_scalar
-
-        measured = self.numbers["measured"].to_numpy()
-
-        def misfit(offset: float) -> float:
-            return float(((self._numbers(curves, offset) - measured) ** 2).sum())
-
-        tried = np.linspace(-self.clock, self.clock, OFFSETS)
-        nearest = tried[np.argmin([misfit(each) for each in tried])]
-        step = tried[1] - tried[0]
-        bounds = max(nearest - step, -self.clock), min(nearest + step, self.clock)
-        return float(minimize_scalar(misfit, bounds=bounds, options={"xatol": CLOCK_DIGITS}).x)
-
-    def _numbers(self, curves: CubicHermiteSpline, offset: float) -> np.ndarray:
-        """Coordinates (numbers,) on curves at the log's times. The robot stands still before and
-        after the simulation."""
-        times = np.clip(self.times - offset, curves.x[0], curves.x[-1])
-        numbers: np.ndarray = curves(times)[self.row, self.column]
-        return numbers
-
-
-@dataclass(frozen=True)
-class _MeasuredRest(Measured):
-    changes: dict[str, Any]
-    places: list[int]
-    """Places of the measured coordinates among all coordinates of the nodes."""
-    cables: list[int]
-    """Indices of the cables whose tension was measured."""
-    modes: int
-    """Number of measured frequencies."""
-
-    def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
-        return [self._prediction(scenario) for scenario in scenarios]
-
-    def _prediction(self, scenario: Scenario) -> Prediction:
-        try:
-            robot = Robot.of(scenario.with_changes(self.changes))
-            rest = robot.equilibrium
-        except InputError:  # there may be no equilibrium with such values
-            return Prediction(np.full(len(self.numbers), np.nan))
-        p_WN = node_positions(robot.structure, rest.state).ravel()[self.places]
-        unactuated = Unactuated(robot.model)
-        force_at_rest(unactuated, rest.state)
-        forces = unactuated.forces.cable_forces[self.cables, TENSION]
-        frequencies = np.full(self.modes, np.nan)
-        if self.modes:
-            found = study_equilibrium(robot).frequencies[: self.modes]
-            frequencies[: len(found)] = found
-        return Prediction(np.concatenate([p_WN, forces, frequencies]))
-
-
 def _coordinates(nodes: Sequence[str]) -> list[str]:
     """Names of the coordinates of nodes, such as "n3 z"."""
     return [f"{node} {axis}" for node in nodes for axis in "xyz"]
@@ -309,7 +280,17 @@ def _coordinates(nodes: Sequence[str]) -> list[str]:
 def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
     """Coordinates in m of a log by time in s, NaN in gaps, with a column such as "n3 z" for each.
     Raises InputError, naming line or column, if the log is wrong."""
-    cells = table_cells(_log_text(path), path)
+    if path.endswith(".parquet"):
+        try:
+            stored = pandas.read_parquet(io.BytesIO(read_bytes(path, "log")))
+        except ImportError as error:
+            raise InputError(path, "", f"cannot be read: pyarrow is missing; {INSTALL}") from error
+        except (ValueError, OSError) as error:
+            raise InputError(path, "", f"is no Parquet file: {error}") from error
+        text = stored.to_csv(index=bool(stored.index.name))
+    else:
+        text = read_text(path, "log")
+    cells = table_cells(text, path)
     if TIME_S not in cells:
         raise InputError(path, TIME_S, "is missing, expected a column with the time in s")
     times = column_numbers(cells.pop(TIME_S), path)
@@ -334,32 +315,3 @@ def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
     if not np.isfinite(table.to_numpy(dtype=float)).any():
         raise InputError(path, "", "has no positions, expected one at least")
     return table
-
-
-def _log_text(path: str) -> str:
-    """The CSV text of a log. Raises InputError if the file cannot be read."""
-    if not path.endswith(".parquet"):
-        return read_text(path, "log")
-    content = io.BytesIO(read_bytes(path, "log"))
-    try:
-        table = pandas.read_parquet(content)
-    except ImportError as error:
-        raise InputError(path, "", f"cannot be read: pyarrow is missing; {INSTALL}") from error
-    except (ValueError, OSError) as error:
-        raise InputError(path, "", f"is no Parquet file: {error}") from error
-    return table.to_csv(index=bool(table.index.name))
-
-
-def _check_length(times: np.ndarray, driver: Driver, scenario: Scenario, log: str) -> None:
-    """Raises InputError if a log is longer than the simulation, or shorter than the command."""
-    found, duration = times[-1] - times[0], scenario.simulation.duration
-    if found > duration + ROUNDING:
-        expected = f"expected at most the duration, {duration:g}"
-        problem = f"found {found:g} s, {expected} s; give simulation.duration more"
-        raise InputError(log, TIME_S, problem)
-    if not isinstance(driver, Command):
-        return
-    least = min(duration, driver.period * (len(driver.samples) - 1))
-    if found < (1.0 - CUT) * least:
-        problem = f"found {found:g} s, expected at least the command's {least:g} s"
-        raise InputError(log, TIME_S, f"{problem}; give simulation.duration less to fit a part")

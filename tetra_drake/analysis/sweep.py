@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from tetra_drake.scenario.changes import given_changes
 from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
-from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section, python_value, value_at
 
 if TYPE_CHECKING:
@@ -85,18 +84,21 @@ def sweep(
     for key, values in changes.items():
         along = [each[key] for each in grid]
         firsts = [scenarios[along.index(value)] for value in values]
-        # The last part of the key, or the whole key if the dataset already has that name.
         name = key.rpartition(".")[2]
-        others = [other.rpartition(".")[2] for other in changes if other != key]
-        is_taken = name in ("gait", "fitness", *METRICS, *others)
-        labels[key if is_taken else name] = _labels(key, values, firsts)
+        taken = [other.rpartition(".")[2] for other in changes if other != key]
+        dimension = key if name in ("gait", "fitness", *METRICS, *taken) else name
+        numbers = [value_at(each.model_dump(), separate(key)[-1]) for each in firsts]
+        if all(isinstance(number, int | float) for number in numbers):
+            labels[dimension] = numbers, {"units": getattr(numbers[0], "unit", "1")}
+        else:
+            labels[dimension] = [str(value) for value in values], {}
     labels["gait"] = [gait.name for gait in walkers], {}
     shape = [len(values) for values, _ in labels.values()]
     rows = [_numbers(outcome) for outcome in outcomes]
     variables = {}
     for name, unit in {"fitness": "", **UNITS}.items():
-        numbers = np.reshape([row[name] for row in rows], shape)
-        variables[name] = list(labels), numbers, {"units": unit or "1"}
+        found = np.reshape([row[name] for row in rows], shape)
+        variables[name] = list(labels), found, {"units": unit or "1"}
     coordinates = {name: (name, *given) for name, given in labels.items()}
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
 
@@ -109,17 +111,6 @@ def _values(key: str, given: Any) -> Collection[Any]:
     if not len(values):
         raise InputError("sweep", key, "found no value, expected one at least")
     return values
-
-
-def _labels(
-    key: str, values: Iterable[Any], scenarios: Sequence[Scenario]
-) -> tuple[list[Any], dict[str, str]]:
-    """Coordinates of a dimension: the numbers of a key in SI and their unit. Values that are not
-    numbers become text."""
-    numbers = [value_at(changed.model_dump(), separate(key)[-1]) for changed in scenarios]
-    if not all(isinstance(number, int | float) for number in numbers):
-        return [str(value) for value in values], {}
-    return numbers, {"units": getattr(numbers[0], "unit", "1")}
 
 
 def _numbers(outcome: Outcome) -> dict[str, float]:

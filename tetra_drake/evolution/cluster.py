@@ -21,25 +21,9 @@ GivenExecutor = Union[Executor, MakeExecutor, "Client"]
 """An executor, a function that makes one, or a Dask client."""
 
 
-class DaskExecutors:
-    """Factory of executors on one Dask client. Each executor uses all workers of the cluster."""
-
-    def __init__(self, client: Client) -> None:
-        self._client = client
-
-    def __call__(self, workers: int) -> Executor:
-        # Dask refuses a key that has killed its worker. Without `pure`, a second try has a new key.
-        return self._client.get_executor(pure=False)
-
-    @property
-    def workers(self) -> int:
-        """Number of threads in the cluster."""
-        return sum(self._client.nthreads().values())
-
-
 @contextlib.contextmanager
-def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator[DaskExecutors]:
-    """Context manager: executors on a Dask cluster, for evolve().
+def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator[Lent]:
+    """Context manager: executor on all workers of a Dask cluster, for evolve().
 
     Args:
         cluster: a cluster object, such as an SSHCluster, or the address of a scheduler. By default
@@ -65,12 +49,12 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         except (OSError, ValueError) as error:
             problem = f"no Dask scheduler answers at '{cluster}': {error}"
             raise InputError("executor", "", problem) from error
-        yield executors_of(client)
+        yield executor_of(client)
 
 
-def executors_of(client: Client) -> DaskExecutors:
-    """Factory of executors on a Dask client. Raises InputError if the client is closed or
-    asynchronous, or a worker has another version of this package or of Drake."""
+def executor_of(client: Client) -> Lent:
+    """Executor on a Dask client. Raises InputError if the client is closed or asynchronous, or a
+    worker has another version of this package or of Drake."""
     if client.asynchronous or client.status != "running":
         found = "asynchronous" if client.asynchronous else client.status
         raise InputError("executor", "", f"found a Dask client that is {found}, expected running")
@@ -80,7 +64,8 @@ def executors_of(client: Client) -> DaskExecutors:
             if theirs != ours:
                 problem = f"{name} on worker {worker}: found {theirs!r}, expected '{ours}' as here"
                 raise InputError("executor", "", problem)
-    return DaskExecutors(client)
+    # Dask refuses a key that has killed its worker. Without `pure`, a resumed run has new keys.
+    return Lent(client.get_executor(pure=False), sum(client.nthreads().values()))
 
 
 def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
@@ -90,7 +75,7 @@ def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
         return Lent(executor)
     dask = sys.modules.get("distributed")
     if dask and isinstance(executor, dask.Client):
-        return executors_of(executor)
+        return executor_of(executor)
     if executor is None or callable(executor):
         return executor
     expected = "an Executor, a Dask client, or a function that makes an Executor"

@@ -111,23 +111,24 @@ class _EliteLine(_Line):
     mean_distance: float | None
 
 
-class _Lines(NamedTuple):
-    """What the lines of a file are."""
+class _Schema(NamedTuple):
+    """Schema of the lines of a file."""
 
-    kind: type[_Line]
-    counter: str = ""
-    """Key of the number of a line; "" if lines are not numbered."""
-    unique: tuple[str, ...] = ()
-    """Keys whose values are unique among the lines."""
+    line: type[_Line]
+    keys: tuple[str, ...]
+    """Keys whose values together are unique among the lines."""
+    is_counted: bool = False
+    """True if the single key is the number of the line, from 0."""
 
 
-_FILES = {
-    EVALUATIONS: _Lines(_EvaluationLine, counter="index"),
-    ITERATIONS: _Lines(_IterationLine, counter="iteration"),
-    IN_PROGRESS: _Lines(_EvaluationLine, unique=("index",)),
-    REEVALUATIONS: _Lines(_EvaluationLine, unique=("index",)),
-    ELITES: _Lines(_EliteLine, unique=("trial", "index")),
+_SCHEMAS = {
+    EVALUATIONS: _Schema(_EvaluationLine, ("index",), is_counted=True),
+    ITERATIONS: _Schema(_IterationLine, ("iteration",), is_counted=True),
+    IN_PROGRESS: _Schema(_EvaluationLine, ("index",)),
+    REEVALUATIONS: _Schema(_EvaluationLine, ("index",)),
+    ELITES: _Schema(_EliteLine, ("trial", "index")),
 }
+"""Schemas by file name."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -187,30 +188,28 @@ class RecordFile:
         Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
         to another run or trial.
         """
-        packed, entries = compressed(self.path), []
+        packed, schema = compressed(self.path), _SCHEMAS[self.path.name]
         earlier = _parse(_unpacked(packed), packed, is_packed=True)
         later = _parse(_read(self.path), self.path, is_packed=False)
-        kind, counter, unique = _FILES[self.path.name]
-        seen = set()
+        entries: dict[tuple[int, ...], dict[str, Any]] = {}
         for row, entry in enumerate(itertools.chain(earlier, later)):
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
                     self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
             try:
-                kind.model_validate(entry)
+                schema.line.model_validate(entry)
             except ValidationError as error:
                 first = error.errors(include_url=False)[0]
-                wrong = ".".join(str(part) for part in first["loc"])
-                self.refuse(row, f"is damaged: {wrong}: {first['msg']}; {REMEDY}")
-            if counter and entry[counter] != row:
-                problem = f"is damaged: {counter} is {entry[counter]}, expected {row}"
+                key = ".".join(str(part) for part in first["loc"])
+                self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
+            values, keys = tuple(entry[key] for key in schema.keys), " and ".join(schema.keys)
+            if schema.is_counted and values != (row,):
+                problem = f"is damaged: {keys} is {values[0]}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
-            values = tuple(entry[key] for key in unique)
-            if unique and values in seen:
-                self.refuse(row, f"has {' and '.join(unique)} of a line before it; {REMEDY}")
-            seen.add(values)
-            entries.append(entry)
-        return entries
+            if values in entries:
+                self.refuse(row, f"has {keys} of a line before it; {REMEDY}")
+            entries[values] = entry
+        return list(entries.values())
 
     def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
         """Appends lines; creates the folder if it is missing. On return the operating system has

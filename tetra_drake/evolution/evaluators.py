@@ -9,21 +9,20 @@ An evaluator stores no results. After a crash, a run is resumed from its record.
 
 from __future__ import annotations
 
+import abc
 import contextlib
-import functools
 import multiprocessing
 import os
 import pickle
 import signal
 import sys
 import threading
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, Executor, Future
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say
@@ -42,14 +41,11 @@ TASKS_PER_WORKER = 150
 diagram with Python systems."""
 
 
-class Evaluator(Protocol):
+class Evaluator(contextlib.AbstractContextManager["Evaluator"]):
     """Evaluates tasks in any order. It is used in a `with` block; the end of the block cancels the
     evaluations that are not done."""
 
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None: ...
-
+    @abc.abstractmethod
     def submit(self, task: Task) -> Future[Evaluation]:
         """Future of a task's evaluation. If the worker dies, the future raises the error of its
         executor, such as BrokenExecutor."""
@@ -83,7 +79,7 @@ def evaluator_of(
     return InProcesses(evaluate, workers)
 
 
-class InLanes(contextlib.AbstractContextManager["InLanes"]):
+class InLanes(Evaluator):
     """Evaluates gaits in the lanes of the compiled engine, in several threads."""
 
     def __init__(self, evaluate: GaitEvaluation, workers: int) -> None:
@@ -100,25 +96,29 @@ class InLanes(contextlib.AbstractContextManager["InLanes"]):
         return self._evaluate.on_queue(task, self._queue)
 
 
-class InProcesses(contextlib.AbstractContextManager["InProcesses"]):
-    """Evaluates in worker processes. They are spawned, not forked, and end with this process.
-
-    Each worker process has its own executor, because all processes of one executor die together.
-    """
+class InProcesses(Evaluator):
+    """Evaluates in worker processes. They are spawned, not forked, and end with this process."""
 
     def __init__(self, evaluate: Evaluate, workers: int) -> None:
         self._evaluate = evaluate
-        self._threads = futures.ThreadPoolExecutor(workers)
-        self._idle: deque[Executor] = deque()
         self._lifeline, self._holder = multiprocessing.Pipe(duplex=False)
+        self._processes = futures.ProcessPoolExecutor(
+            workers,
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_end_with,
+            initargs=(self._lifeline,),
+            max_tasks_per_child=TASKS_PER_WORKER,
+        )
+        # An executor with more tasks than processes does not replace its processes
+        # (https://github.com/python/cpython/issues/115634). So tasks wait in front of threads.
+        self._threads = futures.ThreadPoolExecutor(workers)
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
         if kind is not None:
             self._holder.close()
         self._threads.shutdown()
-        for executor in self._idle:
-            executor.shutdown()
+        self._processes.shutdown()
         self._holder.close()
         self._lifeline.close()
 
@@ -128,27 +128,7 @@ class InProcesses(contextlib.AbstractContextManager["InProcesses"]):
             return self._threads.submit(self._in_process, task)
 
     def _in_process(self, task: Task) -> Evaluation:
-        executor = self._idle.pop() if self._idle else self._started()
-        evaluation = executor.submit(self._evaluate, task).result()
-        self._idle.append(executor)  # unless its process has died
-        return evaluation
-
-    def _started(self) -> Executor:
-        """A new executor with one process, which has loaded the evaluation."""
-        executor = futures.ProcessPoolExecutor(
-            max_workers=1,
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=_end_with,
-            initargs=(self._lifeline,),
-            max_tasks_per_child=TASKS_PER_WORKER,
-        )
-        try:
-            executor.submit(_load, self._evaluate).result()
-        except BrokenExecutor as error:
-            cause = f"it may be that {_UNGUARDED}, or that memory is short"
-            problem = f"do not start, as they say above; {cause}"
-            raise InputError(_SOURCE, "", problem) from error
-        return executor
+        return self._processes.submit(self._evaluate, task).result()
 
 
 def _end_with(lifeline: Connection) -> None:
@@ -160,10 +140,6 @@ def _end_with(lifeline: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _load(evaluate: Evaluate) -> None:
-    """First task of a worker process. It does nothing, but the function is loaded for it."""
 
 
 @contextlib.contextmanager
@@ -178,12 +154,11 @@ def deaf_to_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
-    """Evaluates on an executor of concurrent.futures. A broken executor is replaced."""
+class OnExecutor(Evaluator):
+    """Evaluates on an executor of concurrent.futures."""
 
     def __init__(self, evaluate: Evaluate, make: MakeExecutor, workers: int) -> None:
-        self._evaluate, self._make = evaluate, functools.partial(make, workers)
-        self._executor = self._make()
+        self._evaluate, self._executor = evaluate, make(workers)
         self._submitted: set[Future[Evaluation]] = set()
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -192,95 +167,52 @@ class OnExecutor(contextlib.AbstractContextManager["OnExecutor"]):
         self._executor.shutdown(wait=kind is None)
 
     def submit(self, task: Task) -> Future[Evaluation]:
-        """See Evaluator.submit()."""
+        """See Evaluator.submit(). Raises InputError if the executor is broken or shut down."""
         try:
             future = self._executor.submit(self._evaluate, task)
-        except BrokenExecutor:
-            self._executor.shutdown(wait=False)
-            self._executor = self._make()
-            future = self._executor.submit(self._evaluate, task)
+        except RuntimeError as error:
+            problem = f"takes no more tasks; the run can be resumed: {error}"
+            raise InputError("executor", "", problem) from error
         self._submitted.add(future)
         future.add_done_callback(self._submitted.discard)
         return future
 
 
 class Lent(Executor):
-    """An executor of the user, as a MakeExecutor: it is neither shut down nor replaced."""
+    """An executor of the user, as a MakeExecutor: it is not shut down."""
 
-    workers = "its executor's"
-
-    def __init__(self, executor: Executor) -> None:
-        self._executor = executor
+    def __init__(self, executor: Executor, workers: int | str = "its executor's") -> None:
+        self._executor, self.workers = executor, workers
 
     def __call__(self, workers: int) -> Executor:
         return self
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **more: Any) -> Future[Any]:
-        """Submits a task. Raises InputError if the executor is broken or shut down."""
-        try:
-            return self._executor.submit(function, *args, **more)
-        except RuntimeError as error:
-            problem = f"takes no more tasks; the run can be resumed: {error}"
-            raise InputError("executor", "", problem) from error
+        """See Executor.submit()."""
+        return self._executor.submit(function, *args, **more)
 
 
-class Evaluations:
-    """Queue of tasks in front of an evaluator.
+Running = dict[Future[Evaluation], Task]
+"""Submitted tasks, by the futures of their evaluations."""
 
-    If a worker dies, its task is tried once more, alone, because memory may have been short. If the
-    second worker dies, too, an InputError names the task.
+
+def submitted(evaluator: Evaluator, tasks: Iterable[Task]) -> Running:
+    """Submits tasks to an evaluator."""
+    return {evaluator.submit(task): task for task in tasks}
+
+
+def finished(running: Running, timeout: float | None = None) -> list[tuple[Task, Evaluation]]:
+    """Removes finished tasks from `running`; returns them with their evaluations.
+
+    Returns when at least one is finished, or after `timeout` seconds. An error of a task is raised
+    after all finished tasks were returned. Raises InputError if a worker has died.
     """
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self._evaluator = evaluator
-        self._waiting: deque[Task] = deque()
-        self._running: dict[Future[Evaluation], Task] = {}
-        self._died: deque[Task] = deque()
-        """Tasks whose workers died. While it is not empty, no other task begins."""
-
-    @property
-    def busy(self) -> bool:
-        """True if a task is running or waiting."""
-        return any((self._waiting, self._running, self._died))
-
-    def add(self, tasks: Iterable[Task]) -> None:
-        """Adds tasks to the queue."""
-        self._waiting.extend(tasks)
-
-    def wait(self, timeout: float | None = None) -> list[tuple[Task, Evaluation]]:
-        """Finished tasks and their evaluations. Returns when at least one is finished, or after
-        `timeout` seconds."""
-        if self._died and not self._running:
-            return [self._tried_alone(self._died.popleft())]
-        while self._waiting and not self._died:
-            task = self._waiting.popleft()
-            self._running[self._evaluator.submit(task)] = task
-        done, _ = futures.wait(self._running, timeout, return_when=futures.FIRST_COMPLETED)
-        evaluated, failed = [], None
-        for future in done:
-            try:
-                evaluated.append((self._running[future], _result(future)))
-            except BrokenExecutor:
-                self._died.append(self._running[future])
-            except Exception:
-                failed = future
-                continue
-            del self._running[future]
-        if failed is not None and not evaluated:
-            _result(failed)  # raises its error, but only after all finished tasks were returned
-        return evaluated
-
-    def _tried_alone(self, task: Task) -> tuple[Task, Evaluation]:
-        try:
-            return task, _result(self._evaluator.submit(task))
-        except BrokenExecutor as error:
-            died = "its worker died, and once more when nothing else ran, as if memory is short"
-            problem = f"{died}; it is not recorded, and the run can be resumed"
-            raise InputError(task, "", problem) from error
+    done, _ = futures.wait(running, timeout, return_when=futures.FIRST_COMPLETED)
+    evaluated = [f for f in done if not f.cancelled() and f.exception() is None]
+    return [(running.pop(future), _result(future)) for future in evaluated or done]
 
 
 def _result(future: Future[Evaluation]) -> Evaluation:
-    """The result of a future. The death of a worker is BrokenExecutor for every executor."""
     try:
         return future.result()
     except futures.CancelledError as error:
@@ -288,17 +220,18 @@ def _result(future: Future[Evaluation]) -> Evaluation:
         raise InputError("executor", "", problem) from error
     except Exception as error:
         dask = sys.modules.get("distributed")
-        if dask and isinstance(error, dask.KilledWorker):
-            raise BrokenExecutor from error
+        if isinstance(error, BrokenExecutor) or (dask and isinstance(error, dask.KilledWorker)):
+            cause = f"it may be that memory is short, or that {_UNGUARDED}"
+            problem = f"do not start or have died, as they may say above; {cause}"
+            raise InputError(_SOURCE, "", f"{problem}; a run can be resumed") from error
         raise
 
 
 def evaluate_all(evaluator: Evaluator, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:
     """Evaluates tasks. Yields each task with its evaluation as soon as it is finished."""
-    evaluations = Evaluations(evaluator)
-    evaluations.add(tasks)
-    while evaluations.busy:
-        yield from evaluations.wait()
+    running = submitted(evaluator, tasks)
+    while running:
+        yield from finished(running)
 
 
 _SOURCE = "worker processes"

@@ -149,17 +149,17 @@ def read_manifest(directory: Path) -> Manifest:
 def write_manifest(directory: Path, manifest: Manifest) -> None:
     """Writes scenario.yaml and then manifest.json, which makes the directory a run."""
     text = save_scenario(directory, manifest.scenario)
-    file = _File(
-        schema=SCHEMA,
-        run=manifest.run,
-        seed=manifest.seed,
-        versions=dict(manifest.versions),
-        scenario_sha256=_sha256(text),
+    content = {
+        "schema": SCHEMA,
+        "run": manifest.run,
+        "seed": manifest.seed,
+        "versions": dict(manifest.versions),
+        "scenario_sha256": _sha256(text),
         **vars(manifest.method),
-        sha256=_digest(manifest),
-        reevaluate=manifest.reevaluate,
-    )
-    content = file.model_dump(by_alias=True, exclude_defaults=True)
+        "sha256": _digest(manifest),
+    }
+    if not manifest.reevaluate:
+        content["reevaluate"] = False
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 

@@ -262,24 +262,23 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
             if len(entry.get("genome") or columns) != len(columns):
                 found = f"a genome of {len(entry['genome'])} numbers"
                 file.refuse(number, f"is damaged: found {found}, expected {len(columns)}")
-            row = _flat(entry, columns, bodies) if "genome" in entry else entry
-            rows.append({"trial": trial, **row})
+            rows.append({"trial": trial, **entry})
+            if "genome" in entry:
+                _flatten(rows[-1], columns, bodies)
     table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
     kinds = dict.fromkeys(_NUMBERS.intersection(table), "float")
     kinds |= dict.fromkeys(_INDICES.intersection(table), "Int64")
     return table.astype(kinds).copy()  # copy() joins the blocks that astype() makes per column
 
 
-def _flat(entry: dict[str, Any], columns: list[str], bodies: Sequence[str]) -> dict[str, Any]:
-    """A row of the table of evaluations: one column for each number of a line."""
+def _flatten(entry: dict[str, Any], columns: list[str], bodies: Sequence[str]) -> None:
+    """Makes a line a row of the table of evaluations: one column for each number."""
     genome = entry.pop("genome") or [math.nan] * len(columns)
-    metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
-    for body, share in zip(bodies, metrics.pop("lifted_shares", []), strict=False):
-        metrics[f"lifted_{body}"] = share
-    metrics["distance_in"] = metrics["distance"] / INCH
-    draws = entry.pop("draws", None)
-    if draws is not None:
-        metrics["draws_fitness"] = draws["fitness"]
-        metrics["draws_distance"] = draws["distance"]
-        metrics["worst_distance"] = min(draws["distance"])
-    return entry | metrics | dict(zip(columns, genome, strict=True))
+    entry |= dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
+    for body, share in zip(bodies, entry.pop("lifted_shares", []), strict=False):
+        entry[f"lifted_{body}"] = share
+    entry["distance_in"] = entry["distance"] / INCH
+    if draws := entry.pop("draws", None):
+        entry |= {f"draws_{name}": numbers for name, numbers in draws.items()}
+        entry["worst_distance"] = min(draws["distance"])
+    entry |= zip(columns, genome, strict=True)

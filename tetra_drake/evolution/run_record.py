@@ -15,20 +15,18 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import (
-    BEST_GAIT,
     EVALUATIONS,
     IN_PROGRESS,
     ITERATIONS,
     RecordFile,
     evaluation_entry,
     recorded_evaluation,
-    trial_folder,
 )
 from tetra_drake.evolution.manifest import (
     MANIFEST,
@@ -113,20 +111,30 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         return record
 
     def begin(self) -> None:
-        """Writes the manifest, if it is not written yet. Deletes the run that is overwritten."""
+        """Writes the manifest, if it is not written yet. Deletes the run that is overwritten, which
+        comes back if the manifest cannot be written."""
         if self.begun:
             return
         if self._lock is None:
             make_folder(self.directory)
             self._lock = _locked(self.directory)
             _check_empty(self.directory)  # another process may have been faster
-        with _set_aside(self.directory):
+        aside = self.directory / _ASIDE
+        shutil.rmtree(aside, ignore_errors=True)
+        aside.mkdir()
+        old = [file for file in self.directory.iterdir() if file.name not in (LOCK, _ASIDE)]
+        old.sort(key=lambda file: file.name != MANIFEST)  # the manifest first: it makes a run
+        try:
+            for file in old:
+                file.rename(aside / file.name)
             write_manifest(self.directory, self.manifest)
+        except BaseException:
+            for file in aside.iterdir():
+                file.replace(self.directory / file.name)
+            raise
+        finally:
+            shutil.rmtree(aside)
         self.begun = True
-
-    def file(self, name: str, trial: int) -> RecordFile:
-        """A file of a trial."""
-        return RecordFile.of(self.directory, self.manifest.run, name, trial=trial)
 
     def __exit__(self, *_: object) -> None:
         if self._lock is not None:
@@ -144,14 +152,15 @@ class TrialRecord:
 
     def __init__(self, run: RunRecord, number: int) -> None:
         self._run = run
-        names = (EVALUATIONS, ITERATIONS, IN_PROGRESS)
-        self._files = {name: run.file(name, number) for name in names}
-        self.best_gait = trial_folder(run.directory, number) / BEST_GAIT
-        self._lines: dict[str, _Lines] = dict.fromkeys(names, ())
+        self._files: dict[str, RecordFile] = {}
+        self._lines: dict[str, _Lines] = {}
         """Recorded lines of each file."""
-        for name in names if run.begun else ():
-            self._files[name].repair()
-            self._lines[name] = self._files[name].read()
+        for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
+            file = RecordFile.of(run.directory, run.manifest.run, name, trial=number)
+            if run.begun:
+                file.repair()
+            self._files[name] = file
+            self._lines[name] = file.read() if run.begun else ()
         self._recorded: dict[int, tuple[str, int]] = {}
         """File and row of each recorded evaluation, by its index."""
         for name in (IN_PROGRESS, EVALUATIONS):
@@ -199,15 +208,12 @@ class TrialRecord:
         self._files[IN_PROGRESS].path.unlink(missing_ok=True)
 
     def _write(self, name: str, entries: _Lines, *, first: int) -> None:
-        recorded, missing = self._lines[name], []
-        for row, entry in enumerate(entries, start=first):
-            if row >= len(recorded):
-                missing.append(entry)
-                continue
-            for key in recorded[row] | entry:
-                if recorded[row].get(key) != entry.get(key):
+        recorded = self._lines[name][first:]
+        for row, (ours, entry) in enumerate(zip(recorded, entries, strict=False), start=first):
+            for key in ours | entry:
+                if ours.get(key) != entry.get(key):
                     self._files[name].refuse(row, _NOT_REPEATED.format(key))
-        if missing:
+        if missing := entries[len(recorded) :]:
             self._append(name, missing)
 
     def _append(self, name: str, entries: _Lines) -> None:
@@ -229,27 +235,6 @@ def _check_empty(directory: Path) -> None:
         raise InputError(directory, "", problem)
     if not _is_empty(directory):
         raise InputError(directory, "", "is not empty, expected a new directory")
-
-
-@contextlib.contextmanager
-def _set_aside(directory: Path) -> Iterator[None]:
-    """Context manager: moves the content of a directory away, except the lock. The content is
-    deleted if the block succeeds and restored if it fails."""
-    aside = directory / _ASIDE
-    shutil.rmtree(aside, ignore_errors=True)
-    aside.mkdir()
-    names = [file.name for file in directory.iterdir() if file.name not in (LOCK, _ASIDE)]
-    names.sort(key=lambda name: name != MANIFEST)  # the manifest first: it makes a run
-    try:
-        for name in names:
-            (directory / name).rename(aside / name)
-        yield
-    except BaseException:
-        for file in aside.iterdir():
-            file.replace(directory / file.name)
-        raise
-    finally:
-        shutil.rmtree(aside)
 
 
 def _locked(directory: Path) -> BinaryIO:

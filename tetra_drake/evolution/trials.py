@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluators import Evaluations, Evaluator, evaluate_all
+from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
+from tetra_drake.evolution.evaluators import Evaluator, evaluate_all, finished, submitted
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
@@ -68,6 +69,7 @@ class Trial:
 
     def __init__(self, number: int, *, run: RunRecord, optimizer: Optimizer) -> None:
         self._manifest = run.manifest
+        self._best_gait = trial_folder(run.directory, number) / BEST_GAIT
         scenario = self._manifest.scenario
         self.status = TrialStatus(number, scenario.evolution.evaluations, units=scenario.units)
         self.unevaluated: dict[int, Task] = {}
@@ -97,30 +99,28 @@ class Trial:
     def _advance(self) -> None:
         """Runs recorded iterations, up to the first unrecorded vectors or the trial's end."""
         while self.status.stop is None:
-            self._ask()
+            self._results = {}
+            first, trial = self.status.evaluations, self.status.number
+            iteration = self.status.iteration + 1
+            batch = self._optimizer.ask()[: self.status.evaluations_at_most - first]
+            for index, vector in enumerate(batch, start=first):
+                task = self._manifest.task(vector, trial=trial, index=index, iteration=iteration)
+                evaluation = self._record.recall(index, vector)
+                if evaluation is None:
+                    self.unevaluated[index] = task
+                    continue
+                self._add(task, evaluation)
+                if self.recalled is None and evaluation.failure is None:
+                    self.recalled = task, evaluation
             if self.unevaluated:
-                self._save_best()
-                return
+                break
             self._complete()
-        self._record.finish(self.status.evaluations)
-        self._save_best()
-
-    def _ask(self) -> None:
-        """Begins an iteration: asks for vectors and takes their recorded evaluations. The other
-        vectors become `unevaluated`."""
-        self._results = {}
-        first, trial = self.status.evaluations, self.status.number
-        iteration = self.status.iteration + 1
-        batch = self._optimizer.ask()[: self.status.evaluations_at_most - first]
-        for index, vector in enumerate(batch, start=first):
-            task = self._manifest.task(vector, trial=trial, index=index, iteration=iteration)
-            evaluation = self._record.recall(index, vector)
-            if evaluation is None:
-                self.unevaluated[index] = task
-                continue
-            self._add(task, evaluation)
-            if self.recalled is None and evaluation.failure is None:
-                self.recalled = task, evaluation
+        else:
+            self._record.finish(self.status.evaluations)
+        if self._best is not None and self._best is not self._saved:
+            task, _ = self._saved = self._best
+            gait = self._manifest.gait(task.vector, trial=task.trial, index=task.index)
+            save_gait(gait, self._best_gait, self._manifest.scenario)
 
     def _add(self, task: Task, evaluation: Evaluation) -> None:
         status = self.status
@@ -154,13 +154,6 @@ class Trial:
         self._record.complete(results, line, placed=outcome.placed)
         status.complete(line, best_distance=distance)
 
-    def _save_best(self) -> None:
-        if self._best is not None and self._best is not self._saved:
-            task, _ = self._best
-            gait = self._manifest.gait(task.vector, trial=task.trial, index=task.index)
-            save_gait(gait, self._record.best_gait, self._manifest.scenario)
-            self._saved = self._best
-
 
 def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
     """All trials of a record, each at the end of its recorded part.
@@ -192,16 +185,12 @@ def run_trials(
     """
     statuses = [trial.status for trial in trials]
     show(statuses)
-    evaluations = Evaluations(evaluator)
-    waiting = list(trials)
-    while any(trial.unevaluated for trial in trials):
-        for trial in waiting:
-            evaluations.add(trial.unevaluated.values())
-        waiting = []
-        for task, evaluation in evaluations.wait(_SHOW_PERIOD):
+    running = submitted(evaluator, [t for trial in trials for t in trial.unevaluated.values()])
+    while running:
+        for task, evaluation in finished(running, _SHOW_PERIOD):
             trial = trials[task.trial]
             if trial.take(task, evaluation):
-                waiting.append(trial)
+                running |= submitted(evaluator, trial.unevaluated.values())
         show(statuses)
     return statuses
 

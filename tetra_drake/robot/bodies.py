@@ -31,8 +31,18 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
     inertias (bodies, 6) as in Structure."""
     made: dict[tuple[bytes, ...], SpatialInertia] = {}  # equal bodies share one
     inertias = []
+    node_a = blueprint.struts[:, 0]
     for first, end in itertools.pairwise(blueprint.first_node.tolist()):
-        parts = _parts(blueprint, first, end)
+        nodes, struts = slice(first, end), (first <= node_a) & (node_a < end)
+        parts = (
+            blueprint.p_FN[nodes],
+            blueprint.struts[struts] - first,
+            blueprint.strut_radius[struts],
+            blueprint.strut_density[struts],
+            blueprint.node_radius[nodes],
+            blueprint.node_density[nodes],
+            blueprint.node_mass[nodes],
+        )
         key = tuple(part.tobytes() for part in parts)
         if key not in made:
             made[key] = _body_inertia(parts)
@@ -41,21 +51,6 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
     mass = empty + blueprint.payload  # a point mass at the centre of mass
     centres, units = zip(*map(_central, inertias), strict=True)
     return mass, np.array(centres), (empty / mass)[:, np.newaxis] * np.array(units)
-
-
-def _parts(blueprint: Blueprint, first: int, end: int) -> tuple[np.ndarray, ...]:
-    """What _body_inertia() needs of the body with the nodes `first` to `end` - 1."""
-    nodes, node_a = slice(first, end), blueprint.struts[:, 0]
-    struts = (first <= node_a) & (node_a < end)
-    return (
-        blueprint.p_FN[nodes],
-        blueprint.struts[struts] - first,
-        blueprint.strut_radius[struts],
-        blueprint.strut_density[struts],
-        blueprint.node_radius[nodes],
-        blueprint.node_density[nodes],
-        blueprint.node_mass[nodes],
-    )
 
 
 def _body_inertia(parts: tuple[np.ndarray, ...]) -> SpatialInertia:

@@ -101,7 +101,14 @@ def find_equilibrium(
     The search goes downhill in potential energy from the state `start` (13 n,) to a minimum.
     Friction bears no load. Raises InputError, naming `source` and a body, if none is found.
     """
-    unheld = _unheld_force(model)
+    weights = np.array([0.0, 0.0, -model.bodies.weight.sum()])
+    forces = np.vstack([model.loads.forces, weights])
+    unheld = forces.sum(axis=0)
+    unheld[np.abs(unheld) <= ROUNDING * np.abs(forces).sum(axis=0)] = 0.0
+    held = (model.anchors.stiffness > 0.0).any(axis=0)
+    held |= len(model.p_BN) > model.first_node[-1]  # cables from fixed nodes
+    held[2] |= model.ground.contacts.size > 0 and unheld[2] <= 0.0
+    unheld[held] = 0.0
     if unheld.any():
         amounts = ", ".join(f"{force:.3g}" for force in unheld)
         problem = f"has no equilibrium: nothing holds it against the force [{amounts}] N"
@@ -130,19 +137,6 @@ def find_equilibrium(
     lengths = np.round(robot.forces.cable_forces[:, cable.LENGTH], LENGTH_DIGITS)
     feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
     return Equilibrium(descent.state, lengths, feet)
-
-
-def _unheld_force(model: Model) -> np.ndarray:
-    """Sum (3,) in N of weights and loads along x, y and z, where nothing can hold the robot; 0
-    otherwise."""
-    weights = np.array([0.0, 0.0, -model.bodies.weight.sum()])
-    forces = np.vstack([model.loads.forces, weights])
-    total = forces.sum(axis=0)
-    total[np.abs(total) <= ROUNDING * np.abs(forces).sum(axis=0)] = 0.0
-    held = (model.anchors.stiffness > 0.0).any(axis=0)
-    held |= len(model.p_BN) > model.first_node[-1]  # cables from fixed nodes
-    held[2] |= model.ground.contacts.size > 0 and total[2] <= 0.0
-    return np.where(held, 0.0, total)
 
 
 class _Descent:

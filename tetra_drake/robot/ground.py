@@ -38,8 +38,20 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
         radius=structure.contact_radius[structure.contacts],
         nodes=len(structure.p_BN),
     )
-    if not made.flat:
-        _check_start(scenario, structure, made, grid, start)
+    if made.flat:
+        return made
+    near, shown = np.array(grid.corner), scenario.units.shown
+    far = near + (np.array(grid.heights.shape) - 1) * grid.cell
+    if (start[:, :2] < near).any() or (start[:, :2] > far).any():
+        reach = " to ".join(", ".join(shown(x, "m") for x in corner) for corner in (near, far))
+        problem = f"the robot starts off its grid, which goes from x, y = {reach}"
+        raise InputError(scenario.name, "terrain", problem)
+    gaps = ground_frames(start, made)[:, terrain.GAP] - made.radius
+    weight = float(structure.mass.sum()) * scenario.robot.gravity
+    if gaps.min() < -START_DEPTH * structure.scale - weight / scenario.ground.stiffness:
+        node = structure.node_names[structure.contacts[gaps.argmin()]]
+        found = f"the robot starts with node {node} {shown(-gaps.min(), 'm')} below the ground"
+        raise InputError(scenario.name, "terrain", f"{found}; move what is there, or robot.offsets")
     return made
 
 
@@ -73,25 +85,6 @@ def make_surface(
         grid=np.array(surface_grid),
         heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
     )
-
-
-def _check_start(
-    scenario: Scenario, structure: Structure, ground: Ground, grid: Grid, start: np.ndarray
-) -> None:
-    """Raises InputError if a contact node is outside the terrain or in the ground. `start`
-    (contacts, 3) are the positions of the contact nodes."""
-    near, shown = np.array(grid.corner), scenario.units.shown
-    far = near + (np.array(grid.heights.shape) - 1) * grid.cell
-    if (start[:, :2] < near).any() or (start[:, :2] > far).any():
-        reach = " to ".join(", ".join(shown(x, "m") for x in corner) for corner in (near, far))
-        problem = f"the robot starts off its grid, which goes from x, y = {reach}"
-        raise InputError(scenario.name, "terrain", problem)
-    gaps = ground_frames(start, ground)[:, terrain.GAP] - ground.radius
-    weight = float(structure.mass.sum()) * scenario.robot.gravity
-    if gaps.min() < -START_DEPTH * structure.scale - weight / scenario.ground.stiffness:
-        node = structure.node_names[structure.contacts[gaps.argmin()]]
-        found = f"the robot starts with node {node} {shown(-gaps.min(), 'm')} below the ground"
-        raise InputError(scenario.name, "terrain", f"{found}; move what is there, or robot.offsets")
 
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:

@@ -7,7 +7,7 @@ import functools
 import numbers
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -167,7 +167,7 @@ class Robot:
         cpg, driven = self.scenario.cpg, self.structure.cables[self.driven]
         signal = self._usual_signal()
         moved = self._elastic_stretch(signal)
-        share = np.max(moved / self._starting_lengths(driven))
+        share = np.max(moved / self.structure.initial_lengths[self.driven])
         if share < LEAST_MOTION:
             problem = f"move no cable by more than {share:.2g} of its length"
         else:
@@ -226,21 +226,17 @@ class Robot:
     def starting_drives(self) -> np.ndarray:
         """States of the actuators at t = 0 (drives,); see laws.actuator and
         cables_of_drives."""
-        cables = self.structure.cables[self.cables_of_drives]
-        return np.asarray(self.scenario.actuation.drives(self._at_start(cables)))
+        cables = self._at_start(self.cables_of_drives)
+        return np.asarray(self.scenario.actuation.drives(cables))
 
     def starting_cables(self) -> DrivenCables:
         """Properties of the driven cables at t = 0."""
-        return self._at_start(self.structure.cables[self.driven])
+        return self._at_start(self.driven)
 
-    def _at_start(self, driven: np.ndarray) -> DrivenCables:
-        law, signal = cable.CableLaw.of(driven), self.first_signals[driven["signal"]]
-        return DrivenCables.at_rest(law, self._starting_lengths(driven), signal)
-
-    def _starting_lengths(self, cables: np.ndarray) -> Any:
-        """Lengths of cables, records of laws.cable.CABLE, in m at t = 0."""
-        p_WN = node_positions(self.structure, self.structure.initial_state)
-        return np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
+    def _at_start(self, indices: np.ndarray) -> DrivenCables:
+        cables, lengths = self.structure.cables[indices], self.structure.initial_lengths[indices]
+        law, signal = cable.CableLaw.of(cables), self.first_signals[cables["signal"]]
+        return DrivenCables.at_rest(law, lengths, signal)
 
     @functools.cached_property
     def starting_modes(self) -> np.ndarray:

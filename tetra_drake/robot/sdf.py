@@ -61,7 +61,6 @@ def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
 
 
 def _add_pose(parent: Element, X: RigidTransform) -> None:
-    """Adds a pose."""
     angles = RollPitchYaw(X.rotation()).vector()
     add_element(parent, "pose", np.concatenate([X.translation(), angles]))
 

@@ -30,28 +30,19 @@ def speed_limit(driven: DrivenRobot) -> float:
     start, slope = node_positions(structure, structure.initial_state), scenario.terrain.plane_slope
     above = start[:, 2] - start[:, 0] * math.tan(slope or 0.0)
     fall = max(0.0, above.max() - (robot.ground.heights.min() if slope is None else 0.0))
-    speed = math.sqrt(2.0 * (robot.weight * fall + _cable_energy(driven, start)))
+    law, cpg, length = CableLaw.of(structure.cables), scenario.cpg, structure.initial_lengths
+    stretch = length - law.free_length
+    if structure.slack:
+        stretch = np.maximum(stretch, 0.0)
+    pull = Limits(*robot.model.actuator.limits).max_force
+    if math.isnan(pull):  # actuators without limits
+        pull = max(abs(cpg.gain * cpg.external_input), np.abs(driven.samples).max(initial=0.0))
+    # A pull is at most the force that stretches the cable by its whole length.
+    pulls = np.minimum(pull, elastic_tension(length, law)) * length
+    energy = float(np.sum(elastic_energy(stretch, law)) + pulls[robot.driven].sum())
+    speed = math.sqrt(2.0 * (robot.weight * fall + energy))
     speed /= math.sqrt(structure.mass.min())
     downhill = math.sin(abs(slope or 0.0)) if structure.contacts.size else 1.0
     pushed = np.linalg.norm(structure.node_load, axis=1).sum() / structure.mass.sum()
     acceleration = downhill * scenario.robot.gravity + pushed
     return max(LEAST_LIMIT, float(speed + acceleration * scenario.simulation.duration))
-
-
-def _cable_energy(driven: DrivenRobot, p_WN: np.ndarray) -> float:
-    """Energy (J) of the cables at positions of the nodes, and work of a pull by each actuator.
-
-    A pull is at most the force that stretches the cable by its whole length.
-    """
-    robot = driven.robot
-    cables, cpg = robot.structure.cables, robot.scenario.cpg
-    law = CableLaw.of(cables)
-    length = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
-    stretch = length - law.free_length
-    if robot.structure.slack:
-        stretch = np.maximum(stretch, 0.0)
-    pull = Limits(*robot.model.actuator.limits).max_force
-    if math.isnan(pull):  # actuators without limits
-        pull = max(abs(cpg.gain * cpg.external_input), np.abs(driven.samples).max(initial=0.0))
-    pulls = np.minimum(pull, elastic_tension(length, law)) * length
-    return float(np.sum(elastic_energy(stretch, law)) + pulls[robot.driven].sum())

@@ -45,7 +45,11 @@ def find_statics(
     held = np.zeros(p_WN.shape, dtype=bool) if held is None else held
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
     wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
-    allowed = null_space(_motions_of_nodes(p_WN, body_of_node)[held], TOLERANCE)
+    bodies, nodes = body_of_node.max() + 1, np.arange(len(p_WN))
+    motions = np.zeros((nodes.size, 3, bodies + 1, 6))  # of nodes, by body and its motions
+    motions[nodes, :, body_of_node] = rigid_motions(p_WN)
+    motions = motions[:, :, :bodies].reshape(nodes.size, 3, 6 * bodies)
+    allowed = null_space(motions[held], TOLERANCE)
     self_stresses = null_space(allowed.T @ wrenches, TOLERANCE)
     rank = len(cable_ends) - self_stresses.shape[1]
     idle = _spins(p_WN, body_of_node)
@@ -86,15 +90,6 @@ def cable_wrenches(
     wrenches[body_of_node[node_a], :, cables] = wrench
     wrenches[body_of_node[node_b], :, cables] = -wrench
     return wrenches[:bodies].reshape(6 * bodies, len(cables))
-
-
-def _motions_of_nodes(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
-    """Velocities (nodes, 3, 6 B) of the nodes for the motions of B bodies. The six motions of a
-    body are in the order of rigid_motions(), about the world's origin."""
-    bodies = body_of_node.max() + 1
-    motions = np.zeros((len(p_WN), 3, bodies + 1, 6))
-    motions[np.arange(len(p_WN)), :, body_of_node] = rigid_motions(p_WN)
-    return motions[:, :, :bodies].reshape(len(p_WN), 3, 6 * bodies)
 
 
 def _spins(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:

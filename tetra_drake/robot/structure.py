@@ -189,6 +189,12 @@ class Structure(Blueprint):
         poses = np.hstack([self.q_WB, self.p_WB]).ravel()
         return np.concatenate([poses, np.zeros(6 * len(self.bodies))])
 
+    @property
+    def initial_lengths(self) -> np.ndarray:
+        """Lengths of the cables (cables,) in m at t = 0."""
+        node_a, node_b = node_positions(self, self.initial_state)[self.cable_ends.T]
+        return np.asarray(np.linalg.norm(node_b - node_a, axis=1))
+
 
 def turn_with_slope(
     p_WB: np.ndarray, q_WB: np.ndarray, slope: float

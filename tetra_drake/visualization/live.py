@@ -48,9 +48,8 @@ class LiveView:
         p_WN = node_positions(structure, structure.initial_state)
         free = np.array([FREE_FLOOR * structure.scale, 0.0, 0.0])
         # The greatest tension is not known yet. The greatest at the start has half of full size.
-        cables = structure.cables
-        lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
-        tensions = elastic_tension(lengths - cables["free_length"], CableLaw.of(cables))
+        law = CableLaw.of(structure.cables)
+        tensions = elastic_tension(np.subtract(structure.initial_lengths, law.free_length), law)
         self._per_newton = radius_per_newton(structure, 2.0 * np.max(tensions))
         add_robot(meshcat, structure)
         around = np.stack([p_WN - free, p_WN + free])

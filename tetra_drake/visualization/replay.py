@@ -58,6 +58,7 @@ LONG_ARROW = 0.8
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
 """Pattern of the asynchronous commands in Meshcat's page that add parts of the scene. The film runs
 them at once, because it needs the whole scene."""
+_SCRIPT = re.compile("<script[^>]*>(.+?)</script>", re.DOTALL)
 _IN_HEAD = (
     '<meta name="viewport" content="width=device-width, initial-scale=1">'
     '<link rel="icon" href="data:,">'
@@ -92,7 +93,11 @@ def save_replay(
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
     page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
     if viewer is not None:
-        _write_once(Path(viewer), script)
+        if not os.path.exists(viewer):
+            write_whole(viewer, script)
+        elif not os.path.isfile(viewer) or Path(viewer).read_bytes() != script.encode("utf-8"):
+            problem = "is not the viewer of this version of Drake; delete it or name another file"
+            raise InputError(viewer, "", problem)
     write_whole(path, page)
 
 

@@ -187,14 +187,31 @@ def set_surroundings(
     position = camera_position(seen, middle)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     meshcat.SetCameraPose(position, middle)
-    _set_lights(meshcat, reach=reach)
+    for unused in ("PointLightPositiveX", "PointLightNegativeX", "SpotLight"):
+        meshcat.SetProperty(f"/Lights/{unused}", "visible", False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", AMBIENT)
+    light = {
+        "intensity": SUN,
+        "position": (4.0 * reach * TO_SUN / np.linalg.norm(TO_SUN)).tolist(),
+        "castShadow": True,
+        "shadow.mapSize.width": 2048.0,
+        "shadow.mapSize.height": 2048.0,
+        **{f"shadow.camera.{side}": share * reach for side, share in _SHADOWS.items()},
+        "shadow.bias": -0.0005,
+        "shadow.normalBias": 0.002,
+    }
+    for name, value in light.items():
+        meshcat.SetProperty("/Lights/FillLight/<object>", name, value)
 
 
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
     """Adds the floor around `points` (..., 3). `reach` (m) is half of the robot's length."""
     ground, units = robot.ground, robot.scenario.units
-    corners = floor_corners(points, (FLOOR_MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
-    floor = floor_points(ground, corners, units)
+    x_y, dark = points.reshape(-1, 3)[:, :2], units.squares * units.square
+    margin = (FLOOR_MARGIN if ground.flat else UNEVEN_MARGIN) * reach
+    low, high = x_y.min(axis=0) - margin, x_y.max(axis=0) + margin
+    corners = np.array([np.floor(low / dark), np.ceil(high / dark)], dtype=int)  # on dark lines
+    floor = floor_points(ground, units.squares * corners, units)
     contacts = robot.structure.contacts
     sunk = drawn_radii(robot.structure)[1][contacts] - robot.structure.contact_radius[contacts]
     floor[..., 2] -= max(0.0, sunk.min())
@@ -207,35 +224,6 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
     else:
         _add_relief(meshcat, floor, scale=robot.structure.scale)
     _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
-
-
-def _set_lights(meshcat: Meshcat, *, reach: float) -> None:
-    """Sets an ambient light, and a light that casts shadows within `reach` (m) of its target."""
-    for unused in ("PointLightPositiveX", "PointLightNegativeX", "SpotLight"):
-        meshcat.SetProperty(f"/Lights/{unused}", "visible", False)
-    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", AMBIENT)
-    settings = {
-        "intensity": SUN,
-        "position": (4.0 * reach * TO_SUN / np.linalg.norm(TO_SUN)).tolist(),
-        "castShadow": True,
-        "shadow.mapSize.width": 2048.0,
-        "shadow.mapSize.height": 2048.0,
-        **{f"shadow.camera.{side}": share * reach for side, share in _SHADOWS.items()},
-        "shadow.bias": -0.0005,
-        "shadow.normalBias": 0.002,
-    }
-    for name, value in settings.items():
-        meshcat.SetProperty("/Lights/FillLight/<object>", name, value)
-
-
-def floor_corners(points: np.ndarray, margin: float, units: Units) -> np.ndarray:
-    """Corners of the floor: least and greatest x and y (2, 2) in squares, on dark lines.
-
-    The floor surrounds `points` (..., 3) with a margin, both in m.
-    """
-    x_y, dark = points.reshape(-1, 3)[:, :2], units.squares * units.square
-    low, high = x_y.min(axis=0) - margin, x_y.max(axis=0) + margin
-    return units.squares * np.array([np.floor(low / dark), np.ceil(high / dark)], dtype=int)
 
 
 def floor_points(ground: Ground, corners: np.ndarray, units: Units) -> np.ndarray:
