@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,8 @@ def speed_limit(driven: DrivenRobot) -> float:
     start, slope = node_positions(structure, structure.initial_state), scenario.terrain.plane_slope
     above = start[:, 2] - start[:, 0] * math.tan(slope or 0.0)
     fall = max(0.0, above.max() - (robot.ground.heights.min() if slope is None else 0.0))
-    law, cpg, length = CableLaw.of(structure.cables), scenario.cpg, structure.initial_lengths
+    law, cpg = CableLaw.of(structure.cables), scenario.cpg
+    length: Any = structure.initial_lengths
     stretch = length - law.free_length
     if structure.slack:
         stretch = np.maximum(stretch, 0.0)
