@@ -69,8 +69,7 @@ class Batch:
             until: times (s), for each place (N,) or for all. A robot that is not before its time
                 pauses.
             signals: signals (N, m) in N that controllers hold from now on. A change takes one
-                `cpg.listing_step`. Those of robots that pause, or have a gait or a command, may be
-                anything.
+                `cpg.listing_step`. A robot that pauses, or has a gait or a command, ignores them.
             briefly: returns earlier: as soon as a robot has ended, or after some 30 ms. An engine
                 without lanes simulates at least one robot to its time.
 
