@@ -10,8 +10,8 @@ from helpers import analytic
 from helpers.converged import shortly
 from helpers.quantities import with_unit
 from pytest import approx
-
 from tetra_drake.engines.lanes.lane_pool import LanePool
+
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.draws import combine_metrics, worst_mean
 from tetra_drake.evolution.evaluation import GaitEvaluation

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from helpers.analytic import evaluated, small_scenario, tasks_of
 from helpers.converged import shortly
-
 from tetra_drake.engines.lanes.lane_pool import LanePool
+
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.evolution.evaluation import GaitEvaluation

@@ -19,8 +19,8 @@ from tetra_drake.figures.motion import (
 from tetra_drake.figures.style import OKABE_ITO
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Steps
-from tetra_drake.results.measures import last_step
 from tetra_drake.robot.ground import ground_heights
+from tetra_drake.robot.measures import last_step
 from tetra_drake.scenario.robot_tetrahedra import STRUTS
 from tetra_drake.settings.units import INCH, POUND_FORCE
 

@@ -13,8 +13,7 @@ from helpers.synthetic_run import write_run
 from tetra_drake.errors import InputError
 from tetra_drake.report.replay_page import load_or_simulate, write_replay
 from tetra_drake.report.result_folder import check_result_folder, load_result, save_result_folder
-from tetra_drake.results.metrics import headline
-from tetra_drake.results.result import save_result
+from tetra_drake.results.result import headline, save_result
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.settings.units import INCH
 

@@ -8,7 +8,7 @@ from helpers import prism
 from helpers.made_up_walk import PERIOD, make_row, make_walk
 
 from tetra_drake.laws.curves import travelling_index
-from tetra_drake.results.measures import (
+from tetra_drake.robot.measures import (
     distance_walked,
     dominant_frequency,
     intervals,

@@ -9,16 +9,17 @@ import pytest
 from helpers.totals import make_totals
 
 from tetra_drake.laws.terrain import Incline, Rough
-from tetra_drake.results.metrics import (
-    compute_fitness,
-    compute_metrics,
-    headline,
-    unmet_requirements,
-)
-from tetra_drake.robot.path import CentrePath
+from tetra_drake.results.result import compute_metrics, headline
+from tetra_drake.robot.measures import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics
+from tetra_drake.scenario.metrics import (
+    LEAST_WAY,
+    METRICS,
+    Metrics,
+    compute_fitness,
+    unmet_requirements,
+)
 from tetra_drake.scenario.scenario import Scenario
 
 INCH = 0.0254

@@ -29,8 +29,8 @@ from tetra_drake.figures.style import (
     shown_part,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.results.measures import Span, intervals, off_ground, share_of_time
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.measures import Span, intervals, off_ground, share_of_time
 
 _SECONDS = 4.0  # length of the part that is shown by default
 

@@ -28,9 +28,9 @@ from tetra_drake.figures.style import (
     write_beside,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.results import measures
-from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot import measures
+from tetra_drake.robot.measures import Span
 from tetra_drake.robot.structure import Structure
 from tetra_drake.settings.units import Units
 

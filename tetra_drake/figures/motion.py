@@ -29,10 +29,10 @@ from tetra_drake.figures.style import (
     shown_part,
 )
 from tetra_drake.formatting import fixed, signed
-from tetra_drake.results import measures
-from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot import measures
 from tetra_drake.robot.ground import ground_heights
+from tetra_drake.robot.measures import Span
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
 from tetra_drake.settings.units import INCH, Units

@@ -32,7 +32,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file, write_whole
-from tetra_drake.results.measures import Span
+from tetra_drake.robot.measures import Span
 from tetra_drake.settings.units import shown_in
 
 Page: TypeAlias = Figure | SubFigure

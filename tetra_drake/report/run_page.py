@@ -29,7 +29,7 @@ from tetra_drake.report.run_figures import (
     simulate_shown_gaits,
 )
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
-from tetra_drake.results.metrics import headline
+from tetra_drake.results.result import headline
 from tetra_drake.robot.gait import Gait, save_gait
 from tetra_drake.robot.weights import NEURONS
 from tetra_drake.scenario.load import SCENARIO, load_scenario

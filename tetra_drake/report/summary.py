@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import TextTable, fixed, rounded
-from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.metrics import METRICS, UNITS
+from tetra_drake.scenario.metrics import METRICS, UNITS, headline_metric, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import Units
 

@@ -21,7 +21,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render, rounded
 from tetra_drake.robot.ground import ground_axes
-from tetra_drake.robot.path import follow
+from tetra_drake.robot.measures import distance_walked, path_of_centre
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metrics import looks_for_turns
@@ -199,14 +199,12 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     heading."""
     structure, objective = robot.structure, robot.scenario.objective
     if structure.points_ahead and looks_for_turns(objective):
-        poses = np.concatenate([frames["q_WB"].values, frames["p_WB"].values], axis=-1)
-        heading = np.rad2deg(follow(frames["time"].values, poses, structure).heading)
+        heading = np.rad2deg(path_of_centre(frames, structure).heading)
         values, what, unit, digits = heading - heading[0], "turned", "°", 0
     else:
         units = robot.scenario.units
-        x = followed_nodes(frames["p_WN"].values, structure)[:, 0, 0] / units.length
-        values, what, unit = x - x[0], "walked", f" {units.length_name}"
-        digits = units.decimals
+        values = distance_walked(frames, structure) / units.length
+        what, unit, digits = "walked", f" {units.length_name}", units.decimals
     return {"what": what, "unit": unit, "digits": digits, "values": values.round(digits).tolist()}
 
 
