@@ -5,7 +5,6 @@ import dataclasses
 import re
 import shlex
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
@@ -93,7 +92,7 @@ def study(run):
 def render(study, **changes):
     """The page without figures, of a study with changes of its run."""
     run = dataclasses.replace(study.run, **changes)
-    return Page(render_report(dataclasses.replace(study, run=run), [], folder=Path("unused")))
+    return Page(render_report(dataclasses.replace(study, run=run), []))
 
 
 def test_figures_are_files_and_in_the_page(run, page):
@@ -156,9 +155,9 @@ def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study)
     disturbed = {"disturbances": {"draws": 3, "start": 0.1}}
     scenario = tiny_scenario().with_changes(disturbed)
     shown = simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
-    assert shown.best.distance == study.best.distance
+    assert shown.best.result.metrics == study.best.result.metrics
     (note,) = (text for text in render(shown).texts["p"] if "3 draws" in text)
-    assert f"{rounded(shown.best.distance / INCH)} in" in note
+    assert f"{rounded(shown.best.result.metrics.distance_in)} in" in note
 
 
 def test_the_commands_to_reproduce_it_are_commands(page):

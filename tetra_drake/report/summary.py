@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.evolution.run import Run, gait_label
@@ -36,27 +36,25 @@ _NOISE = 1e-5
 
 
 def metrics_table(
-    gaits: Mapping[str, Mapping[str, Any] | pandas.Series], scenario: Scenario
+    names: Sequence[str], gaits: Sequence[Mapping[str, Any] | pandas.Series], scenario: Scenario
 ) -> TextTable:
     """Table of fitness and metrics, with a column per gait. A gait is a row of `Run.evaluations`.
 
     The first row is the main metric of the objective. Numbers that are zero for all gaits are left
     out, unless the scenario's objective or requirements name them.
     """
-    *_, last = gaits.values()
-    first = headline_metric(scenario.objective, last)
-    names = dict.fromkeys([first, "fitness", "worst_distance", *METRICS, "kept"])
+    first = headline_metric(scenario.objective, gaits[-1])
     always = {"fitness", "distance", *scenario.objective, *scenario.require}
     rows = []
-    for name in names:
+    for name in dict.fromkeys([first, "fitness", "worst_distance", *METRICS, "kept"]):
         size, title = _size_and_title(name, scenario.units)
-        values = [gait.get(name, math.nan) / size for gait in gaits.values()]
+        values = [gait.get(name, math.nan) / size for gait in gaits]
         has_some = any(math.isfinite(value) and abs(value) >= _NOTHING for value in values)
         if has_some or name in always:
             whole = name in _SHARES
             digits = [fixed(x, 0) if whole or abs(x) < _NOISE else rounded(x) for x in values]
             rows.append([title, *digits, _NOTES.get(name, "")])
-    return TextTable(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))
+    return TextTable(["", *names, ""], rows, text_columns=(0, len(gaits) + 1))
 
 
 def _size_and_title(name: str, units: Units) -> tuple[float, str]:
@@ -72,7 +70,9 @@ def result_text(result: SimulationResult) -> str:
     """Text about a simulation: metrics, requirements that are not met, wall time."""
     scenario, metrics = result.scenario, result.metrics
     lines = [result.title, f"scenario {scenario.name}, {ground_text(scenario)}"]
-    lines.append(metrics_table({"": {"fitness": result.fitness} | vars(metrics)}, scenario).text())
+    lines.append(
+        metrics_table([""], [{"fitness": result.fitness} | vars(metrics)], scenario).text()
+    )
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
@@ -101,8 +101,8 @@ def run_text(run: Run) -> str:
         texts.append(trials_table(run).text())
     if not run.best().empty:
         best = run.fittest()
-        gaits = {"initially": run.initial_best(best["trial"]), "best": best}
-        texts.append(metrics_table(gaits, run.scenario).text())
+        gaits = [run.initial_best(best["trial"]), best]
+        texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
         if still := Robot.of(run.scenario).stillness_remark(best["distance"]):
             texts.append(f"{still[0].upper()}{still[1:]}.")
     replay, report = run.directory / "replay.html", run.directory / "report.html"

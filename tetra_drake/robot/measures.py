@@ -1,6 +1,6 @@
 """Measures of motion, in SI units: path of the centre, distances, contact and cycles.
 
-Trajectories are those of results.trajectory.make_dataset().
+results.trajectory.make_dataset() makes trajectories.
 """
 
 from __future__ import annotations
