@@ -16,7 +16,6 @@ from tetra_drake.figures.style import (
     AS_USUAL,
     Drawn,
     Look,
-    Page,
     Print,
     figure_function,
     legend_below,
@@ -99,7 +98,7 @@ def save_comparison(compared: Compared, folder: Path, printed: Print = AS_USUAL)
 
 
 @figure_function
-def comparison(compared: Compared, *, figure: Page | None = None) -> Drawn:
+def comparison(compared: Compared) -> Drawn:
     """Comparison of runs: the best fitness so far, as median and interquartile band over the trials
     of each run.
 
@@ -108,9 +107,9 @@ def comparison(compared: Compared, *, figure: Page | None = None) -> Drawn:
     panel_count, unit = 1 if compared.reach is None else 2, compared.scenario.units
     counts = compared.runs["trials"].items()
     labels = [f"{label} ({count} {'trial' if count == 1 else 'trials'})" for label, count in counts]
-    is_narrow = page_width(figure) < _BESIDE * rcParams["font.size"] / Look.font_size
+    is_narrow = page_width() < _BESIDE * rcParams["font.size"] / Look.font_size
     rows, columns = (panel_count, 1) if is_narrow else (1, panel_count)
-    page = page_of(figure, height_in=1.2 + 2.2 * rows + 0.1 * len(labels))
+    page = page_of(height_in=1.2 + 2.2 * rows + 0.1 * len(labels))
     panels = page.subplots(rows, columns, squeeze=False).ravel()
     ends = compared.curves.groupby("run", sort=False)["cost"].max()
     first = min(_FIRST, ends.min())

@@ -9,7 +9,6 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from tetra_drake.analysis.fit import Fit
 from tetra_drake.figures.style import (
     Drawn,
-    Page,
     figure_function,
     legend_below,
     line_style,
@@ -82,14 +81,14 @@ def _page(fit: Fit) -> str:
 
 
 @figure_function
-def residuals(fit: Fit, *, figure: Page | None = None) -> Drawn:
+def residuals(fit: Fit) -> Drawn:
     """Residuals of a fit over time, or by number, in standard deviations of the measurements.
 
     A panel shows a measurement: predictions minus measured numbers, with the start values and with
     the fitted ones. The grey band holds 95 % of the residuals of a right model.
     """
     groups = list(fit.residuals.groupby("measurement", sort=False))
-    page = page_of(figure, height_in=0.8 + 1.7 * len(groups))
+    page = page_of(height_in=0.8 + 1.7 * len(groups))
     panels = page.subplots(len(groups), 1, squeeze=False)[:, 0]
     styles = {}
     for panel, (name, rows) in zip(panels, groups, strict=True):

@@ -47,9 +47,7 @@ _MIRRORED = 0.01  # two nodes share a panel if mean difference / mean force is a
 
 
 @figure_function
-def signals_and_tensions(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Actuation signals and the tensions of the cables that they drive, in the last 4 s.
 
     The title of a panel is the name of the cable. If a signal drives several cables, the first is
@@ -63,7 +61,7 @@ def signals_and_tensions(
     others = []
     if float(trajectory.time[0]) < start_up:
         others.append(Patch(color=SHADE, label="start-up"))
-    page, panels = _panels_over_time(figure, forces.cable.values[driven], groups=groups)
+    page, panels = _panels_over_time(forces.cable.values[driven], groups=groups)
     for cable, oscillator, panel in zip(driven, oscillators, panels, strict=True):
         panel.axhline(0.0, color="0.6", linewidth=0.6)
         if others:
@@ -77,9 +75,7 @@ def signals_and_tensions(
 
 
 @figure_function
-def ground_forces(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Normal force and friction of the feet in the last 4 s.
 
     Friction is along x; on uneven ground, along x projected on the slope. Each foot that touches
@@ -90,7 +86,7 @@ def ground_forces(
     feet = _feet_to_show(end)
     _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)
     page, panels = _panels_over_time(
-        figure, list(feet.values()), groups=per_body.min(), beside="stands 100 %"
+        list(feet.values()), groups=per_body.min(), beside="stands 100 %"
     )
     limits = _limits_between_impacts(forces)
     for foot, panel in zip(feet, panels, strict=True):
@@ -151,19 +147,19 @@ def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
 
 
 def _panels_over_time(
-    figure: Page | None, names: Sequence[str], *, groups: int, beside: str = ""
+    names: Sequence[str], *, groups: int, beside: str = ""
 ) -> tuple[Page, list[Axes]]:
     """The page and a panel per name. If there are few groups of panels, each group has a column. A
     text `beside` the names has its own line if it needs one."""
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
-    width = _NAME / columns * page_width(figure)
+    width = _NAME / columns * page_width()
     names = [folded(name.replace("_", " "), width) for name in names]
     if most_lines(folded(f"{name} {beside}", width) for name in names) > most_lines(names):
         names = [f"{name}\n" for name in names]
     row = 1.05 + 0.15 * most_lines(names)
-    page = page_of(figure, height_in=1.0 + min(row * rows, 9.0))
+    page = page_of(height_in=1.0 + min(row * rows, 9.0))
     panels = panels_in_columns(
         page, len(names), columns, x_label="time (s)", sharex=True, sharey=True
     )

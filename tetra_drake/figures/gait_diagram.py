@@ -15,7 +15,6 @@ from tetra_drake.figures.style import (
     OKABE_ITO,
     REFERENCE,
     Drawn,
-    Page,
     figure_function,
     folded,
     most_lines,
@@ -55,9 +54,7 @@ _OTHER_FOOT = "0.35"
 
 
 @figure_function
-def gait_diagram(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
     speed of the centre of mass.
 
@@ -75,14 +72,14 @@ def gait_diagram(
     stands = ~measures.off_ground(trajectory)
     are_feet = np.isin(structure.contacts, structure.markers)
     stands = stands[:, stands.any("time").values | are_feet]
-    feet, width = _rows_of_feet(stands), _NAMES * page_width(figure)
+    feet, width = _rows_of_feet(stands), _NAMES * page_width()
     names_of_feet = {folded(name, width): row for name, row in _named_rows(stands, feet).items()}
     height = max(feet.values(), default=0.0) * _rows_of_names(names_of_feet)
     rows = [np.clip(height, *_ROWS), _SPEED_ROWS]
     if structure.signals:
         names = [folded(name, width) for name in own_words(structure.oscillators)]
         rows.insert(0, np.clip(structure.signals * _rows_of_names(names), *_ROWS))
-    page = page_of(figure, height_in=_ROW * sum(rows) + 1.25)
+    page = page_of(height_in=_ROW * sum(rows) + 1.25)
     panels = page.subplots(len(rows), sharex=True, height_ratios=rows)
     if structure.signals:
         _draw_signals(panels[0], trajectory, names, unit)

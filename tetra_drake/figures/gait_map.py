@@ -19,7 +19,7 @@ from tetra_drake.analysis.elites import (
     notable_gaits,
 )
 from tetra_drake.evolution.run import Run, gait_label
-from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, page_of, set_title
+from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
 from tetra_drake.formatting import listed
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -30,7 +30,7 @@ _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": 
 
 
 @figure_function
-def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
+def map_of_gaits(run: Run) -> Drawn:
     """Map of gaits: the fittest gait in each cell. White cells have no gait.
 
     If gaits were simulated on disturbed robots, the second panel shows the share of draws with
@@ -45,7 +45,7 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
     named = distinct_gaits(notable_gaits(run))
-    page = page_of(figure, height_in=3.9 + 0.17 * len(named))
+    page = page_of(height_in=3.9 + 0.17 * len(named))
     row = page.subplots(1, 1 + judged, squeeze=False, sharey=True)[0]
     title = f"fitness ({len(kept)} of {math.prod(kind.cells)} cells)"
     _draw_cells(row[0], kept, kept["fitness"], edges, title=title, cmap="viridis")

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from tetra_drake.figures.style import (
+    GIVEN,
     LINE_COLOURS,
     OKABE_ITO,
     Drawn,
@@ -61,16 +62,14 @@ _NAMED["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 
 
 @figure_function
-def relative_distances(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def relative_distances(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Distance along x of each body from the first body, over time. Distances are between centres
     of mass. Grey lines: the distances at the start."""
     unit, x = result.scenario.units, shown_part(result.trajectory, time).p_WB.sel(axis="x")
     distances = (x - x.isel(body=0)) / unit.length
     first, *names = distances.body.values
     height = np.clip(1.5 + 0.6 * len(names), 2.4, 6.5)
-    page, width = page_of(figure, height_in=height), 0.3 * page_width(figure)
+    page, width = page_of(height_in=height), 0.3 * page_width()
     panel = page.subplots()
     for i, name in enumerate(names):
         line = distances.sel(body=name)
@@ -86,16 +85,12 @@ def relative_distances(
 
 @figure_function
 def before_and_after(
-    initial: SimulationResult,
-    best: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
+    initial: SimulationResult, best: SimulationResult, *, time: Span | None = None
 ) -> Drawn:
     """Distance walked over time, before and after evolution: the best initial gait and the best
     gait of the best trial."""
     unit = best.scenario.units
-    page = page_of(figure, height_in=3.8)
+    page = page_of(height_in=3.8)
     panel = page.subplots()
     legend = {}
     for when, result, look in (("before", initial, _BEFORE), ("after", best, _AFTER)):
@@ -110,13 +105,7 @@ def before_and_after(
 
 
 @figure_function
-def time_lapse(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
-    instants: int = 6,
-) -> Drawn:
+def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: int = 6) -> Drawn:
     """Time lapse of the robot from above, to scale, with the distance walked. Forward is to the
     right. The line is the path of the centre so far, with a dot at each full second."""
     structure, unit = result.robot.structure, result.scenario.units
@@ -127,8 +116,8 @@ def time_lapse(
     centre = structure.node_shares @ nodes
     shown = np.concatenate([nodes[samples].reshape(-1, 2), centre])
     wide, high = (_range(shown[:, axis], result) for axis in (X, Y))
-    columns, height = _fit(instants, wide, high, figure, height_in=6.0)
-    page = page_of(figure, height_in=height + 0.9)
+    columns, height = _fit(instants, wide, high, height_in=6.0)
+    page = page_of(height_in=height + 0.9)
     x_label = f"x, forward ({unit.length_name}) →"
     panels = panels_in_columns(page, instants, columns, x_label=x_label)
     looks = [{"color": LINE_COLOURS[i % len(LINE_COLOURS)]} for i in range(len(structure.bodies))]
@@ -151,11 +140,7 @@ def time_lapse(
 
 @figure_function
 def path_of_the_centre(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
-    instants: int = 9,
+    result: SimulationResult, *, time: Span | None = None, instants: int = 9
 ) -> Drawn:
     """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
     straight, its height along x is shown instead."""
@@ -167,7 +152,7 @@ def path_of_the_centre(
     is_straight = high < _STRAIGHT * wide
     ratio = high / max(wide, _margin(result))
     to_scale = min(rcParams["figure.figsize"][0] * ratio, 5.0) + 1.4
-    page = page_of(figure, height_in=2.6 if is_straight else to_scale)
+    page = page_of(height_in=2.6 if is_straight else to_scale)
     panel = page.subplots()
     panel.set_xlabel(f"x ({unit.length_name})")
     panel.plot(points[:, X], points[:, Z if is_straight else Y], **_PATH)
@@ -195,13 +180,7 @@ def path_of_the_centre(
 
 
 @figure_function
-def one_step(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
-    instants: int = 6,
-) -> Drawn:
+def one_step(result: SimulationResult, *, time: Span | None = None, instants: int = 6) -> Drawn:
     """One step to scale, from above and from the side. Bodies off the ground are red.
 
     A body is off the ground if all its feet are higher than 2 % of the robot's height. The lower
@@ -224,11 +203,11 @@ def one_step(
     below = across[0] - high  # the side view stands below the view from above
     views = nodes[..., [X, Y]], nodes[..., [X, Z]] + [0.0, below]
     tall = low + below, across[1]
-    columns, height = _fit(instants, wide, tall, figure, height_in=5.5)
+    columns, height = _fit(instants, wide, tall, height_in=5.5)
     names = structure.bodies if structure.markers.size else (structure.followed,)
     of_paths = 1.1 * math.ceil(len(names) / _PATHS) + 0.4
     parts = [min(height + 0.4, 5.0 * of_paths), of_paths]
-    page = page_of(figure, height_in=sum(parts) + 0.5)
+    page = page_of(height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
     panels = panels_in_columns(upper, instants, columns, x_label=f"x ({unit.length_name})")
     for sample, profile, panel in zip(samples, profiles, panels, strict=True):
@@ -330,15 +309,14 @@ def _range(values: np.ndarray, result: SimulationResult) -> Span:
     return float(values.min()) - margin, float(values.max()) + margin
 
 
-def _fit(
-    count: int, wide: Span, high: Span, figure: Page | None, *, height_in: float
-) -> tuple[int, float]:
+def _fit(count: int, wide: Span, high: Span, *, height_in: float) -> tuple[int, float]:
     """Number of columns for which `count` pictures are largest, and the height (in) of all rows.
 
     `wide` and `high` are the ranges that a picture shows. The pictures fill the caller's figure, or
     a page of the height `height_in`.
     """
-    whole = page_width(figure)
+    whole = page_width()
+    figure = GIVEN.get()
     page_height = height_in if figure is None else figure.bbox.height / figure.dpi
     ratio = (high[1] - high[0]) / (wide[1] - wide[0])
 

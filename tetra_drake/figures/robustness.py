@@ -22,7 +22,6 @@ from tetra_drake.figures.style import (
     REFERENCE,
     SHADE,
     Drawn,
-    Page,
     figure_function,
     folded,
     most_lines,
@@ -102,7 +101,7 @@ def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
 
 
 @figure_function
-def robustness(judgement: Judgement, *, figure: Page | None = None) -> Drawn:
+def robustness(judgement: Judgement) -> Drawn:
     """Robustness of gaits on disturbed robots.
 
     Above: the distance in each draw divided by the undisturbed distance. Boxes are quartiles,
@@ -115,11 +114,11 @@ def robustness(judgement: Judgement, *, figure: Page | None = None) -> Drawn:
     unit = judgement.scenario.units
     gaits = by_gait(judgement).sort_values("kept", kind="stable")
     changes, count = by_change(judgement).iloc[::-1], judgement.draws["draw"].nunique()
-    width = _NAMES * page_width(figure)
+    width = _NAMES * page_width()
     names = [folded(str(name), width) for name in gaits.index]
     what = [folded(str(name), width) for name in changes.index]
     rows = [max(most_lines(texts) * len(texts) + 1, 4) for texts in (names, what)]
-    page = page_of(figure, height_in=_ROW * sum(rows) + 1.8)
+    page = page_of(height_in=_ROW * sum(rows) + 1.8)
     places: Any = [["distances", "distances"], ["alone", "together"]]
     panels = page.subplot_mosaic(places, height_ratios=rows)
     above, alone, together = panels["distances"], panels["alone"], panels["together"]
