@@ -104,7 +104,11 @@ def fitness_of_trials(run: Run) -> Drawn:
     With four trials or more, the fittest and the least fit trial are dark, the others grey. Blue:
     median and quartiles over trials. A finished trial keeps its last value in the quartiles."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
-    whole = _whole_iterations(run)
+    # The mean of a last iteration that the budget has cut would be over few gaits.
+    rows = run.iterations
+    sizes = rows.groupby("trial")["evaluations"].diff()
+    is_cut = sizes < sizes.groupby(rows["trial"]).shift()
+    whole = rows[rows.duplicated("trial", keep="last") | ~is_cut]
     table = whole.pivot(index="evaluations", columns="trial", values=f"{kind}_fitness")
     table = table.dropna(axis="columns", how="all")
     page = page_of(height_in=3.6)
@@ -133,13 +137,3 @@ def fitness_of_trials(run: Run) -> Drawn:
     legend_below(page, legend)
     set_title(page, f"{kind.capitalize()} fitness of each trial")
     return page
-
-
-def _whole_iterations(run: Run) -> pandas.DataFrame:
-    """The iterations of a run, without last iterations that were cut by the budget of evaluations.
-    Their mean would be over few gaits."""
-    rows = run.iterations
-    sizes = rows.groupby("trial")["evaluations"].diff()
-    is_last = ~rows.duplicated("trial", keep="last")
-    before = sizes.groupby(rows["trial"]).shift()
-    return rows[~(is_last & (sizes < before))]

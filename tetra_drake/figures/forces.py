@@ -52,7 +52,7 @@ def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) 
 
     The title of a panel is the name of the cable. If a signal drives several cables, the first is
     shown. The start-up is shaded; signals are 0 there."""
-    unit, trajectory = result.scenario.units, shown_part(result.trajectory, time or _last(result))
+    unit, trajectory = result.scenario.units, _shown(result, time)
     forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
     driven = [signals.index(oscillator) for oscillator in oscillators]
@@ -81,14 +81,18 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
     Friction is along x; on uneven ground, along x projected on the slope. Each foot that touches
     the ground has a panel; feet of one body with equal forces share a panel. Grey: stance. Peaks of
     impacts are cut off, because they are shorter than the time between samples."""
-    unit, end = result.scenario.units, shown_part(result.trajectory, time or _last(result))
+    unit, end = result.scenario.units, _shown(result, time)
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)
     _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)
     page, panels = _panels_over_time(
         list(feet.values()), groups=per_body.min(), beside="stands 100 %"
     )
-    limits = _limits_between_impacts(forces)
+    touching = forces.where(forces.normal_force > 0.0)
+    both = touching.normal_force, touching.friction_force.sel(horizontal="x")
+    values = np.concatenate([*(each.values.ravel() for each in both), [0.0]])
+    low, high = np.nanquantile(values, [_IMPACTS, 1.0 - _IMPACTS])
+    margin = _MARGIN * (high - low)
     for foot, panel in zip(feet, panels, strict=True):
         node, stands = forces.sel(contact=foot), ~off_ground(end.sel(contact=foot))
         spans = intervals(stands.time.values, stands.values)
@@ -101,7 +105,8 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
         panel.plot(landings, [_TOP] * len(landings), transform=above, **_LANDING)
         share = fixed(100.0 * share_of_time(stands), 0)
         panel.set_title(f"stands {share} %", loc="right", fontsize="small", pad=3.0)
-        panel.set_ylim(limits)
+        if margin > 0.0:
+            panel.set_ylim(low - margin, high + margin)
     along = "along x" if result.robot.ground.flat else "along the forward tangent"
     looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
     legend_below(page, looks, Patch(color=SHADE, label="stance"))
@@ -110,20 +115,10 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
     return page
 
 
-def _last(result: SimulationResult) -> Span:
+def _shown(result: SimulationResult, time: Span | None) -> xarray.Dataset:
+    """The part of the trajectory between two times (s), by default its end."""
     end = float(result.trajectory.time[-1])
-    return max(0.0, end - _SECONDS), end
-
-
-def _limits_between_impacts(forces: xarray.Dataset) -> Span | None:
-    """Range of the y axis: the forces of touching nodes without impacts. None if no node touches
-    the ground."""
-    touching = forces.where(forces.normal_force > 0.0)
-    normal, friction = touching.normal_force, touching.friction_force.sel(horizontal="x")
-    values = np.concatenate([normal.values.ravel(), friction.values.ravel(), [0.0]])
-    low, high = np.nanquantile(values, [_IMPACTS, 1.0 - _IMPACTS])
-    margin = _MARGIN * (high - low)
-    return (low - margin, high + margin) if margin > 0.0 else None
+    return shown_part(result.trajectory, time or (max(0.0, end - _SECONDS), end))
 
 
 def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
