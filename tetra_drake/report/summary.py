@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
-from tetra_drake.formatting import TextTable, fixed, rounded
+from tetra_drake.formatting import TextTable, fixed, rounded, sentence
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.metrics import METRICS, UNITS, headline_metric, unmet_requirements
@@ -77,8 +77,8 @@ def result_text(result: SimulationResult) -> str:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
     still = robot.stillness_remark(metrics.distance) if result.gait else ""
-    for remark in filter(None, [robot.start_up_remark() or still, robot.sinking_remark()]):
-        lines.append(f"{remark[0].upper()}{remark[1:]}.")
+    remarks = robot.start_up_remark() or still, robot.sinking_remark()
+    lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]
     time, factor = _time(result.wall_time), rounded(result.duration / result.wall_time)
@@ -104,7 +104,7 @@ def run_text(run: Run) -> str:
         gaits = [run.initial_best(best["trial"]), best]
         texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
         if still := Robot.of(run.scenario).stillness_remark(best["distance"]):
-            texts.append(f"{still[0].upper()}{still[1:]}.")
+            texts.append(sentence(still))
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
         texts.append(f"to watch the best gait:  {replay}\nfigures and numbers:     {report}")

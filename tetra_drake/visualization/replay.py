@@ -92,7 +92,12 @@ def save_replay(
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
     page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
     if viewer is not None:
-        _write_once(Path(viewer), script)
+        file = Path(viewer)
+        if not file.exists():
+            write_whole(file, script)
+        elif not file.is_file() or file.read_bytes() != script.encode("utf-8"):
+            problem = "is not the viewer of this version of Drake; delete it or name another file"
+            raise InputError(file, "", problem)
     write_whole(path, page)
 
 
@@ -264,12 +269,3 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
     return "</main></body>".join(page.rsplit("</body>", 1))
-
-
-def _write_once(path: Path, text: str) -> None:
-    """Writes a file that does not exist yet. Raises InputError if it exists with another text."""
-    if not path.exists():
-        write_whole(path, text)
-    elif not path.is_file() or path.read_bytes() != text.encode("utf-8"):
-        problem = "is not the viewer of this version of Drake; delete it or name another file"
-        raise InputError(path, "", problem)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -167,7 +166,8 @@ def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float)
 def set_surroundings(
     meshcat: Meshcat, robot: Robot, points: np.ndarray, *, seen: np.ndarray
 ) -> None:
-    """Adds floor and light and sets the camera. Without ground there is no floor.
+    """Adds floor and light and sets the camera. Without ground there is no floor. The light casts
+    shadows.
 
     The floor surrounds `points` (..., 3), and the camera sees nodes at all of `seen` (..., 3), both
     in m.
@@ -187,7 +187,21 @@ def set_surroundings(
     position = camera_position(seen, middle)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     meshcat.SetCameraPose(position, middle)
-    _set_lights(meshcat, reach=reach)
+    for unused in ("PointLightPositiveX", "PointLightNegativeX", "SpotLight"):
+        meshcat.SetProperty(f"/Lights/{unused}", "visible", False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", AMBIENT)
+    settings = {
+        "intensity": SUN,
+        "position": (4.0 * reach * TO_SUN / np.linalg.norm(TO_SUN)).tolist(),
+        "castShadow": True,
+        "shadow.mapSize.width": 2048.0,
+        "shadow.mapSize.height": 2048.0,
+        **{f"shadow.camera.{side}": share * reach for side, share in _SHADOWS.items()},
+        "shadow.bias": -0.0005,
+        "shadow.normalBias": 0.002,
+    }
+    for name, value in settings.items():
+        meshcat.SetProperty("/Lights/FillLight/<object>", name, value)
 
 
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
@@ -207,25 +221,6 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
     else:
         _add_relief(meshcat, floor, scale=robot.structure.scale)
     _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
-
-
-def _set_lights(meshcat: Meshcat, *, reach: float) -> None:
-    """Sets an ambient light, and a light that casts shadows within `reach` (m) of its target."""
-    for unused in ("PointLightPositiveX", "PointLightNegativeX", "SpotLight"):
-        meshcat.SetProperty(f"/Lights/{unused}", "visible", False)
-    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", AMBIENT)
-    settings = {
-        "intensity": SUN,
-        "position": (4.0 * reach * TO_SUN / np.linalg.norm(TO_SUN)).tolist(),
-        "castShadow": True,
-        "shadow.mapSize.width": 2048.0,
-        "shadow.mapSize.height": 2048.0,
-        **{f"shadow.camera.{side}": share * reach for side, share in _SHADOWS.items()},
-        "shadow.bias": -0.0005,
-        "shadow.normalBias": 0.002,
-    }
-    for name, value in settings.items():
-        meshcat.SetProperty("/Lights/FillLight/<object>", name, value)
 
 
 def floor_corners(points: np.ndarray, margin: float, units: Units) -> np.ndarray:
@@ -331,16 +326,10 @@ def _add_grid(meshcat: Meshcat, floor: np.ndarray, units: Units, *, colour: str)
             points = line[:: units.squares] if np.ptp(line[:, 2]) == 0.0 else line
             (light if round(position) % units.squares else dark).append(points)
     # Lines are a little above the floor. Otherwise the floor would hide parts of them.
-    if light:
-        _add_lines(meshcat, "/floor/squares", light, lift=0.0002, colour=rgba(colour))
-    _add_lines(meshcat, "/floor/dark", dark, lift=0.0004, colour=rgba("dark_line"))
-
-
-def _add_lines(
-    meshcat: Meshcat, path: str, lines: Sequence[np.ndarray], *, lift: float, colour: Rgba
-) -> None:
-    """Adds lines through points (points, 3), raised by `lift`; all in m."""
-    raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
-    start = np.vstack([line[:-1] for line in raised])
-    end = np.vstack([line[1:] for line in raised])
-    meshcat.SetLineSegments(path, start.T, end.T, rgba=colour)
+    looks = [("squares", light, 0.0002, colour), ("dark", dark, 0.0004, "dark_line")]
+    for name, lines, lift, look in looks:
+        raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
+        if raised:
+            start = np.vstack([line[:-1] for line in raised])
+            end = np.vstack([line[1:] for line in raised])
+            meshcat.SetLineSegments(f"/floor/{name}", start.T, end.T, rgba=rgba(look))
