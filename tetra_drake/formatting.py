@@ -109,7 +109,10 @@ class TextTable:
         widths, lines = self._widths(shutil.get_terminal_size((_WIDTH, 24)).columns), []
         aligns = [str.ljust if is_text else str.rjust for is_text in self._holds_texts]
         for cells in [self.headings, *self.rows]:
-            folded = [_folded(cell, width) for cell, width in zip(cells, widths, strict=True)]
+            folded = [
+                textwrap.wrap(cell, width, subsequent_indent="  ") if len(cell) > width else [cell]
+                for cell, width in zip(cells, widths, strict=True)
+            ]
             for parts in itertools.zip_longest(*folded, fillvalue=""):
                 aligned = zip(aligns, parts, widths, strict=True)
                 lines.append("  ".join(align(part, width) for align, part, width in aligned))
@@ -155,13 +158,6 @@ class TextTable:
                 [cell if is_text else cell.translate(_UNBROKEN) for cell, is_text in cells]
             )
         return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
-
-
-def _folded(text: str, width: int) -> list[str]:
-    """Lines of at most `width` letters; further lines are indented."""
-    if len(text) <= width:
-        return [text]
-    return textwrap.wrap(text, width, subsequent_indent="  ")
 
 
 def render(template: str, **values: object) -> str:

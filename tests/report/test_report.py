@@ -5,13 +5,14 @@ import dataclasses
 import re
 import shlex
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
-from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.formatting import rounded
 from tetra_drake.report.run_figures import simulate_shown_gaits
 from tetra_drake.report.run_page import render_report, write_report
@@ -92,7 +93,7 @@ def study(run):
 def render(study, **changes):
     """The page without figures, of a study with changes of its run."""
     run = dataclasses.replace(study.run, **changes)
-    return Page(render_report(dataclasses.replace(study, run=run), []))
+    return Page(render_report(dataclasses.replace(study, run=run), [], folder=Path()))
 
 
 def test_figures_are_files_and_in_the_page(run, page):
@@ -140,7 +141,7 @@ def test_the_best_gait_is_shown_with_its_weights_and_as_recorded(study, source, 
     # As recorded; simulated again, this gait moves elsewhere, which a note says.
     assert "walks 2.0 in" in page.texts["h1"][0]
     best, initial = "trial 1, evaluation 4", "trial 1, evaluation 0"
-    assert (study.best.label, study.initial.label) == (best, initial)
+    assert (gait_label(study.best.recorded), gait_label(study.initial.recorded)) == (best, initial)
     assert any(f"2 in ({best})" in text for text in page.texts["p"])
 
 

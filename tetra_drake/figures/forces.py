@@ -58,9 +58,8 @@ def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) 
     driven = [signals.index(oscillator) for oscillator in oscillators]
     groups = len(driven) // len(np.unique(forces.cable_bodies[driven]))
     start_up = result.scenario.cpg.start_up
-    others = []
-    if float(trajectory.time[0]) < start_up:
-        others.append(Patch(color=SHADE, label="start-up"))
+    is_shown = float(trajectory.time[0]) < start_up
+    others = [Patch(color=SHADE, label="start-up")] if is_shown else []
     page, panels = _panels_over_time(forces.cable.values[driven], groups=groups)
     for cable, oscillator, panel in zip(driven, oscillators, panels, strict=True):
         panel.axhline(0.0, color="0.6", linewidth=0.6)

@@ -99,15 +99,10 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
 def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:
     """Height of each foot in the diagram, in rows. The first body (the rear) is at the bottom; a
     left foot is above the right foot."""
-    rows: dict[str, float] = {}
-    row = 0.5
-    bodies = stands.contact_body.values
-    for body in dict.fromkeys(bodies):
-        for foot in stands.contact.values[bodies == body][::-1]:
-            rows[foot] = row
-            row += 1.0
-        row += _BETWEEN_BODIES
-    return rows
+    bodies, _ = pandas.factorize(stands.contact_body.values)
+    order = sorted(range(len(bodies)), key=lambda foot: (bodies[foot], -foot))
+    heights = 0.5 + np.arange(len(order)) + _BETWEEN_BODIES * bodies[order]
+    return dict(zip(stands.contact.values[order].tolist(), heights.tolist(), strict=True))
 
 
 def _named_rows(stands: xarray.DataArray, rows: Mapping[str, float]) -> dict[str, float]:
@@ -162,18 +157,17 @@ def _draw_stance(
     for foot, row in rows.items():
         stance = stands.sel(contact=foot)
         spans = [(start, end - start) for start, end in measures.intervals(times, stance.values)]
-        side = foot.rpartition("_")[2]
-        colour = _STANCE.get(side, _OTHER_FOOT)
+        colour = _STANCE.get(foot.rpartition("_")[2], _OTHER_FOOT)
         panel.broken_barh(spans, (row - _BAR / 2, _BAR), facecolors=colour)
         if each:
             write_beside(panel, row, f"{fixed(100.0 * measures.share_of_time(stance), 0)} %")
     _write_names(panel, list(names), names.values())
+    name = "stance"
     if each:
         panel.set_title("duty factor", loc="right", fontsize=rcParams["ytick.labelsize"])
-        name_panel(panel, "stance")
-    else:
-        has_sides = any(foot.endswith("_left") for foot in rows)
-        name_panel(panel, "stance, left foot above right one" if has_sides else "stance")
+    elif any(foot.endswith("_left") for foot in rows):
+        name = "stance, left foot above right one"
+    name_panel(panel, name)
     panel.tick_params(axis="y", length=0)
     panel.set_ylim(-_EDGE, max(rows.values(), default=0.5) + 0.5 + _EDGE)
     panel.grid(visible=False, axis="y")

@@ -191,21 +191,20 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
     cycle = time or measures.last_step(result.trajectory)
     start, end = cycle or (0.75 * end, end)
     step = shown_part(result.trajectory, (start, end))
-    samples, nodes = _nearest(step, np.linspace(start, end, instants)), step.p_WN.values
-    nodes, (lifted, least) = nodes / unit.length, _off_ground(step, result)
+    samples = _nearest(step, np.linspace(start, end, instants))
+    nodes = step.p_WN.values / unit.length
+    lifted, least = _off_ground(step, result)
     wide, across = (_range(nodes[..., axis], result) for axis in (X, Y))
     x = np.arange(*wide, _PROFILE * structure.scale / unit.length)
-    profiles = [
-        _heights_below(np.column_stack([x, np.full_like(x, nodes[sample, :, Y].mean())]), result)
-        for sample in samples
-    ]
-    low, high = _range(np.concatenate([nodes[..., Z].ravel(), *profiles]), result)
+    middle = nodes[samples, :, Y].mean(axis=1, keepdims=True)
+    profiles = _heights_below(np.stack(np.broadcast_arrays(x, middle), axis=-1), result)
+    low, high = _range(np.append(nodes[..., Z], profiles), result)
     below = across[0] - high  # the side view stands below the view from above
     views = nodes[..., [X, Y]], nodes[..., [X, Z]] + [0.0, below]
     tall = low + below, across[1]
     columns, height = _fit(instants, wide, tall, height_in=5.5)
-    names = structure.bodies if structure.markers.size else (structure.followed,)
-    of_paths = 1.1 * math.ceil(len(names) / _PATHS) + 0.4
+    paths = followed_nodes(nodes, structure)[:, ::2]  # every second node is a left one
+    of_paths = 1.1 * math.ceil(paths.shape[1] / _PATHS) + 0.4
     parts = [min(height + 0.4, 5.0 * of_paths), of_paths]
     page = page_of(height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
@@ -225,10 +224,7 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
         for body in (0, len(structure.bodies) - 1):
             middle = views[0][samples[0], structure.carriers == body].mean(axis=0)
             panels[0].text(middle[0], middle[1], structure.bodies[body], **_NAMED)
-    else:
-        lifted = np.all(lifted, axis=1, keepdims=True)
-    paths = followed_nodes(nodes, structure)[:, ::2]  # every second node is a left one
-    _draw_paths(lower, names, paths, lifted, result)
+    _draw_paths(lower, paths, lifted, result)
     looks = {
         f"over {least:.1g} {unit.length_name} off the ground": {"color": _LIFTED},
         "on the ground": {"color": _ON_GROUND},
@@ -253,15 +249,13 @@ def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[n
 
 
 def _draw_paths(
-    page: Page,
-    names: Sequence[str],
-    paths: np.ndarray,
-    lifted: np.ndarray,
-    result: SimulationResult,
+    page: Page, paths: np.ndarray, lifted: np.ndarray, result: SimulationResult
 ) -> None:
-    """Draws paths (samples, names, 3) enlarged; parts that are `lifted` (samples, names) are
-    red."""
-    length = result.scenario.units.length_name
+    """Draws the paths (samples, paths, 3) of one node per body, or of the centre, enlarged. They
+    are red where the body, or all bodies, are `lifted` (samples, bodies)."""
+    names, length = result.robot.structure.bodies, result.scenario.units.length_name
+    if not result.robot.structure.markers.size:
+        names, lifted = (result.robot.structure.followed,), np.all(lifted, axis=1, keepdims=True)
     columns, x_label = min(len(names), _PATHS), f"forward ({length})"
     panels = panels_in_columns(page, len(names), columns, x_label=x_label, sharex=True, sharey=True)
     for i, (name, panel) in enumerate(zip(names, panels, strict=True)):
@@ -315,17 +309,13 @@ def _fit(count: int, wide: Span, high: Span, *, height_in: float) -> tuple[int, 
     `wide` and `high` are the ranges that a picture shows. The pictures fill the caller's figure, or
     a page of the height `height_in`.
     """
-    whole = page_width()
-    figure = GIVEN.get()
-    page_height = height_in if figure is None else figure.bbox.height / figure.dpi
+    page, columns = GIVEN.get(), np.arange(1, count + 1)
+    width, rows = page_width(), np.ceil(count / columns)
+    height = height_in if page is None else page.bbox.height / page.dpi
     ratio = (high[1] - high[0]) / (wide[1] - wide[0])
-
-    def width(columns: int) -> float:
-        return min(whole / columns, page_height / math.ceil(count / columns) / ratio)
-
-    columns = max(range(1, count + 1), key=width)
-    row = (whole / columns - _GAP) * ratio + _PANEL_NAME
-    return columns, row * math.ceil(count / columns)
+    best = np.minimum(width / columns, height / rows / ratio).argmax()
+    row = (width / columns[best] - _GAP) * ratio + _PANEL_NAME
+    return int(columns[best]), float(row * rows[best])
 
 
 def _to_scale(panel: Axes, wide: Span, high: Span) -> None:

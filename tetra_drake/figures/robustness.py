@@ -145,17 +145,16 @@ def robustness(judgement: Judgement) -> Drawn:
 
 def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -> None:
     draws = judgement.compared(judgement.draws).dropna(subset=["distance", "undisturbed"])
-    for row, gait in enumerate(gaits.index):
+    for row, (gait, kept) in enumerate(gaits["kept"].items()):
         simulated = draws[draws["gait"] == gait]
         shares = simulated["distance"] / simulated["undisturbed"]
         # Multiples of the golden ratio spread any number of dots evenly.
         heights = row + 0.6 * (simulated["draw"] * 0.618034 % 1.0 - 0.5)
         axes.plot(shares, heights, "o", **_DOTS)
         axes.boxplot(shares, positions=[row], **_BOX)
+        write_beside(axes, row, f"{fixed(100.0 * kept, 0)} %")
     axes.axvline(1.0 - LOSS, **REFERENCE)
     axes.axvline(1.0, color="black", linewidth=0.8)
-    for row, kept in enumerate(gaits["kept"]):
-        write_beside(axes, row, f"{fixed(100.0 * kept, 0)} %")
     margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
     axes.set(xlabel="distance / undisturbed distance", xmargin=0.02)
     axes.set_ylim(-margin, len(gaits) - 1 + margin)

@@ -163,19 +163,17 @@ def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
     """
 
     @functools.wraps(draw)
-    def drawn(
-        *args: Any, figure: Page | None = None, units: str | None = None, **kwargs: Any
-    ) -> Drawn:
+    def make(*args: Any, figure: Page | None = None, units: str | None = None, **own: Any) -> Drawn:
         if not isinstance(figure, Page | None):
             kind = type(figure).__name__
             problem = f"found a value of type {kind}, expected matplotlib's Figure or SubFigure"
             raise InputError(draw.__name__, "figure", problem)
-        look = Look(**{name: kwargs.pop(name) for name in vars(Look()) if name in kwargs})
+        look = Look(**{name: own.pop(name) for name in vars(Look()) if name in own})
         token = GIVEN.set(figure)
         try:
             with shown_in(units), common_style(look):
                 rcParams["text.parse_math"] = False  # a name may hold a dollar sign
-                page = draw(*args, **kwargs)
+                page = draw(*args, **own)
         finally:
             GIVEN.reset(token)
         if not look.title:
@@ -186,10 +184,10 @@ def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
     of_look = inspect.signature(Look).parameters.values()
     added = [inspect.Parameter(name, keyword, default=None) for name in ("figure", "units")]
     added += [parameter.replace(kind=keyword) for parameter in of_look]
-    own = inspect.signature(draw)
-    shown: Any = drawn
-    shown.__signature__ = own.replace(parameters=[*own.parameters.values(), *added])
-    return drawn
+    before = inspect.signature(draw)
+    shown: Any = make
+    shown.__signature__ = before.replace(parameters=[*before.parameters.values(), *added])
+    return make
 
 
 class ShownFigure(Figure):

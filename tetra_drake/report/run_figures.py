@@ -16,7 +16,7 @@ import pandas
 
 from tetra_drake.analysis.elites import elites
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.run import Run, gait_label
+from tetra_drake.evolution.run import Run
 from tetra_drake.figures.fitness import (
     fitness_of_trials,
     initial_distances,
@@ -49,11 +49,6 @@ class RecordedGait:
     """Row of the run's evaluations."""
     result: SimulationResult
     """Result of the new simulation, with trajectory."""
-
-    @property
-    def label(self) -> str:
-        """Trial and evaluation of the gait, as text."""
-        return gait_label(self.recorded)
 
     @property
     def change(self) -> float:
@@ -103,6 +98,21 @@ class Picture(NamedTuple):
     data: Sequence[Any]
     """Arguments of the figure function."""
 
+    @property
+    def name(self) -> str:
+        """Name of the figure and of its files."""
+        return self.draw.__name__
+
+    @property
+    def caption(self) -> str:
+        """Caption of the figure, in one line."""
+        return " ".join((inspect.getdoc(self.draw) or "").split())
+
+    def image(self, folder: Path) -> str:
+        """URL with the figure's content. Embedded directly, ids of two SVGs would clash."""
+        content = base64.b64encode((folder / f"{self.name}.svg").read_bytes()).decode()
+        return f"data:image/svg+xml;base64,{content}"
+
 
 def pictures_of_gait(result: SimulationResult) -> list[Picture]:
     """The figures of one simulation."""
@@ -132,30 +142,9 @@ def pictures_of_run(shown: ShownGaits) -> list[Picture]:
     ]
 
 
-class DrawnFigure(NamedTuple):
-    """A figure that was written to a folder."""
-
-    part: str
-    """See Picture."""
-    path: Path
-    """File of the figure, an SVG."""
-    caption: str
-
-    @property
-    def image(self) -> str:
-        """URL with the content of the file. Embedded directly, ids of two SVGs would clash."""
-        content = base64.b64encode(self.path.read_bytes()).decode()
-        return f"data:image/svg+xml;base64,{content}"
-
-
-def draw(pictures: Sequence[Picture], folder: Path, printed: Print = AS_USUAL) -> list[DrawnFigure]:
+def draw(pictures: Sequence[Picture], folder: Path, printed: Print = AS_USUAL) -> None:
     """Draws figures and writes them to a folder. Raises InputError if a file cannot be written."""
-    drawn = []
     for picture in pictures:
         if picture.is_there:
-            name = picture.draw.__name__
             figure = picture.draw(*picture.data, **vars(printed.look))
-            save_figure(figure, folder, name, kinds=printed.kinds)
-            caption = " ".join((inspect.getdoc(picture.draw) or "").split())
-            drawn.append(DrawnFigure(picture.part, folder / f"{name}.svg", caption))
-    return drawn
+            save_figure(figure, folder, picture.name, kinds=printed.kinds)

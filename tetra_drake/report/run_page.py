@@ -21,7 +21,7 @@ from tetra_drake.machine import versions
 from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.report.run_figures import (
-    DrawnFigure,
+    Picture,
     ShownGaits,
     draw,
     pictures_of_gait,
@@ -31,7 +31,6 @@ from tetra_drake.report.run_figures import (
 )
 from tetra_drake.results.result import headline
 from tetra_drake.robot.gait import save_gait
-from tetra_drake.robot.weights import NEURONS
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 
@@ -56,32 +55,40 @@ def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USU
         InputError: if `source` is neither, or `out` cannot be written to.
     """
     folder = out or source / FIGURES
-    if os.path.exists(source / MANIFEST):
-        check_folder(folder)
-        if out is None:
-            return write_report(source, printed)
-        draw(pictures_of_run(simulate_shown_gaits(load_run(source))), folder, printed)
-    elif os.path.exists(source / RESULT):
-        check_folder(folder)
-        draw(pictures_of_gait(load_result(source)), folder, printed)
-    else:
+    is_run = os.path.exists(source / MANIFEST)
+    if not is_run and not os.path.exists(source / RESULT):
         problem = f"holds neither {MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
+    check_folder(folder)
+    if is_run and out is None:
+        return write_report(source, printed)
+    if is_run:
+        draw(pictures_of_run(simulate_shown_gaits(load_run(source))), folder, printed)
+    else:
+        draw(pictures_of_gait(load_result(source)), folder, printed)
     return [folder]
 
 
 def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
     """Writes figures/, replay.html and report.html into the folder of a run. Returns their paths.
 
-    A run with a map also gets elites/. The run may be unfinished. Raises InputError if there is no
+    A run with a map also gets elites/: a table of all gaits of the map, and a gait file and a
+    replay page for each notable gait. The run may be unfinished. Raises InputError if there is no
     run, if it is damaged or has no fitness yet, or if the folder cannot be written to.
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     shown = simulate_shown_gaits(load_run(directory))
-    drawn = draw(pictures_of_run(shown), figures, printed)
-    _write_map(shown, directory)
+    pictures = pictures_of_run(shown)
+    draw(pictures, figures, printed)
+    run, notable = shown.run, _notable(shown)
+    if notable:
+        write_whole(directory / ELITES_CSV, elites(run).to_csv(index=False))
+    for _, row, file, page in notable:
+        save_gait(run.gait(row["trial"], row["index"]), directory / str(file), run.scenario)
+        if page != REPLAY:
+            simulate_again(run, row).result.save_replay(directory / str(page))
     shown.best.result.save_replay(replay)
-    write_whole(report, render_report(shown, drawn))
+    write_whole(report, render_report(shown, pictures, folder=figures))
     return [figures, replay, report]
 
 
@@ -91,60 +98,43 @@ class _Shown(NamedTuple):
     names: Sequence[str]
     recorded: pandas.Series
     """Row of the run's evaluations."""
-    file: Path | None
+    file: str | None
     """Gait file, relative to the folder of the run; None for a gait without a file."""
-    page: Path | None = None
+    page: str | None = None
     """Replay page; None if the table has no link to it."""
 
 
 def _notable(shown: ShownGaits) -> list[_Shown]:
     """The notable gaits of the map. The run's best gait has its replay page already."""
-    found = []
+    found, best = [], gait_label(shown.best.recorded)
     for names, row in distinct_gaits(notable_gaits(shown.run)):
         name = names[0].replace(", ", "_").replace(" ", "_")
-        page = REPLAY if gait_label(row) == shown.best.label else f"{ELITES}/{name}.html"
-        found.append(_Shown(names, row, Path(f"{ELITES}/{name}.json"), Path(page)))
+        page = REPLAY if gait_label(row) == best else f"{ELITES}/{name}.html"
+        found.append(_Shown(names, row, f"{ELITES}/{name}.json", page))
     return found
 
 
-def _write_map(shown: ShownGaits, directory: Path) -> None:
-    """Writes elites/: a table of all gaits of the map, and a gait file and a replay page for each
-    notable gait."""
-    run, notable = shown.run, _notable(shown)
-    if notable:
-        write_whole(directory / ELITES_CSV, elites(run).to_csv(index=False))
-    for _, row, file, page in notable:
-        save_gait(run.gait(row["trial"], row["index"]), directory / str(file), run.scenario)
-        if page != Path(REPLAY):
-            simulate_again(run, row).result.save_replay(directory / str(page))
-
-
-def render_report(shown: ShownGaits, figures: Sequence[DrawnFigure]) -> str:
-    """The report as HTML, with its figures."""
+def render_report(shown: ShownGaits, pictures: Sequence[Picture], *, folder: Path) -> str:
+    """The report as HTML, with figures that are files in `folder`."""
     run, best, scenario = shown.run, shown.best, shown.run.scenario
     trial = best.recorded["trial"]
     gait = run.gait(trial, best.recorded["index"])
     gains = [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
     turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
-    weights = dict(zip(gait.weight_names, gait.weights, strict=True))
-    numbers = range(1, len(scenario.robot.blueprint().oscillators) + 1)
     named = distinct_gaits({"initially": shown.initial.recorded, "best": best.recorded})
-    best_gait = trial_folder(Path(), trial) / BEST_GAIT
+    best_gait = str(trial_folder(Path(), trial) / BEST_GAIT)
     return render(
         "report/report.html.jinja",
         shown=shown,
         title=f"{scenario.name}: {headline(scenario, best.recorded)}",
-        figures=figures,
+        pictures=pictures,
+        folder=folder,
         gaits=[_Shown(names, row, best_gait if "best" in names else None) for names, row in named],
         map=_notable(shown),
         parameters=listed(
             [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s", *turn, *gains]
         ),
-        weights={
-            kind: [[weights.get(f"{j}->{i} {kind}") for j in numbers] for i in numbers]
-            for kind in NEURONS
-            if weights
-        },
+        weights=dict(zip(gait.weight_names, gait.weights, strict=True)),
         differences=[
             (key, value)
             for key, value in scenario.differences(load_scenario("thesis"))

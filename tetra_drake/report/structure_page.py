@@ -63,22 +63,17 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     scenario = given.with_sections(friction=friction, engine=Mujoco())
     try:
         robot = Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
-        return robot if is_scenario else _on_firm_ground(robot)
+        p_WN = node_positions(robot.structure, robot.structure.initial_state)
+        # With this stiffness, a single node bears the weight.
+        least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
+        if is_scenario or least <= given.ground.stiffness:
+            return robot
+        damping = given.ground.damping * least / given.ground.stiffness
+        firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
+        return Robot.of(firm, undisturbed_structure(firm, may_overlap=True))
     except InputError as error:
         key = error.key if is_scenario else error.key.removeprefix("robot.")
         raise InputError(name_or_file, key, error.problem) from error
-
-
-def _on_firm_ground(robot: Robot) -> Robot:
-    """The robot on a ground that is stiff enough to bear its weight at a single node."""
-    scenario, p_WN = robot.scenario, node_positions(robot.structure, robot.structure.initial_state)
-    least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
-    ground = scenario.ground
-    if least <= ground.stiffness:
-        return robot
-    damping = ground.damping * least / ground.stiffness
-    firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
-    return Robot.of(firm, undisturbed_structure(firm, may_overlap=True))
 
 
 def structure_text(study: EquilibriumStudy) -> str:

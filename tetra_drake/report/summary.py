@@ -70,9 +70,8 @@ def result_text(result: SimulationResult) -> str:
     """Text about a simulation: metrics, requirements that are not met, wall time."""
     scenario, metrics = result.scenario, result.metrics
     lines = [result.title, f"scenario {scenario.name}, {ground_text(scenario)}"]
-    lines.append(
-        metrics_table([""], [{"fitness": result.fitness} | vars(metrics)], scenario).text()
-    )
+    gait = {"fitness": result.fitness} | vars(metrics)
+    lines.append(metrics_table([""], [gait], scenario).text())
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
@@ -117,17 +116,13 @@ def results(run: Run) -> list[tuple[str, str]]:
     Gaits are described by the main metric of the objective, such as the distance. The best gait is
     the fittest.
     """
-    statuses, best = run.statuses, run.best()
-    evaluations = sum(status.evaluations for status in statuses)
-    failures = sum(status.failures for status in statuses)
-    wall_time = sum(status.wall_time for status in statuses)
-    count = f"{evaluations} ({failures} failed)" if failures else f"{evaluations}"
-    effort = [("evaluations", count)]
-    if evaluations:
-        effort.append(("time per evaluation", _time(wall_time / evaluations)))
+    table, best = run.evaluations, run.best()
+    failures = table["failure"].notna().sum()
+    effort = [("evaluations", f"{len(table)} ({failures} failed)" if failures else f"{len(table)}")]
+    if len(table):
+        effort.append(("time per evaluation", _time(table["wall_time_s"].mean())))
     if best.empty:
-        last = run.evaluations["failure"].tail(1)
-        return effort + [("last failure", failure) for failure in last]
+        return effort + [("last failure", failure) for failure in table["failure"].tail(1)]
     fittest = run.fittest()
     starts = [run.initial_best(trial) for trial in best["trial"]]
     initial = max(starts, key=lambda gait: gait["fitness"])
@@ -155,6 +150,8 @@ def trials_table(run: Run) -> TextTable:
     Gaits are described by the main metric of the objective. "in Drake" is the final best gait,
     evaluated again on the Drake diagram. Columns without values are left out.
     """
+    import pandas
+
     name = _about(run)
     size, title = _size_and_title(name, run.scenario.units)
     best = run.best().set_index("trial")
@@ -172,10 +169,10 @@ def trials_table(run: Run) -> TextTable:
         counts = [f"{status.evaluations}", f"{status.failures or ''}"]
         end = "not finished" if status.stop is None else status.stop.replace(ALL_DONE, "")
         rows.append([f"{status.number}", *cells, *counts, end])
-    shown = [i for i, cells in enumerate(zip(*rows, strict=True)) if {*cells} - {"-", ""}]
-    rows = [[row[i] for i in shown] for row in rows]
-    names = [columns[i] for i in shown]
-    return TextTable(names, rows, text_columns=(0, names.index("end") if "end" in names else 0))
+    table = pandas.DataFrame(rows, columns=columns)
+    table = table.loc[:, ~table.isin(["-", ""]).all()]
+    texts = [place for place, name in enumerate(table) if name in ("trial", "end")]
+    return TextTable([*table], table.to_numpy().tolist(), text_columns=texts)
 
 
 def _about(run: Run) -> str:

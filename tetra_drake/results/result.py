@@ -118,11 +118,8 @@ class SimulationResult:
 
     def __str__(self) -> str:
         kept = "not recorded" if self.recorded is None else "recorded"
-        return (
-            f"{self.title}\n"
-            f"scenario {self.scenario.name}, engine {self.engine}, trajectory {kept}, "
-            f"fitness {self.fitness:.4g}\n{self.metrics}"
-        )
+        about = f"scenario {self.scenario.name}, engine {self.engine}, trajectory {kept}"
+        return f"{self.title}\n{about}, fitness {self.fitness:.4g}\n{self.metrics}"
 
     def __repr__(self) -> str:
         return f"<SimulationResult {self.title}>"
@@ -214,10 +211,7 @@ def make_result(
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
     ends = motion.at(np.array([0.0, simulation.settling_time, simulation.duration]))
-    trajectory = None
-    if record:
-        samples = sample_times(simulation.duration, simulation.sample_period)
-        trajectory = make_dataset(robot, motion.at(samples))
+    samples = sample_times(simulation.duration, simulation.sample_period)
     poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses, structure)
     metrics = compute_metrics(
@@ -239,7 +233,7 @@ def make_result(
         integrator=work,
         engine=robot.scenario.engine_name,
         path=path,
-        recorded=trajectory,
+        recorded=make_dataset(robot, motion.at(samples)) if record else None,
     )
 
 

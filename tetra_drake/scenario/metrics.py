@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections.abc import Callable, Collection, Mapping
@@ -128,6 +129,10 @@ def _metric(unit: str, note: str, compute: Callable[[Walk], float], **more: Any)
     return field(metadata={"metric": Metric(unit, note, compute, **more)})
 
 
+_of_pose = functools.partial(_metric, of_pose=True)
+_cost = functools.partial(_metric, is_cost=True)
+
+
 def _cost_of_transport(walk: Walk) -> float:
     x, y, _ = walk.steady_centre_way.tolist()
     carried = walk.weight * max(math.hypot(x, y), LEAST_WAY * walk.scale)
@@ -135,8 +140,8 @@ def _cost_of_transport(walk: Walk) -> float:
 
 
 def _signal_rate(walk: Walk) -> float:
-    mean_square = walk.per_steady_time * float(walk.tally.roughness.total[0])
-    return math.sqrt(mean_square / max(walk.signals.shape[1], 1))
+    total = float(walk.tally.roughness.total[0])
+    return math.sqrt(walk.per_steady_time * total / max(walk.signals.shape[1], 1))
 
 
 @dataclass(frozen=True)
@@ -150,41 +155,33 @@ class Metrics:
     NaN.
     """
 
-    distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0], of_pose=True)
+    distance: float = _of_pose("m", "along x", lambda walk: walk.followed_way[0])
     """Displacement of x₁ from the start to the end."""
-    steady_distance: float = _metric(
-        "m",
-        "without the start",
-        lambda walk: walk.followed[2, 0] - walk.followed[1, 0],
-        of_pose=True,
+    steady_distance: float = _of_pose(
+        "m", "without the start", lambda walk: walk.followed[2, 0] - walk.followed[1, 0]
     )
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
-    speed: float = _metric(
-        "m/s",
-        "of the centre",
-        lambda walk: walk.steady_centre_way[0] / walk.since_steady_from,
-        of_pose=True,
+    speed: float = _of_pose(
+        "m/s", "of the centre", lambda walk: walk.steady_centre_way[0] / walk.since_steady_from
     )
     """Mean speed of the centre along x from `simulation.steady_from` on."""
-    twist: float = _metric(
+    twist: float = _of_pose(
         "m",
         "one rear foot ahead of the other",
         lambda walk: abs(walk.markers[2, 0, 0] - walk.markers[2, 1, 0]),
-        of_pose=True,
         needs=ROW,
         is_cost=True,
     )
     """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
-    lead: float = _metric(
+    lead: float = _of_pose(
         "m",
         "front tip ahead of rear foot",
         lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
-        of_pose=True,
         needs=ROW,
     )
     """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
-    lateral_drift: float = _metric(
-        "m", "sideways", lambda walk: abs(walk.followed_way[1]), of_pose=True, is_cost=True
+    lateral_drift: float = _of_pose(
+        "m", "sideways", lambda walk: abs(walk.followed_way[1]), is_cost=True
     )
     """Sideways displacement, abs(y₁), at the end."""
     heading_change: float = _metric(
@@ -201,17 +198,13 @@ class Metrics:
     )
     """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
     the path bends left as seen along the motion, even if the robot walks backward."""
-    actuator_work: float = _metric(
-        "J", "of all actuators", lambda walk: walk.tally.effort.work[0], is_cost=True
-    )
+    actuator_work: float = _cost("J", "of all actuators", lambda walk: walk.tally.effort.work[0])
     """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
     max(0, -S dl/dt) for driven cables with signal S and length l."""
-    cost_of_transport: float = _metric(
-        "", "work / (weight x distance)", _cost_of_transport, is_cost=True
-    )
+    cost_of_transport: float = _cost("", "work / (weight x distance)", _cost_of_transport)
     """Actuator work divided by weight and by the centre's displacement over the ground, in the
     steady stretch. The displacement counts as at least 1 mm. Infinite without gravity."""
-    signal_rate: float = _metric("N/s", "how fast signals change", _signal_rate, is_cost=True)
+    signal_rate: float = _cost("N/s", "how fast signals change", _signal_rate)
     """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
     lifted: float = _metric(
         "",
@@ -236,42 +229,40 @@ class Metrics:
     )
     """Travelling index of the signals in the steady stretch: 0 for a standing wave along the robot,
     1 for a travelling wave."""
-    peak_actuator_force: float = _metric(
+    peak_actuator_force: float = _cost(
         "N",
         "at any time; a cable can pull a winch backward",
         lambda walk: walk.tally.effort.peak_force[0],
         most=True,
-        is_cost=True,
     )
     """Greatest tension of a driven cable at any time. It exceeds the `max_force` of a winch while
     the robot stretches the cable faster than the stalled winch pays out."""
-    mean_actuator_force: float = _metric(
-        "N", "of all driven cables", lambda walk: walk.mean("impulse"), is_cost=True
+    mean_actuator_force: float = _cost(
+        "N", "of all driven cables", lambda walk: walk.mean("impulse")
     )
     """Mean tension of the driven cables in the steady stretch."""
-    peak_actuator_speed: float = _metric(
-        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True, is_cost=True
+    peak_actuator_speed: float = _cost(
+        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True
     )
     """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
     for a winch, otherwise of the cable's length."""
-    mean_actuator_speed: float = _metric(
-        "m/s", "winding or paying out", lambda walk: walk.mean("wound"), is_cost=True
+    mean_actuator_speed: float = _cost(
+        "m/s", "winding or paying out", lambda walk: walk.mean("wound")
     )
     """Mean speed in the steady stretch, winding or paying out."""
-    peak_actuator_power: float = _metric(
-        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True, is_cost=True
+    peak_actuator_power: float = _cost(
+        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True
     )
     """Greatest product of an actuator's tension and winding speed, at any time."""
-    mean_actuator_power: float = _metric(
-        "W", "effort of an actuator", lambda walk: walk.mean("pulled"), most=True, is_cost=True
+    mean_actuator_power: float = _cost(
+        "W", "effort of an actuator", lambda walk: walk.mean("pulled"), most=True
     )
     """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
-    actuator_limited: float = _metric(
+    actuator_limited: float = _cost(
         "",
         "time at a limit of an actuator",
         lambda walk: walk.mean("limited"),
         most=True,
-        is_cost=True,
         is_share=True,
         needs=LIMITS,
     )

@@ -9,7 +9,6 @@ import logging
 import math
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -118,7 +117,21 @@ def replay_page(
         reader = render("visualization/viewer.html.jinja", address=address)
         # Before the body, so that nothing of the body is shown if the file is missing.
         page = (before + after).replace("</head>", f"{reader}</head>", 1)
-    page = _with_overlay(page, title, film_of(robot, frames))
+    name, _, deed = title.rpartition(": ")
+    overlay = render(
+        "visualization/overlay.html.jinja",
+        name=name,
+        deed=deed,
+        film=film_of(robot, frames),
+        script=render("visualization/film.js"),
+    )
+    page = _COMMAND.sub(r"handle(\1);", page)
+    # The replacements are functions, because backslashes in a text would be interpreted.
+    named = f"<title>{html.escape(title)}</title>{_IN_HEAD}"
+    page = page.replace("<html>", '<html lang="en">', 1)
+    page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
+    page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
+    page = "</main></body>".join(page.rsplit("</body>", 1))
     return pack_page(page, title=title), script
 
 
@@ -131,7 +144,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     structure = robot.structure
     bodies, contacts = structure.bodies, structure.contacts
     nodes = {
-        "path": [_parts(path) for path in node_paths(structure)],
+        "path": [path.split("/")[1:] for path in node_paths(structure)],
         "body": structure.carriers.tolist(),
         "place": structure.p_BN.round(6).tolist(),
         "colour": [COLOURS[name] for name in node_colours(structure)],
@@ -147,7 +160,8 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     force_of_square = round_force(usual_force / max(arrow, 1.0), units)
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
     ends = structure.cables[["node_a", "node_b"]].tolist()
-    cables = zip(cable_paths(structure), ends, strict=True)
+    paths = [path.split("/")[1:] for path in cable_paths(structure)]
+    cables = zip(paths, ends, strict=True)
     return {
         "times": frames["time"].values.round(5).tolist(),
         "resolution": RESOLUTION,
@@ -157,7 +171,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "nodes": [
             dict(zip(nodes, node, strict=True)) for node in zip(*nodes.values(), strict=True)
         ],
-        "cables": [{"path": _parts(path), "nodes": joined} for path, joined in cables],
+        "cables": [{"path": path, "nodes": joined} for path, joined in cables],
         "contacts": contacts.tolist(),
         "colours": COLOURS,
         "anchored": bool(structure.held.any()),
@@ -213,10 +227,6 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     return {"what": what, "unit": unit, "digits": digits, "values": values.round(digits).tolist()}
 
 
-def _parts(path: str) -> list[str]:
-    return path.strip("/").split("/")
-
-
 def _steps(values: np.ndarray) -> list[list[int]]:
     """Differences between frames of values (frames, ...), in units of RESOLUTION; a row per
     number of a frame."""
@@ -250,22 +260,3 @@ def pack_page(page: str, *, title: str) -> str:
     """A compressed page that unpacks itself in the browser. `title` is plain text."""
     packed = base64.b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
-
-
-def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
-    """Adds the film, a heading, a legend and a control bar to Meshcat's page."""
-    name, _, deed = title.rpartition(": ")
-    overlay = render(
-        "visualization/overlay.html.jinja",
-        name=name,
-        deed=deed,
-        film=film,
-        script=render("visualization/film.js"),
-    )
-    page = _COMMAND.sub(r"handle(\1);", page)
-    # The replacements are functions, because backslashes in a text would be interpreted.
-    named = f"<title>{html.escape(title)}</title>{_IN_HEAD}"
-    page = page.replace("<html>", '<html lang="en">', 1)
-    page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
-    page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
-    return "</main></body>".join(page.rsplit("</body>", 1))

@@ -205,7 +205,8 @@ def set_surroundings(
 
 
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
-    """Adds the floor around `points` (..., 3). `reach` (m) is half of the robot's length."""
+    """Adds the floor around `points` (..., 3), with lines around its squares. `reach` (m) is half
+    of the robot's length."""
     ground, units = robot.ground, robot.scenario.units
     corners = floor_corners(points, (FLOOR_MARGIN if ground.flat else UNEVEN_MARGIN) * reach, units)
     floor = floor_points(ground, corners, units)
@@ -220,7 +221,25 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
         meshcat.SetTransform("/floor/slab", RigidTransform(middle))
     else:
         _add_relief(meshcat, floor, scale=robot.structure.scale)
-    _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
+    light: list[np.ndarray] = []
+    dark: list[np.ndarray] = []
+    for axis in (0, 1):
+        for line in np.moveaxis(floor, axis, 0):
+            position = line[0, axis] / units.square
+            if abs(position - round(position)) > 1e-6:
+                continue
+            # A straight line has pieces, too: some browsers lose lines that pass the camera.
+            points = line[:: units.squares] if np.ptp(line[:, 2]) == 0.0 else line
+            (light if round(position) % units.squares else dark).append(points)
+    # Lines are a little above the floor. Otherwise the floor would hide parts of them.
+    square = "square" if ground.flat else "square_on_relief"
+    looks = [("squares", light, 0.0002, square), ("dark", dark, 0.0004, "dark_line")]
+    for name, lines, lift, look in looks:
+        raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
+        if raised:
+            start = np.vstack([line[:-1] for line in raised])
+            end = np.vstack([line[1:] for line in raised])
+            meshcat.SetLineSegments(f"/floor/{name}", start.T, end.T, rgba=rgba(look))
 
 
 def floor_corners(points: np.ndarray, margin: float, units: Units) -> np.ndarray:
@@ -311,25 +330,3 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
         np.column_stack([a, b, c, a, c, d]).reshape(-1, 3).T,
         ((colours.clip(0.0, 1.0) * 255).round() / 255).reshape(-1, 3).T ** _GAMMA,
     )
-
-
-def _add_grid(meshcat: Meshcat, floor: np.ndarray, units: Units, *, colour: str) -> None:
-    """Adds lines along and across the floor (rows, columns, 3), around its squares."""
-    light: list[np.ndarray] = []
-    dark: list[np.ndarray] = []
-    for axis in (0, 1):
-        for line in np.moveaxis(floor, axis, 0):
-            position = line[0, axis] / units.square
-            if abs(position - round(position)) > 1e-6:
-                continue
-            # A straight line has pieces, too: some browsers lose lines that pass the camera.
-            points = line[:: units.squares] if np.ptp(line[:, 2]) == 0.0 else line
-            (light if round(position) % units.squares else dark).append(points)
-    # Lines are a little above the floor. Otherwise the floor would hide parts of them.
-    looks = [("squares", light, 0.0002, colour), ("dark", dark, 0.0004, "dark_line")]
-    for name, lines, lift, look in looks:
-        raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
-        if raised:
-            start = np.vstack([line[:-1] for line in raised])
-            end = np.vstack([line[1:] for line in raised])
-            meshcat.SetLineSegments(f"/floor/{name}", start.T, end.T, rgba=rgba(look))
