@@ -119,12 +119,16 @@ def test_of_a_straight_path_the_height_is_shown(walk):
     np.testing.assert_allclose(path.get_xydata(), centre.sel(axis=["x", "z"]))
 
 
-def test_in_one_step_tetrahedra_well_off_the_ground_stand_out(walk):
+def paths_of(figure):
+    return [panel for panel in figure.axes if panel.get_aspect() != 1.0]
+
+
+def test_one_step_has_tetrahedra_off_the_ground_in_red_and_paths_of_bottom_nodes(walk):
     start, end = last_step(walk)
     now = walk.sel(time=np.linspace(start, end, 5), method="nearest")
     lowest = now.p_WN.sel(axis="z").values.reshape(5, 5, 4).min(axis=2)
-    height = float(np.ptp(walk.p_WN[0].sel(axis="z").values))
-    aloft = lowest > 0.02 * height
+    least = 0.02 * float(np.ptp(walk.p_WN[0].sel(axis="z").values))
+    aloft = lowest > least
     assert aloft.any() and not aloft.all()
     figure = one_step(row(walk), instants=5)
     assert f"{start:.2f} to {end:.2f} s" in figure.get_suptitle()
@@ -132,22 +136,14 @@ def test_in_one_step_tetrahedra_well_off_the_ground_stand_out(walk):
     for view in (0, 1):
         of_bodies = colours[:, view, :: len(STRUTS)]
         np.testing.assert_array_equal(of_bodies == OKABE_ITO["vermillion"], aloft)
-
-
-def paths_of(figure):
-    return [panel for panel in figure.axes if panel.get_aspect() != 1.0]
-
-
-def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
-    paths = paths_of(one_step(row(walk)))
+    paths = paths_of(figure)
     assert [panel.get_title("left") for panel in paths] == walk.body.values.tolist()
-    least = 0.02 * float(np.ptp(walk.p_WN[0].sel(axis="z").values)) / INCH
     for panel in paths:
         path, in_the_air, _ = panel.lines
         assert np.ptp(path.get_xdata()) == pytest.approx(SPEED * PERIOD / INCH, rel=0.04)
         assert path.get_ydata().max() == pytest.approx(HEIGHT / INCH, rel=1e-3)
-        aloft = np.isfinite(in_the_air.get_ydata())
-        np.testing.assert_array_equal(aloft, path.get_ydata() > least)
+        in_red = np.isfinite(in_the_air.get_ydata())
+        np.testing.assert_array_equal(in_red, path.get_ydata() > least / INCH)
 
 
 def test_tensions_are_those_of_the_driven_cables(walk):

@@ -63,7 +63,7 @@ BAD = {
     "a cell too many": (("0.010000,", "0.010000,1,"), "line 3", "found 10 cells, expected 9"),
     "an open quote": (("0.010000,", '0.010000,"'), "", "is no table"),
     "infinite": (("0.010000,0.500000", "0.010000,inf"), f"line 3, {FIRST}", "'inf'"),
-    "a gap": (("0.030000", "0.040000"), "line 5, time_s", "found 0.04 after 0.02"),
+    "a gap": (("0.030000", "0.030550"), "line 5, time_s", "found 0.03055 after 0.02"),
     "a late start": (("0.000000,0", "0.005000,0"), "time_s", "the first at 0"),
 }
 
@@ -77,15 +77,11 @@ def test_a_bad_file_is_refused(robot, wrong, load, refused):
         load(text.replace(old, new, 1))
 
 
-@pytest.mark.parametrize(("late", "is_even"), [(0.045, True), (-0.045, True), (0.055, False)])
-def test_times_may_be_uneven_by_a_twentieth(robot, late, is_even, load, refused):
+@pytest.mark.parametrize("late", [0.045, -0.045])
+def test_times_may_be_uneven_by_a_twentieth(robot, late, load):
     text = command_text(robot, Command("uneven", 0.01, np.zeros((9, 8))))
     changed = text.replace("0.040000,", f"{0.04 + 0.01 * late:.6f},")
-    if is_even:
-        assert load(changed).period == pytest.approx(0.01)
-    else:
-        with refused("c.csv", "line 6, time_s", "found 0.04055 after 0.03"):
-            load(changed)
+    assert load(changed).period == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(("share", "is_enough"), [(0.955, True), (0.945, False), (0.0, False)])

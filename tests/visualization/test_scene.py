@@ -16,20 +16,18 @@ from tetra_drake.settings.units import INCH, INCHES
 from tetra_drake.visualization import scene
 from tetra_drake.visualization.replay import quiet_meshcat
 
-UNEVEN = {
-    "incline": Incline(slope=0.2),
-    "steps": Steps(height=0.3 * INCH, depth=6.0 * INCH, count=3),
-    "rough": Rough(amplitude=0.3 * INCH, wavelength=4.0 * INCH),
-}
 
-
-def robot_on(terrain):
-    return Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
-
-
-@pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
-def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
-    robot = robot_on(terrain)
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        Incline(slope=0.2),
+        Steps(height=0.3 * INCH, depth=6.0 * INCH, count=3),
+        Rough(amplitude=0.3 * INCH, wavelength=4.0 * INCH),
+    ],
+    ids=lambda terrain: type(terrain).__name__,
+)
+def test_the_drawn_floor_is_the_ground_a_node_radius_lower_as_fine_as_bounds_allow(terrain):
+    robot = Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
     ground, radius = robot.ground, scene.drawn_radii(robot.structure)[1].min()
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     points = make_walk().p_WN.values
@@ -49,13 +47,7 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
         assert np.abs(above[~walls] if path == "/floor/relief" else above - 3e-4).max() < 1.1e-4
         assert (p_WV[:, :2].min(axis=0) < points.min(axis=(0, 1))[:2] - 6.0 * INCH).all()
         assert (p_WV[:, :2].max(axis=0) > points.max(axis=(0, 1))[:2] + 6.0 * INCH).all()
-
-
-@pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
-def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
-    ground = robot_on(terrain).ground
-    corners = np.array([[-6, -9], [60, 9]])
-    floor = scene.floor_points(ground, corners, INCHES)
+    floor = scene.floor_points(ground, np.array([[-6, -9], [60, 9]]), INCHES)
     assert floor.shape[0] * floor.shape[1] <= scene.MOST_POINTS
     inches = floor[:, 0, 0] / INCH
     assert set(range(-6, 61)) <= set(inches.round(9))  # the grid's lines lie on its edges
@@ -97,6 +89,8 @@ def test_a_sample_places_bodies_and_cables_and_colours_feet():
         matrix = moved[path]
         np.testing.assert_allclose(matrix[:3, 3] - matrix[:3, 2] / 2, start, rtol=0, atol=1e-12)
         np.testing.assert_allclose(matrix[:3, 3] + matrix[:3, 2] / 2, end, rtol=0, atol=1e-12)
+    for body, place in zip(robot.structure.bodies, walk.p_WB.values[0], strict=True):
+        np.testing.assert_array_equal(moved[f"/robot/{body}"][:3, 3], place)
     told = [c for c in commands(page, "set_property") if c["property"] == "color"]
     colours = {c["path"]: c["value"] for c in told}
     lifted, stands = (colours[f"/robot/{body}/node {body} bottom_left"] for body in ("T1", "T2"))
