@@ -156,7 +156,6 @@ def test_a_robot_that_stands_still_scores_nothing():
 
 
 MISUSES = [
-    (lambda one, many: one.step(np.zeros((2, 4))), "actions", "(4,)"),
     (lambda one, many: many.step(np.zeros(8)), "actions", f"numbers of shape ({LANES}, 8)"),
     (lambda one, many: one.reset(seed=-1), "seed", "-1"),
     (lambda one, many: many.reset(seed=[1]), "seed", f"expected {LANES}"),

@@ -205,16 +205,11 @@ def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(wal
     assert shown == alike | {"T2 tip", "T4 left", "T4 right"}
 
 
-@pytest.fixture(scope="module")
-def carried():
-    """A robot that is no row, and its motion."""
+def test_of_a_structure_that_is_no_row_the_centre_is_shown():
     robot = prism.make_prism()
-    return result_of(robot, prism.slide_prism(robot))
-
-
-def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
+    carried = result_of(robot, prism.slide_prism(robot))
     slow = carried.trajectory.assign(p_WN=0.5 * carried.trajectory.p_WN)
-    [panel] = before_and_after(result_of(carried.robot, slow), carried).axes
+    [panel] = before_and_after(result_of(robot, slow), carried).axes
     for line, share in zip(panel.lines, (0.5, 1.0), strict=True):
         way = share * prism.SPEED * carried.trajectory.time / INCH
         np.testing.assert_allclose(line.get_ydata(), way, atol=1e-9)

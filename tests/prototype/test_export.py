@@ -45,16 +45,13 @@ def test_a_robot_walks_by_the_file_as_far_as_by_the_gait(actuation, tmp_path):
 def test_the_folder_loads_and_begins_where_the_robot_does(short, tmp_path):
     folder = tmp_path / "lab"
     export(short, seeded_gait(short), rate=50.0, out=folder)
-    names = {path.name for path in folder.iterdir()}
-    assert names == {COMMAND, EXPECTED, LIMITS_FILE, SCENARIO, README}
+    assert {p.name for p in folder.iterdir()} == {COMMAND, EXPECTED, LIMITS_FILE, SCENARIO, README}
     assert load_command(folder / COMMAND, load_scenario(folder / SCENARIO)).period == 0.02
     expected = rows_of(folder / EXPECTED)
     assert len(expected) == 3 * 50 + 1
     # T1's base edge of 6 in lies along y.
-    first = expected[0]
-    edge = float(first["T1 bottom_left y_mm"]) - float(first["T1 bottom_right y_mm"])
-    assert edge == pytest.approx(6 * 25.4, abs=1e-5)
-    assert float(first["T1 bottom_left x_mm"]) == pytest.approx(0.0, abs=1e-6)
+    left, right = (float(expected[0][f"T1 bottom_{side} y_mm"]) for side in ("left", "right"))
+    assert left - right == pytest.approx(6 * 25.4, abs=1e-5)
 
 
 def test_forces_are_the_signals_of_the_gait(short, tmp_path):
@@ -127,14 +124,10 @@ def test_a_gait_with_feedback_is_exported_as_it_walked_once(tmp_path):
     assert np.abs(played.p_WN.values - walked.p_WN.values).max() < 2e-3
 
 
-@pytest.mark.parametrize("rate", [0.0, 2001.0, 7.1, float("nan")])
-def test_a_rate_without_meaning_is_refused(short, rate, tmp_path, refused):
-    with refused("export", "rate", "Hz"):
-        export(short, seeded_gait(short), rate=rate, out=tmp_path / "lab")
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_existing_folder_is_left_alone_and_a_failure_leaves_nothing(short, tmp_path, refused):
+def test_what_cannot_be_exported_leaves_nothing(short, tmp_path, refused):
+    for rate in (0.0, 2001.0, 7.1, float("nan")):
+        with refused("export", "rate", "Hz"):
+            export(short, seeded_gait(short), rate=rate, out=tmp_path / "lab")
     with refused(tmp_path, "", "exists"):
         export(short, seeded_gait(short), rate=100.0, out=tmp_path)
     smaller = short.with_changes({"robot.tetrahedra": 3})

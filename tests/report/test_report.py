@@ -12,7 +12,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
-from tetra_drake.evolution.run import gait_label, load_run
+from tetra_drake.evolution.run import load_run
 from tetra_drake.formatting import rounded
 from tetra_drake.report.run_figures import simulate_shown_gaits
 from tetra_drake.report.run_page import render_report, write_report
@@ -58,9 +58,6 @@ class Page(HTMLParser):
         """The cells of the last row that begins so."""
         return {cells[0]: cells[1:] for cells in self.table}.get(heading)
 
-    def attributes(self, name):
-        return [values[name] for _, values in self.tags if name in values]
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
@@ -104,7 +101,7 @@ def test_figures_are_files_and_in_the_page(run, page):
 
 
 def test_it_needs_no_network_and_links_relatively(run, source, page):
-    links = [*page.attributes("src"), *page.attributes("href")]
+    links = [values.get("src") or values.get("href", "data:") for _, values in page.tags]
     files = {link for link in links if not link.startswith("data:")}
     assert {"replay.html", "figures/", "trial_01/best_gait.json"} <= files
     assert not [link for link in files if re.match(r"[a-z]+:|/", link)]
@@ -140,9 +137,7 @@ def test_the_best_gait_is_shown_with_its_weights_and_as_recorded(study, source, 
         assert re.search(rf'title="{title}"[^>]*>\s*{weight:.2f}\s*<', source), title
     # As recorded; simulated again, this gait moves elsewhere, which a note says.
     assert "walks 2.0 in" in page.texts["h1"][0]
-    best, initial = "trial 1, evaluation 4", "trial 1, evaluation 0"
-    assert (gait_label(study.best.recorded), gait_label(study.initial.recorded)) == (best, initial)
-    assert any(f"2 in ({best})" in text for text in page.texts["p"])
+    assert any("2 in (trial 1, evaluation 4)" in text for text in page.texts["p"])
 
 
 def test_metrics_of_the_best_gait_stand_beside_the_initial_ones(page):

@@ -76,8 +76,7 @@ def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
 def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
     metrics = walked(robot, 0.0, path=CIRCLE, steady_from=2.0)
     assert metrics.heading_change == pytest.approx(-4.0)
-    assert metrics.path_curvature == pytest.approx(1.0, rel=1e-6)
-    assert metrics.path_radius == pytest.approx(1.0, rel=1e-6)
+    assert [metrics.path_curvature, metrics.path_radius] == pytest.approx([1.0, 1.0], rel=1e-6)
     # Straight until 4 s, the bend after it is the steady stretch's.
     late = CIRCLE.times > 4.0 - 1e-9
     straight = np.where(late[:, None], CIRCLE.centre, CIRCLE.times[:, None] * [1.0, 2.0, 0.0])
@@ -118,9 +117,8 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:
     # In inches: 1 * 4 - 10 * 0.5 + 0 * 7 - 1 * 0.25
-    inches = {"distance": 5.0, "steady_distance": 4.0, "twist": 0.5, "lead": 7.0}
-    inches["lateral_drift"] = 0.25
-    lengths = {name: value * INCH for name, value in inches.items()}
+    names = "distance", "steady_distance", "twist", "lead", "lateral_drift"
+    lengths = dict(zip(names, INCH * np.array([5.0, 4.0, 0.5, 7.0, 0.25]), strict=True))
     metrics = Metrics(**dict.fromkeys(METRICS, 1.0) | lengths)
     assert compute_fitness(metrics, scenario.objective) == pytest.approx(-1.25)
     lead = scenario.with_changes({"objective.lead": "2 /in", "objective.speed": "3 s/m"})
@@ -134,7 +132,10 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
         ({"objective": {"heading_change": 1.0}}, "turns 180 degrees in 15 s"),
         ({"objective": {"rolled": 1.0}}, "rolled 5.73 deg, walks 2.0 inches in 15 s"),
         ({"terrain": Incline(slope=0.25)}, "walks 2.0 inches up 14.3 degrees in 15 s"),
-        ({"terrain": ROUGH}, "walks 2.0 inches on rough ground in 15 s"),
+        (
+            {"terrain": ROUGH},
+            "walks 2.0 inches on rough ground in 15 s",
+        ),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for_and_where_it_walks(scenario, changes, text):
