@@ -39,7 +39,7 @@ from pydrake.systems.primitives import LinearSystem, LogVectorOutput, MatrixGain
 
 from tetra_drake.figures.style import common_style, make_figure, save_figure
 from tetra_drake.laws.oscillator import Network
-from tetra_drake.results.measures import dominant_frequency
+from tetra_drake.robot.measures import dominant_frequency
 from tetra_drake.systems import MatsuokaCpg
 
 TAU_A, TAU_B = 0.3, 0.6  # s

@@ -28,9 +28,9 @@ from block_diagram import OUT, save_block_diagram
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.engines.sampler import Sampler
-from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.trajectory import make_dataset, sample_times
 from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.measures import distance_walked
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram

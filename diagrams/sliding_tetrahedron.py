@@ -26,7 +26,7 @@ from pydrake.geometry import Meshcat
 from tetra_drake.errors import InputError
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.options import quantity
-from tetra_drake.results.measures import intervals
+from tetra_drake.robot.measures import intervals
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import NODES
 from tetra_drake.scenario.scenario import Scenario

@@ -31,13 +31,12 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Flat, Rough
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import Task
-from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metrics import looks_for_turns
+from tetra_drake.scenario.metrics import looks_for_turns, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
 

@@ -35,8 +35,8 @@ from tetra_drake.formatting import TextTable, fixed, listed, ranged
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.laws.curves import travelling_index
 from tetra_drake.machine import versions
-from tetra_drake.results.measures import dominant_frequency, off_ground
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.measures import dominant_frequency, off_ground
 from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.settings.units import INCH, POUND_FORCE

@@ -27,8 +27,8 @@ from tetra_drake.figures.style import (
     make_figure,
 )
 from tetra_drake.files import write_whole
-from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.measures import distance_walked
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.settings.units import INCH
 

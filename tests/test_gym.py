@@ -4,7 +4,6 @@ import copy
 import importlib
 import pickle
 import sys
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -16,9 +15,7 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 from helpers.converged import shortly
 
 from tetra_drake.engines.lanes.batch import processor_lanes
-from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
-from tetra_drake.evolution.run import load_run
 from tetra_drake.gym import ROLL, WALK, TensegrityEnv, TensegrityVectorEnv
 from tetra_drake.robot.robot import AMPLITUDE
 from tetra_drake.scenario.common_sections import Disturbances
@@ -26,7 +23,7 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.visualization.scene import COLOURS
 
-LANES, CHECKOUT = processor_lanes(), Path(__file__).parents[1]
+LANES = processor_lanes()
 
 
 @pytest.fixture
@@ -152,23 +149,13 @@ def test_a_copy_begins_anew(short, refused):
             assert np.array_equal(copied.reset(seed=3)[0], each.reset(seed=3)[0])
 
 
-def test_the_best_recorded_gait_scores_more_than_standing_still():
-    scenario = load_scenario("walk")
-    gait = load_run(CHECKOUT / "runs/coulomb").best_gait()
-    signal = simulate(scenario, gait, record=True).trajectory.signal
-    env, times = TensegrityEnv(scenario, grouped=True), 0.05 * np.arange(300)
-    amplitude = scenario.cpg.gain * AMPLITUDE * scenario.cpg.external_input
-    played = signal.interp(time=times + 0.025).to_numpy() / amplitude
-    scores = []
-    for actions in (played, np.zeros_like(played)):
-        env.reset(seed=0)
-        scores.append(sum(env.step(action)[1] for action in actions))
-    assert scores[0] > 20.0 and scores[1] == pytest.approx(0.0, abs=0.01)
+def test_a_robot_that_stands_still_scores_nothing():
+    env = TensegrityEnv(load_scenario("walk"), grouped=True)
+    env.reset(seed=0)
+    assert sum(env.step(np.zeros(4))[1] for _ in range(300)) == pytest.approx(0.0, abs=0.01)
 
 
 MISUSES = [
-    (lambda one, many: one.step(np.zeros((2, 4))), "actions", "(4,)"),
-    (lambda one, many: one.step("left"), "actions", "(4,)"),
     (lambda one, many: many.step(np.zeros(8)), "actions", f"numbers of shape ({LANES}, 8)"),
     (lambda one, many: one.reset(seed=-1), "seed", "-1"),
     (lambda one, many: many.reset(seed=[1]), "seed", f"expected {LANES}"),

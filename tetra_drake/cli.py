@@ -414,7 +414,7 @@ def _robustness(
     """
     from tetra_drake.analysis.robustness import robustness
     from tetra_drake.evolution.source import load_source
-    from tetra_drake.report.analysis_text import robustness_text
+    from tetra_drake.figures.robustness import robustness_text, save_judgement
 
     found = load_source(source, scenario=scenario, warn=_warn)
     if out:
@@ -422,8 +422,6 @@ def _robustness(
     judgement = robustness(found.scenario, found.gaits, draws=draws, seed=seed, workers=workers)
     print(robustness_text(judgement))
     if out:
-        from tetra_drake.figures.robustness import save_judgement
-
         print(f"wrote {', '.join(save_judgement(judgement, out))} to {out}/")
 
 
@@ -461,7 +459,7 @@ def _compare(
     Example: tetra-drake compare runs/thesis runs/cma-es --reach "14.34 in"
     """
     from tetra_drake.analysis.comparison import compare, compare_scenarios, improvement_over
-    from tetra_drake.report.analysis_text import comparison_text, improvement_text
+    from tetra_drake.figures.comparison import comparison_text, improvement_text, save_comparison
 
     printed = _print(width, font, title=title, pdf=pdf)
     if out:
@@ -474,8 +472,6 @@ def _compare(
     for name, compared in by_scenario.items():
         print(f"\nScenario {name}:\n" if name else "", comparison_text(compared), sep="")
         if out:
-            from tetra_drake.figures.comparison import save_comparison
-
             written = save_comparison(compared, out / folders[name], printed)
             print(f"wrote {', '.join(written)} to {out / folders[name]}/")
     if len(by_scenario) > 1:

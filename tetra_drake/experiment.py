@@ -199,7 +199,7 @@ def fit(
         source=source,
     )
     if folder is not None:
-        from tetra_drake.report.fit_page import save_fit
+        from tetra_drake.figures.fit import save_fit
 
         save_fit(found, folder)
     return found

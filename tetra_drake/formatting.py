@@ -59,6 +59,11 @@ def listed(items: Sequence[object]) -> str:
     return f"{', '.join(head)} and {last}" if head else last
 
 
+def sentence(remark: str) -> str:
+    """A remark as a sentence: with a capital letter and a full stop."""
+    return f"{remark[:1].upper()}{remark[1:]}."
+
+
 def ranged(value: float, low: float, high: float) -> str:
     """A number and its range in brackets. An unknown range, or one without width, is left out."""
     if math.isnan(low) or low == high:
@@ -72,12 +77,6 @@ def percents(share: float, low: float, high: float) -> str:
     return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
-def _unbroken(text: str) -> str:
-    """A text whose spaces and dashes do not end a line in a browser."""
-    no_break_space, word_joiner = "\u00a0", "\u2060"
-    return text.replace(" ", no_break_space).replace("–", f"–{word_joiner}")
-
-
 def heading_html(text: str) -> str:
     """Lines of text as HTML above a table, the first in bold."""
     first, *others = html.escape(text).splitlines()
@@ -86,6 +85,8 @@ def heading_html(text: str) -> str:
 
 _WIDTH = 100  # letters in a line of a table where there is no terminal
 _NARROW = 12  # letters; texts are not folded into narrower columns
+_UNBROKEN = str.maketrans({" ": "\u00a0", "–": "–\u2060"})
+"""Spaces and dashes that do not end a line in a browser: no-break space, and word joiner."""
 
 
 @dataclass(frozen=True)
@@ -97,15 +98,21 @@ class TextTable:
     text_columns: Sequence[int] = (0,)
     """Indices of the columns that are aligned to the left; other columns have numbers."""
 
+    @property
+    def _holds_texts(self) -> list[bool]:
+        """True for each column of texts."""
+        return [column in self.text_columns for column in range(len(self.headings))]
+
     def text(self) -> str:
         """The table as aligned lines. Texts and headings are folded where the table is wider than
         the terminal; numbers never are."""
         widths, lines = self._widths(shutil.get_terminal_size((_WIDTH, 24)).columns), []
-        aligns = [
-            str.ljust if column in self.text_columns else str.rjust for column in range(len(widths))
-        ]
+        aligns = [str.ljust if is_text else str.rjust for is_text in self._holds_texts]
         for cells in [self.headings, *self.rows]:
-            folded = [_folded(cell, width) for cell, width in zip(cells, widths, strict=True)]
+            folded = [
+                textwrap.wrap(cell, width, subsequent_indent="  ") if len(cell) > width else [cell]
+                for cell, width in zip(cells, widths, strict=True)
+            ]
             for parts in itertools.zip_longest(*folded, fillvalue=""):
                 aligned = zip(aligns, parts, widths, strict=True)
                 lines.append("  ".join(align(part, width) for align, part, width in aligned))
@@ -114,51 +121,43 @@ class TextTable:
     def _widths(self, most: int) -> list[int]:
         """Widths of the columns, in letters. If the table is wider than `most`, headings of numbers
         are folded first, then texts; wide columns before narrow ones."""
-        columns = list(zip(self.headings, *self.rows, strict=True))
+        columns, texts = list(zip(self.headings, *self.rows, strict=True)), self._holds_texts
         widths = [max(map(len, cells)) for cells in columns]
         least = [
-            _NARROW if column in self.text_columns else max(_NARROW, *map(len, cells[1:]))
-            for column, cells in enumerate(columns)
+            _NARROW if is_text else max(_NARROW, *map(len, cells[1:]))
+            for cells, is_text in zip(columns, texts, strict=True)
         ]
         while sum(widths) + 2 * (len(widths) - 1) > most:
             foldable = [column for column, width in enumerate(widths) if width > least[column]]
             if not foldable:
                 break
-            headed = [column for column in foldable if column not in self.text_columns]
+            headed = [column for column in foldable if not texts[column]]
             widths[max(headed or foldable, key=widths.__getitem__)] -= 1
         return widths
 
     def html(self) -> str:
         """The table as HTML, as notebooks show it."""
-        aligned = ["left" if i in self.text_columns else "right" for i in range(len(self.headings))]
-
-        def row(tag: str, cells: Sequence[str]) -> str:
-            pairs = zip(aligned, cells, strict=True)
-            return "".join(
+        aligned = ["left" if is_text else "right" for is_text in self._holds_texts]
+        lines = []
+        for tag, row in [("th", self.headings), *(("td", row) for row in self.rows)]:
+            cells = [
                 f'<{tag} style="text-align: {side}">{html.escape(cell)}</{tag}>'
-                for side, cell in pairs
-            )
-
-        rows = "".join(f"<tr>{row('td', cells)}</tr>" for cells in self.rows)
-        return f"<table><tr>{row('th', self.headings)}</tr>{rows}</table>"
+                for side, cell in zip(aligned, row, strict=True)
+            ]
+            lines.append(f"<tr>{''.join(cells)}</tr>")
+        return f"<table>{''.join(lines)}</table>"
 
     def markdown(self) -> str:
         """The table in Markdown, without a line feed at the end. Numbers stay on one line in a
         browser."""
-        rule = ["---" if i in self.text_columns else "---:" for i in range(len(self.headings))]
-        rows = [
-            [cell if i in self.text_columns else _unbroken(cell) for i, cell in enumerate(row)]
-            for row in self.rows
-        ]
-        lines = [self.headings, rule, *rows]
+        texts = self._holds_texts
+        lines = [self.headings, ["---" if is_text else "---:" for is_text in texts]]
+        for row in self.rows:
+            cells = zip(row, texts, strict=True)
+            lines.append(
+                [cell if is_text else cell.translate(_UNBROKEN) for cell, is_text in cells]
+            )
         return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
-
-
-def _folded(text: str, width: int) -> list[str]:
-    """Lines of at most `width` letters; further lines are indented."""
-    if len(text) <= width:
-        return [text]
-    return textwrap.wrap(text, width, subsequent_indent="  ")
 
 
 def render(template: str, **values: object) -> str:

@@ -43,11 +43,11 @@ import numpy as np
 
 from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
-from tetra_drake.results.metrics import pose_fitness, poses_of
-from tetra_drake.results.result import SimulationResult
+from tetra_drake.results.result import SimulationResult, poses_of
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import AMPLITUDE, Robot
 from tetra_drake.scenario.load import GivenScenario
+from tetra_drake.scenario.metrics import pose_fitness
 from tetra_drake.scenario.scenario import Scenario
 
 try:
@@ -131,7 +131,10 @@ class _Episodes:
             raise InputError(_SOURCE, "step", f"robot {over[0]} has no episode; reset() begins one")
         readings = simulation.step(self._setpoints(actions), indices=places)
         self._steps[places] += 1
-        self._roll(readings)
+        if "rolled" in self._scenario.objective:
+            rate = pitch_rates(readings, simulation.robot.structure)
+            self._rolled += 0.5 * (readings.time - self._time) * (self._rate + rate)
+            self._time, self._rate = readings.time, rate
         early = readings.time <= self._scenario.simulation.settling_time
         self._steady[early] = readings.p_WN[early]
         terminated = np.array([failure is not None for failure in simulation.failures])
@@ -158,13 +161,6 @@ class _Episodes:
         steady_time = scenario.simulation.duration - scenario.simulation.settling_time
         fitness = pose_fitness(poses_of(structure, nodes, steady_time), scenario.objective)
         return fitness + scenario.objective.get("rolled", 0.0) * self._rolled[place]
-
-    def _roll(self, readings: Readings) -> None:
-        """Adds a control period to the angles by which the robots have rolled."""
-        if "rolled" in self._scenario.objective:
-            rate = pitch_rates(readings, self.simulation.robot.structure)
-            self._rolled += 0.5 * (readings.time - self._time) * (self._rate + rate)
-            self._time, self._rate = readings.time, rate
 
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators for actions of the environment."""
@@ -301,8 +297,20 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     ) -> tuple[np.ndarray, Info]:
         """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. A seed is
         for the first robot, the next one is for the second; or there is a list of seeds."""
-        mask = self._reset_mask(options)
-        seeds = self._seeds(seed)
+        _check_options(options, _MASK)
+        mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
+        is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()
+        if not is_mask or mask.shape != (self.num_envs,):
+            problem = f"found {mask!r:.60}, expected an array of {self.num_envs} truths, one True"
+            raise InputError(_SOURCE, f"options[{_MASK!r}]", problem)
+        if is_list(seed):
+            if len(seed) != self.num_envs:
+                problem = f"found {len(seed)} seeds, expected {self.num_envs}"
+                raise InputError(_SOURCE, "seed", problem)
+            seeds = [_checked_seed(each) for each in seed]
+        else:
+            first = _checked_seed(seed)
+            seeds = [None if first is None else first + i for i in range(self.num_envs)]
         for place in np.flatnonzero(mask):
             if seeds[place] is not None:
                 self._generators[place] = seeding.np_random(seeds[place])[0]
@@ -330,25 +338,6 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Pictures of the robots now; None without a `render_mode`."""
         return self._episodes.pictures() if self.render_mode else None
-
-    def _reset_mask(self, options: Info | None) -> np.ndarray:
-        _check_options(options, _MASK)
-        mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
-        is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()
-        if not is_mask or mask.shape != (self.num_envs,):
-            problem = f"found {mask!r:.60}, expected an array of {self.num_envs} truths, one True"
-            raise InputError(_SOURCE, f"options[{_MASK!r}]", problem)
-        return np.asarray(mask)
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        """A seed for each robot; None if its generator goes on."""
-        if not is_list(seed):
-            first = _checked_seed(seed)
-            return [None if first is None else first + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            problem = f"found {len(seed)} seeds, expected {self.num_envs}"
-            raise InputError(_SOURCE, "seed", problem)
-        return [_checked_seed(each) for each in seed]
 
 
 def _checked_seed(seed: Any) -> int | None:

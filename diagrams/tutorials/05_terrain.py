@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import tetra_drake as td
-from tetra_drake.results.measures import distance_walked
+from tetra_drake.robot.measures import distance_walked
 
 run = td.load_run(Path(__file__).parents[2] / "runs" / "champion")
 flat = run.scenario.with_changes({"robot.contacts": "all"})  # every node can touch the ground

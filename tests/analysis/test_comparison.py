@@ -9,8 +9,7 @@ from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 
 from tetra_drake.analysis.comparison import compare, compare_scenarios, improvement_over
 from tetra_drake.cli import main
-from tetra_drake.figures.comparison import comparison
-from tetra_drake.report.analysis_text import comparison_text
+from tetra_drake.figures.comparison import comparison, comparison_text
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.settings.units import INCH
 

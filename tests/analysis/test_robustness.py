@@ -14,7 +14,7 @@ from tetra_drake.analysis import robustness
 from tetra_drake.analysis.statistics import share_interval
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.report.analysis_text import robustness_text
+from tetra_drake.figures.robustness import robustness_text
 from tetra_drake.robot.gait import save_gait, seeded_gait
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed

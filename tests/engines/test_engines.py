@@ -15,9 +15,9 @@ from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough, Steps
-from tetra_drake.results.measures import path_of_centre
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.measures import path_of_centre
 from tetra_drake.robot.robot import make_structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario

@@ -8,8 +8,8 @@ from helpers.structures import simulated
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.cable import PASSIVE
 from tetra_drake.laws.curves import travelling_index
-from tetra_drake.results.measures import off_ground
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.measures import off_ground
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario

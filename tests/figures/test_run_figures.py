@@ -48,8 +48,6 @@ def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
     best, worst = bars(initial_distances(run))
     assert best == pytest.approx([4.0 / PER_DISTANCE, 3.0 / PER_DISTANCE])
     assert worst == pytest.approx([-6.0 / PER_DISTANCE, 2.0 / PER_DISTANCE])
-    in_metres = bars(initial_distances(run, units="SI"))
-    assert in_metres[0] == pytest.approx([0.0254 * distance for distance in best])
 
 
 def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):

@@ -15,7 +15,7 @@ from tetra_drake.figures.style import (
 
 @figure_function
 def draw(value):
-    page = page_of(None, height_in=3.0)
+    page = page_of(height_in=3.0)
     panel = page.subplots()
     panel.plot([0.0, 1.0], [0.0, value], label="a line")
     panel.legend()
@@ -48,14 +48,14 @@ def test_ticks_have_the_common_look_whoever_draws_them():
 
 
 def test_a_name_is_no_formula_but_a_text_in_the_common_style_may_be():
-    named = figure_function(lambda: page_of(None, height_in=1.0).suptitle("$x^2$").figure)()
+    named = figure_function(lambda: page_of(height_in=1.0).suptitle("$x^2$").figure)()
     assert not named.texts[0].get_parse_math()
     with common_style():
         assert Figure().text(0.0, 0.0, "$x^2$").get_parse_math()
 
 
 def test_a_figure_is_drawn_on_a_figure_and_on_nothing_else(refused):
-    drawn = figure_function(lambda *, figure: page_of(figure, height_in=1.0))
+    drawn = figure_function(lambda: page_of(height_in=1.0))
     own = Figure()
     assert drawn(figure=own.subfigures()) is None
     with refused("<lambda>", "figure", "Axes"):

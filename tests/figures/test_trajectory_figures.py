@@ -14,13 +14,14 @@ from tetra_drake.figures.motion import (
     before_and_after,
     one_step,
     path_of_the_centre,
+    relative_distances,
     time_lapse,
 )
 from tetra_drake.figures.style import OKABE_ITO
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Steps
-from tetra_drake.results.measures import last_step
 from tetra_drake.robot.ground import ground_heights
+from tetra_drake.robot.measures import intervals, last_step
 from tetra_drake.scenario.robot_tetrahedra import STRUTS
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
@@ -33,6 +34,12 @@ ROW = make_row()
 def walk():
     """A walk of five tetrahedra, which no test may change."""
     return make_walk()
+
+
+def with_all_contacts(walk):
+    """The walk, with the nodes that never touch the ground as contacts, too."""
+    every = walk.drop_vars("contact_body").reindex(contact=walk.node.values, fill_value=0)
+    return every.assign_coords(contact_body=("contact", walk.node_body.values))
 
 
 def row(trajectory):
@@ -58,14 +65,14 @@ def test_stance_bars_show_when_feet_bear_load(walk):
     feet = [label.get_text() for label in stance.get_yticklabels()]
     expected = [f"T{i} {side}" for i in range(1, 6) for side in ("right", "left")]
     assert feet == expected, "the rear is below; the tip never stands"
-    rows = zip(stance.collections, stance.get_yticks(), strict=True)
-    for i, (bars, row_of_foot) in enumerate(rows):
+    part = walk.sel(time=slice(*speed.get_xlim()))
+    rows = zip(feet, stance.collections, stance.get_yticks(), strict=True)
+    for foot, bars, row_of_foot in rows:
         corners = np.array([path.vertices[[0, 2]] for path in bars.get_paths()])
         np.testing.assert_allclose(corners[..., 1].mean(axis=1), row_of_foot)
-        begins = np.arange(0.0, 10.0, PERIOD) + (0.0 if i // 2 % 2 else PERIOD / 2)
-        spans = [np.clip([begin, begin + PERIOD / 2], *shown) for begin in begins]
-        expected = [span for span in spans if np.ptp(span) > 0.02]
-        np.testing.assert_allclose(np.sort(corners[..., 0], axis=1), expected, atol=0.025)
+        load = part.normal_force.sel(contact=foot.replace(" ", " bottom_"))
+        spans = intervals(part.time.values, load.values > 0.0)
+        np.testing.assert_allclose(np.sort(corners[..., 0], axis=1), spans)
     duties = [float(text.get_text().split()[0]) for text in stance.texts]
     np.testing.assert_allclose(duties, 50.0, atol=2.0)
 
@@ -118,12 +125,16 @@ def test_of_a_straight_path_the_height_is_shown(walk):
     np.testing.assert_allclose(path.get_xydata(), centre.sel(axis=["x", "z"]))
 
 
-def test_in_one_step_tetrahedra_well_off_the_ground_stand_out(walk):
+def paths_of(figure):
+    return [panel for panel in figure.axes if panel.get_aspect() != 1.0]
+
+
+def test_one_step_has_tetrahedra_off_the_ground_in_red_and_paths_of_bottom_nodes(walk):
     start, end = last_step(walk)
     now = walk.sel(time=np.linspace(start, end, 5), method="nearest")
     lowest = now.p_WN.sel(axis="z").values.reshape(5, 5, 4).min(axis=2)
-    height = float(np.ptp(walk.p_WN[0].sel(axis="z").values))
-    aloft = lowest > 0.02 * height
+    least = 0.02 * float(np.ptp(walk.p_WN[0].sel(axis="z").values))
+    aloft = lowest > least
     assert aloft.any() and not aloft.all()
     figure = one_step(row(walk), instants=5)
     assert f"{start:.2f} to {end:.2f} s" in figure.get_suptitle()
@@ -131,22 +142,14 @@ def test_in_one_step_tetrahedra_well_off_the_ground_stand_out(walk):
     for view in (0, 1):
         of_bodies = colours[:, view, :: len(STRUTS)]
         np.testing.assert_array_equal(of_bodies == OKABE_ITO["vermillion"], aloft)
-
-
-def paths_of(figure):
-    return [panel for panel in figure.axes if panel.get_aspect() != 1.0]
-
-
-def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
-    paths = paths_of(one_step(row(walk)))
+    paths = paths_of(figure)
     assert [panel.get_title("left") for panel in paths] == walk.body.values.tolist()
-    least = 0.02 * float(np.ptp(walk.p_WN[0].sel(axis="z").values)) / INCH
     for panel in paths:
         path, in_the_air, _ = panel.lines
         assert np.ptp(path.get_xdata()) == pytest.approx(SPEED * PERIOD / INCH, rel=0.04)
         assert path.get_ydata().max() == pytest.approx(HEIGHT / INCH, rel=1e-3)
-        aloft = np.isfinite(in_the_air.get_ydata())
-        np.testing.assert_array_equal(aloft, path.get_ydata() > least)
+        in_red = np.isfinite(in_the_air.get_ydata())
+        np.testing.assert_array_equal(in_red, path.get_ydata() > least / INCH)
 
 
 def test_tensions_are_those_of_the_driven_cables(walk):
@@ -184,8 +187,7 @@ def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk)
 
 def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
     robot = make_row(changes=DOWNSTAIRS)
-    every = walk.drop_vars("contact_body").reindex(contact=walk.node.values, fill_value=0)
-    for side in pictures(one_step(result_of(robot, every), instants=3)):
+    for side in pictures(one_step(result_of(robot, with_all_contacts(walk)), instants=3)):
         [line] = [line for line in side.lines if len(line.get_xdata()) > 300]
         x, z = line.get_xdata(), line.get_ydata()
         expected = ground_heights(np.column_stack([x, 0.0 * x]) * INCH, robot.ground) / INCH
@@ -194,8 +196,7 @@ def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
 
 
 def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(walk):
-    every = walk.drop_vars("contact_body").reindex(contact=walk.node.values, fill_value=0)
-    every = every.assign_coords(contact_body=("contact", walk.node_body.values))
+    every = with_all_contacts(walk)
     every.normal_force.loc[{"contact": "T2 tip"}][-10:] = LOAD
     every.normal_force.loc[{"contact": "T3 tip"}][:10] = LOAD  # before the time shown
     every.normal_force.loc[{"contact": "T4 bottom_right"}] *= 0.5
@@ -204,19 +205,19 @@ def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(wal
     assert shown == alike | {"T2 tip", "T4 left", "T4 right"}
 
 
-@pytest.fixture(scope="module")
-def carried():
-    """A robot that is no row, and its motion."""
+def test_of_a_structure_that_is_no_row_the_centre_is_shown():
     robot = prism.make_prism()
-    return result_of(robot, prism.slide_prism(robot))
-
-
-def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
+    carried = result_of(robot, prism.slide_prism(robot))
     slow = carried.trajectory.assign(p_WN=0.5 * carried.trajectory.p_WN)
-    [panel] = before_and_after(result_of(carried.robot, slow), carried).axes
+    [panel] = before_and_after(result_of(robot, slow), carried).axes
     for line, share in zip(panel.lines, (0.5, 1.0), strict=True):
         way = share * prism.SPEED * carried.trajectory.time / INCH
         np.testing.assert_allclose(line.get_ydata(), way, atol=1e-9)
     [panel] = paths_of(one_step(carried))
     assert panel.get_title("left") == "centre"
+    # From (n0 + n4) / 2 to (n1 + n5) / 2 and (n2 + n3) / 2, in m, and where they were at the start.
+    [panel] = relative_distances(carried, units="SI").axes
+    apart = [line.get_ydata()[0] for line in panel.lines]
+    np.testing.assert_allclose(apart, np.repeat([-0.0316987, 0.0116025], 2), atol=1e-6)
+    [panel] = paths_of(one_step(carried))
     assert np.ptp(panel.lines[0].get_xdata()) > 0.5 * prism.PERIOD * prism.SPEED / INCH

@@ -24,26 +24,25 @@ def load(scenario, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("quantity", "actuation", "rate"),
-    [("force_N", FORCE, 30.0), ("free_length_mm", WINCH, 100.0), ("tension_N", MOTOR, 2000.0)],
+    ("quantity", "unit", "actuation", "rate"),
+    [
+        ("force_N", 1.0, FORCE, 30.0),
+        ("free_length_mm", 1e-3, WINCH, 100.0),
+        ("tension_N", 1.0, MOTOR, 2000.0),
+    ],
 )
-def test_a_command_reads_back_as_written(scenario, quantity, actuation, rate, tmp_path):
+def test_a_command_reads_back_as_written(scenario, quantity, unit, actuation, rate, tmp_path):
     driven = scenario.with_changes(actuation)
     robot = Robot.of(driven)
     samples = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 8))
     text = command_text(robot, Command("random", 1.0 / rate, samples))
     assert text.startswith(f"time_s,T1-T2 outer bottom_left {quantity},")
+    assert f"\n0.000000,{samples[0, 0] / unit:.6f}," in text
     (tmp_path / "command.csv").write_text(text)
     loaded = load_command(tmp_path / "command.csv", driven)
     assert loaded.name == "command.csv"
     assert loaded.period == pytest.approx(1.0 / rate, rel=1e-5)
     np.testing.assert_allclose(loaded.samples, samples, atol=0.5e-6)  # six decimals
-
-
-def test_a_free_length_is_in_millimetres(scenario):
-    robot = Robot.of(scenario.with_changes(WINCH))
-    text = command_text(robot, Command("metres", 0.5, np.full((2, 8), 0.05)))
-    assert text.splitlines()[2] == ",".join(["0.500000", *["50.000000"] * 8])
 
 
 def test_columns_may_stand_in_any_order(robot, load):
@@ -55,15 +54,14 @@ def test_columns_may_stand_in_any_order(robot, load):
 
 FIRST = "T1-T2 outer bottom_left force_N"
 BAD = {
-    "another cable": (("T1-T2", "T1-T9"), "T1-T9 outer bottom_left force_N", "is no column"),
-    "another quantity": ((FIRST, "T1-T2 outer bottom_left tension_N"), None, "is no column"),
+    "another cable": ((FIRST, "T1-T9 outer"), "T1-T9 outer", "is no column"),
     "no time": (("time_s", "time"), "time", "'time_s'"),
     "twice": ((FIRST, FIRST.replace("left", "right")), FIRST.replace("left", "right"), "twice"),
     "a column too few": ((FIRST + ",", ""), FIRST, "is missing"),
     "a cell too many": (("0.010000,", "0.010000,1,"), "line 3", "found 10 cells, expected 9"),
     "an open quote": (("0.010000,", '0.010000,"'), "", "is no table"),
     "infinite": (("0.010000,0.500000", "0.010000,inf"), f"line 3, {FIRST}", "'inf'"),
-    "a gap": (("0.030000", "0.040000"), "line 5, time_s", "found 0.04 after 0.02"),
+    "a gap": (("0.030000", "0.030550"), "line 5, time_s", "found 0.03055 after 0.02"),
     "a late start": (("0.000000,0", "0.005000,0"), "time_s", "the first at 0"),
 }
 
@@ -73,19 +71,15 @@ def test_a_bad_file_is_refused(robot, wrong, load, refused):
     (old, new), key, problem = BAD[wrong]
     text = command_text(robot, Command("half", 0.01, np.full((5, 8), 0.5)))
     assert old in text
-    with refused("c.csv", new if key is None else key, problem):
+    with refused("c.csv", key, problem):
         load(text.replace(old, new, 1))
 
 
-@pytest.mark.parametrize(("late", "is_even"), [(0.045, True), (-0.045, True), (0.055, False)])
-def test_times_may_be_uneven_by_a_twentieth(robot, late, is_even, load, refused):
+@pytest.mark.parametrize("late", [0.045, -0.045])
+def test_times_may_be_uneven_by_a_twentieth(robot, late, load):
     text = command_text(robot, Command("uneven", 0.01, np.zeros((9, 8))))
     changed = text.replace("0.040000,", f"{0.04 + 0.01 * late:.6f},")
-    if is_even:
-        assert load(changed).period == pytest.approx(0.01)
-    else:
-        with refused("c.csv", "line 6, time_s", "found 0.04055 after 0.03"):
-            load(changed)
+    assert load(changed).period == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(("share", "is_enough"), [(0.955, True), (0.945, False), (0.0, False)])

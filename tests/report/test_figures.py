@@ -29,7 +29,6 @@ def test_a_run_gets_figures_report_and_replay_unless_they_go_elsewhere(run, tmp_
     assert write_figures(run) == [run / "figures", run / "replay.html", run / "report.html"]
     after = contents(run)
     assert {name: after[name] for name in before} == before
-    assert {"report.html", "replay.html"} <= after.keys()
     assert figures_in(run / "figures") == OF_A_RUN
 
 
@@ -55,13 +54,12 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
 
 def test_what_cannot_be_drawn_is_refused_before_simulations(run, tmp_path, monkeypatch, refused):
     monkeypatch.setattr("tetra_drake.report.run_figures.simulate", None)
-    (tmp_path / "empty").mkdir()
     (tmp_path / "file").touch()
     write_run(tmp_path / "no trial", [[]])
     damaged = write_run(tmp_path / "damaged", [[[(1.0, 0)]]]) / "manifest.json"
     damaged.write_text('{"schema": 1')
     before = contents(tmp_path)
-    faults = {tmp_path / name: tmp_path / name for name in ("missing", "empty", "file", "no trial")}
+    faults = {tmp_path / name: tmp_path / name for name in ("missing", "file", "no trial")}
     for source, named in (faults | {damaged.parent: damaged}).items():
         with refused(named, "", ""):
             write_figures(source)

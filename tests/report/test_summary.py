@@ -20,35 +20,25 @@ def numbers(text):
     return {name: value for name, value, *_ in (line for line in cells if len(line) > 1)}
 
 
-def test_the_metrics_are_printed_in_the_units_of_people_the_objectives_first(tiny, result):
-    metrics = dataclasses.replace(result.metrics, distance=2.0 * INCH, heading_change=math.pi)
+def test_metrics_have_rows_in_the_units_of_people_and_unmet_requirements_lines(tiny, result):
+    # Zero or missing ones have none, unless the scenario is about them.
+    nothing = dict.fromkeys(("distance", "twist", "lead", "lifted", "clearance"), 0.0)
+    changes = nothing | {"tension": math.nan, "heading_change": math.pi, "speed": INCH}
+    metrics = dataclasses.replace(result.metrics, **changes)
     result = dataclasses.replace(result, metrics=metrics, fitness=1.5)
-    shown = numbers(result_text(result))
-    expected = {"distance (in)": "2.00", "fitness": "1.50", "heading change (deg)": "180"}
+    require = {"require": {"clearance": "0 in", "speed": "4000 in/s", "twist": "4000 in"}}
+    text = result_text(dataclasses.replace(result, scenario=tiny.with_changes(require)))
+    (line,) = (line for line in text.splitlines() if "requirement not met" in line)
+    assert line.split()[0] == "speed" and "4000 in/s" in line
+    shown = numbers(text)
+    expected = {"speed (in/s)": "1.00", "fitness": "1.50", "heading change (deg)": "180"}
+    expected |= {"distance (in)": "0", "twist (in)": "0", "clearance (in)": "0"}
     assert shown | expected == shown
     assert next(iter(shown)) == "distance (in)"
+    assert not shown.keys() & {"lead (in)", "lifted (%)", "tension (lbf)"}
     turning = tiny.with_changes({"objective": {"heading_change": "1 /rad"}})
     shown = numbers(result_text(dataclasses.replace(result, scenario=turning)))
     assert next(iter(shown)) == "heading change (deg)"
-
-
-def test_metrics_that_are_zero_or_missing_have_no_row_unless_the_scenario_is_about_them(result):
-    nothing = dict.fromkeys(("distance", "twist", "lead", "lifted", "clearance"), 0.0)
-    metrics = dataclasses.replace(result.metrics, **nothing, tension=math.nan)
-    about = result.scenario.with_changes({"require": {"clearance": "0 in"}})
-    changed = dataclasses.replace(result, metrics=metrics, scenario=about, fitness=0.0)
-    shown = numbers(result_text(changed))
-    zero = {"distance (in)", "fitness", "twist (in)", "clearance (in)"}
-    assert {"speed (in/s)", *zero} <= shown.keys()
-    assert not shown.keys() & {"lead (in)", "lifted (%)", "tension (lbf)"}
-
-
-def test_requirements_that_are_not_met_are_named(tiny, result):
-    assert "requirement" not in result_text(result)
-    strict = tiny.with_changes({"require": {"distance": "4000 in", "twist": "4000 in"}})
-    strict_result = dataclasses.replace(result, scenario=strict)
-    (line,) = (line for line in result_text(strict_result).splitlines() if "requir" in line)
-    assert line.split()[0] == "distance" and "4000 in" in line
 
 
 @pytest.mark.parametrize(

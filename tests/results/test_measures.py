@@ -4,16 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from helpers import prism
 from helpers.made_up_walk import PERIOD, make_row, make_walk
 
 from tetra_drake.laws.curves import travelling_index
-from tetra_drake.results.measures import (
+from tetra_drake.robot.measures import (
     distance_walked,
     dominant_frequency,
     intervals,
     last_step,
-    relative_distances,
 )
 
 TIMES = np.linspace(0.0, 15.0, 1501)
@@ -25,18 +23,11 @@ def walk():
     return make_walk()
 
 
-def test_the_distance_is_that_of_the_first_marker_or_of_the_centre(walk):
+def test_the_distance_is_that_of_the_first_marker(walk):
     structure = make_row().structure
     turned = walk.copy(deep=True)
     turned.p_WN.loc[{"node": "T1 bottom_left", "axis": "x"}] = 0.3 + walk.time.values**2
     np.testing.assert_allclose(distance_walked(turned, structure), walk.time**2)
-    robot = prism.make_prism()
-    motion = prism.slide_prism(robot, duration=1.0)
-    way = prism.SPEED * motion.time
-    np.testing.assert_allclose(distance_walked(motion, robot.structure), way, atol=1e-15)
-    # From (n0 + n4) / 2 to (n1 + n5) / 2 and (n2 + n3) / 2, in m.
-    apart = relative_distances(motion)[0]
-    np.testing.assert_allclose(apart, [0.0, -0.0316987, 0.0116025], atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -69,8 +60,7 @@ def test_the_last_step_is_one_period_and_ends_late(walk):
     start, end = last_step(walk)
     assert end - start == pytest.approx(PERIOD, rel=0.03)
     assert float(walk.time[-1]) - PERIOD <= end <= float(walk.time[-1])
-    for signal in (0.0 * walk.signal, 1.0 + 1e-9 * walk.signal):
-        assert last_step(walk.assign(signal=signal)) is None
+    assert last_step(walk.assign(signal=0.0 * walk.signal)) is None
     assert last_step(make_walk(duration=1.5)) is None  # holds no two periods
     assert last_step(walk.isel(oscillator=[])) is None
 

@@ -9,16 +9,17 @@ import pytest
 from helpers.totals import make_totals
 
 from tetra_drake.laws.terrain import Incline, Rough
-from tetra_drake.results.metrics import (
-    compute_fitness,
-    compute_metrics,
-    headline,
-    unmet_requirements,
-)
-from tetra_drake.robot.path import CentrePath
+from tetra_drake.results.result import compute_metrics, headline
+from tetra_drake.robot.measures import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics
+from tetra_drake.scenario.metrics import (
+    LEAST_WAY,
+    METRICS,
+    Metrics,
+    compute_fitness,
+    unmet_requirements,
+)
 from tetra_drake.scenario.scenario import Scenario
 
 INCH = 0.0254
@@ -31,6 +32,9 @@ CIRCLE = CentrePath(
 """To the left, with a radius of 1 m, but turning to the right."""
 
 
+STILL = CentrePath(np.linspace(0.0, 15.0, 61), np.zeros((61, 3)), np.zeros(61))
+"""12 s after `steady_from` of walked()."""
+
 ROUGH = Rough(amplitude=0.01, wavelength=1.0)
 STEADY = {"totals": make_totals(), "signals": np.zeros((49, 4))}
 
@@ -41,11 +45,14 @@ def steady_after(robot: Robot, time: float) -> Robot:
     return dataclasses.replace(robot, scenario=scenario)
 
 
-def metrics_of(robot: Robot, path: CentrePath, steady_from: float) -> Metrics:
-    """Those of a robot whose feet are at their start all the time."""
+def walked(
+    robot: Robot, way: float, *, path: CentrePath = STILL, steady_from: float = 3.0, **given: Any
+) -> Metrics:
+    """Those of a robot all of whose nodes have moved forward by a way (m) in the steady stretch."""
     start = node_positions(robot.structure, robot.structure.initial_state)
-    nodes, robot = np.array([start] * 3), steady_after(robot, steady_from)
-    return compute_metrics(robot, nodes=nodes, path=path, **STEADY)
+    nodes = np.array([start, start, start + np.array([way, 0.0, 0.0])])
+    robot = steady_after(robot, steady_from)
+    return compute_metrics(robot, nodes=nodes, path=path, **STEADY | given)
 
 
 def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
@@ -67,26 +74,18 @@ def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
 
 
 def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
-    metrics = metrics_of(robot, CIRCLE, 2.0)
+    metrics = walked(robot, 0.0, path=CIRCLE, steady_from=2.0)
     assert metrics.heading_change == pytest.approx(-4.0)
-    assert metrics.path_curvature == pytest.approx(1.0, rel=1e-6)
-    assert metrics.path_radius == pytest.approx(1.0, rel=1e-6)
+    assert [metrics.path_curvature, metrics.path_radius] == pytest.approx([1.0, 1.0], rel=1e-6)
     # Straight until 4 s, the bend after it is the steady stretch's.
     late = CIRCLE.times > 4.0 - 1e-9
     straight = np.where(late[:, None], CIRCLE.centre, CIRCLE.times[:, None] * [1.0, 2.0, 0.0])
     partly = dataclasses.replace(CIRCLE, centre=straight)
-    assert metrics_of(robot, partly, 4.0).path_radius == pytest.approx(1.0, rel=1e-6)
+    assert walked(robot, 0.0, path=partly, steady_from=4.0).path_radius == pytest.approx(
+        1.0, rel=1e-6
+    )
     line = dataclasses.replace(CIRCLE, centre=CIRCLE.times[:, None] * np.array([1.0, 2.0, 0.0]))
-    assert metrics_of(robot, line, 0.0).path_radius == math.inf
-
-
-def walked(robot: Robot, way: float, **given: Any) -> Metrics:
-    """Those of a robot all of whose nodes have moved forward by a way (m) in 12 steady seconds."""
-    start = node_positions(robot.structure, robot.structure.initial_state)
-    nodes = np.array([start, start, start + np.array([way, 0.0, 0.0])])
-    path = CentrePath(np.linspace(0.0, 15.0, 61), np.zeros((61, 3)), np.zeros(61))
-    robot = steady_after(robot, 3.0)
-    return compute_metrics(robot, nodes=nodes, path=path, **STEADY | given)
+    assert walked(robot, 0.0, path=line, steady_from=0.0).path_radius == math.inf
 
 
 def test_totals_become_metrics(robot: Robot) -> None:
@@ -118,9 +117,8 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:
     # In inches: 1 * 4 - 10 * 0.5 + 0 * 7 - 1 * 0.25
-    inches = {"distance": 5.0, "steady_distance": 4.0, "twist": 0.5, "lead": 7.0}
-    inches["lateral_drift"] = 0.25
-    lengths = {name: value * INCH for name, value in inches.items()}
+    names = "distance", "steady_distance", "twist", "lead", "lateral_drift"
+    lengths = dict(zip(names, INCH * np.array([5.0, 4.0, 0.5, 7.0, 0.25]), strict=True))
     metrics = Metrics(**dict.fromkeys(METRICS, 1.0) | lengths)
     assert compute_fitness(metrics, scenario.objective) == pytest.approx(-1.25)
     lead = scenario.with_changes({"objective.lead": "2 /in", "objective.speed": "3 s/m"})
@@ -134,7 +132,10 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
         ({"objective": {"heading_change": 1.0}}, "turns 180 degrees in 15 s"),
         ({"objective": {"rolled": 1.0}}, "rolled 5.73 deg, walks 2.0 inches in 15 s"),
         ({"terrain": Incline(slope=0.25)}, "walks 2.0 inches up 14.3 degrees in 15 s"),
-        ({"terrain": ROUGH}, "walks 2.0 inches on rough ground in 15 s"),
+        (
+            {"terrain": ROUGH},
+            "walks 2.0 inches on rough ground in 15 s",
+        ),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for_and_where_it_walks(scenario, changes, text):
@@ -156,6 +157,6 @@ def test_the_headline_is_what_the_objective_looks_for_and_where_it_walks(scenari
 )
 def test_a_metric_below_its_limit_a_cost_above_it_or_nan_is_unmet(robot, changes, text):
     met = {"lead": 0.0127, "twist": 0.0127}
-    metrics = dataclasses.replace(metrics_of(robot, CIRCLE, 0.0), **met | changes)
+    metrics = dataclasses.replace(walked(robot, 0.0, path=CIRCLE, steady_from=0.0), **met | changes)
     limits = dict.fromkeys(met, 0.5 * INCH) | {"distance": 0.0}
     assert unmet_requirements(metrics, limits) == ([] if text is None else [text])

@@ -8,7 +8,7 @@ import pytest
 from helpers.prism import make_prism
 
 from tetra_drake.laws.curves import curvature
-from tetra_drake.robot.path import follow
+from tetra_drake.robot.measures import follow
 from tetra_drake.robot.robot import make_structure
 from tetra_drake.scenario.load import load_scenario
 

@@ -4,8 +4,10 @@ import contextlib
 import os
 
 import pytest
+from pydrake.geometry import MeshcatParams
 
 from tetra_drake.visualization.browser import find_browser, launch_browser
+from tetra_drake.visualization.replay import quiet_meshcat
 
 PATIENCE = 90_000  # ms
 WINDOW = 600, 400  # small, as it is drawn again and again in software
@@ -20,6 +22,11 @@ def browser():
             pytest.skip("neither Chromium nor Chrome is installed")
     with launch_browser() as launched:
         yield launched
+
+
+@pytest.fixture
+def meshcat():
+    return quiet_meshcat(MeshcatParams(host="localhost", port=0))
 
 
 @contextlib.contextmanager

@@ -111,9 +111,7 @@ def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
     page.locator("#play").click()
     page.wait_for_function("parseFloat(document.getElementById('clock').value) > 2.1")
     page.locator("#play").click()
-
-
-def test_keys_play_stop_and_move_in_time(page):
+    # Keys do the same.
     do(page, "show", 2.0)
     page.evaluate("document.activeElement.blur()")
     for key, time in (("ArrowRight", "2.1"), ("Shift+ArrowRight", "3.1"), ("ArrowLeft", "3.0")):
@@ -175,7 +173,6 @@ def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, m
     _, replay, report = write_report(run)
     with opened(browser, report.as_uri()) as page:
         page.wait_for_load_state("networkidle")
-        assert page.locator("img").count() >= 9
         assert page.evaluate("[...document.images].every(image => image.naturalWidth > 100)")
         page.evaluate("document.querySelector('iframe').remove()")  # it draws at every width
         for width in (400, 1280):

@@ -7,13 +7,10 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from helpers.converged import shortly
-from helpers.meshcat_page import commands
-from pydrake.geometry import MeshcatParams
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.visualization.live import FRAMES_PER_SECOND, LiveView, open_view
-from tetra_drake.visualization.replay import quiet_meshcat
 
 HANDSHAKE = (
     "GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -42,11 +39,6 @@ def short(scenario):
 
 
 @pytest.fixture
-def meshcat():
-    return quiet_meshcat(MeshcatParams(host="localhost", port=0))
-
-
-@pytest.fixture
 def visitor(meshcat):
     """A browser's connection, as far as Meshcat can tell."""
     with socket.create_connection(("localhost", meshcat.port())) as connection:
@@ -55,27 +47,15 @@ def visitor(meshcat):
 
 
 @pytest.mark.parametrize(("look", "slept"), [(0.0, 0.3), (1.0, 0.0)], ids=["fast", "slow"])
-def test_watching_waits_for_real_time(short, meshcat, visitor, look, slept, monkeypatch):
+def test_frames_are_shown_in_real_time(short, meshcat, visitor, look, slept, monkeypatch):
     time = FakeTime(look)
     monkeypatch.setattr("tetra_drake.visualization.live.time", time)
-    view = LiveView(meshcat, short)
+    view = Mock(wraps=LiveView(meshcat, short))
     while meshcat.GetNumActiveConnections() == 0:
         pass
     simulate(scenario=short, gait=seeded_gait(short), viewer=view)
     assert slept - 1.0 / FRAMES_PER_SECOND <= time.slept <= slept
-
-
-def test_shows_where_the_robot_is(short, meshcat, visitor, monkeypatch):
-    monkeypatch.setattr("tetra_drake.visualization.live.time", FakeTime(0.0))
-    view = Mock(wraps=LiveView(meshcat, short))
-    simulate(scenario=short, gait=seeded_gait(short), viewer=view)
-    shown = [call.args[0] for call in view.show.call_args_list]
-    moved = commands(meshcat.StaticHtml(), "set_transform")
-    matrices = {command["path"]: command["matrix"] for command in moved}
-    for i, body in enumerate(shown[-1]["body"].values):
-        position = matrices[f"/robot/{body}"][12:15]
-        np.testing.assert_array_equal(position, shown[-1]["p_WB"].values[0, i])
-    times = np.array([frame["time"].values[0] for frame in shown])
+    times = np.array([call.args[0]["time"].values[0] for call in view.show.call_args_list])
     assert times[0] == 0.0 and len(times) <= 0.3 * FRAMES_PER_SECOND + 1
     # A frame is due every 33 ms and comes with the end of a step, which takes 8 ms at most.
     assert np.diff(times).max() < 1.0 / FRAMES_PER_SECOND + 0.009

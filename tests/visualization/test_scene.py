@@ -6,7 +6,6 @@ from helpers import prism
 from helpers.made_up_walk import make_row, make_walk
 from helpers.meshcat_page import commands
 from matplotlib.colors import hex2color
-from pydrake.geometry import MeshcatParams
 
 from tetra_drake.laws.terrain import Incline, Rough, Steps
 from tetra_drake.robot.ground import ground_heights
@@ -14,20 +13,20 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH, INCHES
 from tetra_drake.visualization import scene
-from tetra_drake.visualization.replay import quiet_meshcat
-
-UNEVEN = {
-    "incline": Incline(slope=0.2),
-    "steps": Steps(height=0.3 * INCH, depth=6.0 * INCH, count=3),
-    "rough": Rough(amplitude=0.3 * INCH, wavelength=4.0 * INCH),
-}
 
 
-@pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
-def test_the_drawn_floor_is_the_ground_a_node_radius_lower_as_fine_and_bounded(terrain):
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        Incline(slope=0.2),
+        Steps(height=0.3 * INCH, depth=6.0 * INCH, count=3),
+        Rough(amplitude=0.3 * INCH, wavelength=4.0 * INCH),
+    ],
+    ids=lambda terrain: type(terrain).__name__,
+)
+def test_the_drawn_floor_is_the_ground_a_node_radius_lower_and_as_fine(terrain, meshcat):
     robot = Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
     ground, radius = robot.ground, scene.drawn_radii(robot.structure)[1].min()
-    meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     points = make_walk().p_WN.values
     scene.set_surroundings(meshcat, robot, points, seen=points[0])
     page = meshcat.StaticHtml()
@@ -45,8 +44,6 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower_as_fine_and_bounded(t
         assert np.abs(above[~walls] if path == "/floor/relief" else above - 3e-4).max() < 1.1e-4
         assert (p_WV[:, :2].min(axis=0) < points.min(axis=(0, 1))[:2] - 6.0 * INCH).all()
         assert (p_WV[:, :2].max(axis=0) > points.max(axis=(0, 1))[:2] + 6.0 * INCH).all()
-
-    # The floor is as fine as the ground.
     floor = scene.floor_points(ground, np.array([[-6, -9], [60, 9]]), INCHES)
     assert floor.shape[0] * floor.shape[1] <= scene.MOST_POINTS
     inches = floor[:, 0, 0] / INCH
@@ -56,9 +53,8 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower_as_fine_and_bounded(t
     assert np.abs(error).max() < 0.01 * INCH
 
 
-def test_bodies_of_any_structure_have_their_struts_and_nodes():
+def test_bodies_of_any_structure_have_their_struts_and_nodes(meshcat):
     structure = prism.make_prism().structure
-    meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     scene.add_robot(meshcat, structure)
     page = meshcat.StaticHtml()
     shapes = {c["path"]: c["object"]["geometries"][0] for c in commands(page, "set_object")}
@@ -77,9 +73,9 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
         np.testing.assert_allclose(moved[path][:3, 3], p_BN, rtol=0, atol=1e-12)
 
 
-def test_a_sample_places_bodies_and_cables_and_colours_feet():
+def test_a_sample_places_bodies_and_cables_and_colours_feet(meshcat):
     walk = make_walk().isel(time=[50])  # T1 is lifted, T2 stands
-    robot, meshcat = make_row(), quiet_meshcat(MeshcatParams(host="localhost", port=0))
+    robot = make_row()
     scene.add_robot(meshcat, robot.structure)
     scene.place_robot(meshcat, robot.structure, walk, per_newton=1e-4)
     page = meshcat.StaticHtml()
@@ -89,6 +85,8 @@ def test_a_sample_places_bodies_and_cables_and_colours_feet():
         matrix = moved[path]
         np.testing.assert_allclose(matrix[:3, 3] - matrix[:3, 2] / 2, start, rtol=0, atol=1e-12)
         np.testing.assert_allclose(matrix[:3, 3] + matrix[:3, 2] / 2, end, rtol=0, atol=1e-12)
+    for body, place in zip(robot.structure.bodies, walk.p_WB.values[0], strict=True):
+        np.testing.assert_array_equal(moved[f"/robot/{body}"][:3, 3], place)
     told = [c for c in commands(page, "set_property") if c["property"] == "color"]
     colours = {c["path"]: c["value"] for c in told}
     lifted, stands = (colours[f"/robot/{body}/node {body} bottom_left"] for body in ("T1", "T2"))

@@ -14,13 +14,12 @@ from tetra_drake.analysis.statistics import interval, json_rows, share_interval
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.machine import versions
-from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, GivenGait, given_gait
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import varied, written
 

@@ -26,10 +26,10 @@ from tetra_drake.errors import (
 from tetra_drake.evolution.draws import combine
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.optimizers.base import Evaluation, Task
-from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
+from tetra_drake.scenario.metrics import unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ from tetra_drake.evolution.run import Run
 from tetra_drake.figures.style import (
     OKABE_ITO,
     Drawn,
-    Page,
     figure_function,
     legend_below,
     line_style,
@@ -40,12 +39,12 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
 
 
 @figure_function
-def initial_distances(run: Run, *, figure: Page | None = None) -> Drawn:
+def initial_distances(run: Run) -> Drawn:
     """Distances of the fittest and the least fit initial gait of each trial. Failed gaits are left
     out."""
     unit, width = run.scenario.units, 0.4
     extremes = initial_extremes(run) / unit.length
-    page = page_of(figure, height_in=3.6)
+    page = page_of(height_in=3.6)
     panel = page.subplots()
     blue, orange = OKABE_ITO["blue"], OKABE_ITO["orange"]
     best = panel.bar(extremes.index - width / 2, extremes["best"], width, color=blue)
@@ -68,12 +67,12 @@ def initial_distances(run: Run, *, figure: Page | None = None) -> Drawn:
 
 
 @figure_function
-def initial_fitness(run: Run, trial: int, *, figure: Page | None = None) -> Drawn:
+def initial_fitness(run: Run, trial: int) -> Drawn:
     """Histogram of the fitness of a trial's initial gaits. Gaits that walk backward are hatched."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
     fitness, backward = walked["fitness"], walked["distance"] < 0.0
-    page = page_of(figure, height_in=3.6)
+    page = page_of(height_in=3.6)
     panel = page.subplots()
     # Bin edges are round numbers, so zero is an edge if the values have both signs.
     locator = MaxNLocator(nbins=20, steps=[1, 2, 2.5, 5, 10])
@@ -98,17 +97,21 @@ def initial_fitness(run: Run, trial: int, *, figure: Page | None = None) -> Draw
 
 
 @figure_function
-def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
+def fitness_of_trials(run: Run) -> Drawn:
     """Fitness over evaluations: the mean of each trial's population, or the best if the optimiser
     reports no mean.
 
     With four trials or more, the fittest and the least fit trial are dark, the others grey. Blue:
     median and quartiles over trials. A finished trial keeps its last value in the quartiles."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
-    whole = _whole_iterations(run)
+    # The mean of a last iteration that the budget has cut would be over few gaits.
+    rows = run.iterations
+    sizes = rows.groupby("trial")["evaluations"].diff()
+    is_cut = sizes < sizes.groupby(rows["trial"]).shift()
+    whole = rows[rows.duplicated("trial", keep="last") | ~is_cut]
     table = whole.pivot(index="evaluations", columns="trial", values=f"{kind}_fitness")
     table = table.dropna(axis="columns", how="all")
-    page = page_of(figure, height_in=3.6)
+    page = page_of(height_in=3.6)
     panel = page.subplots()
     ends = table.ffill().iloc[-1].sort_values(ascending=False)
     looks = {trial: line_style(series) for series, trial in enumerate(ends.index)}
@@ -134,13 +137,3 @@ def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     legend_below(page, legend)
     set_title(page, f"{kind.capitalize()} fitness of each trial")
     return page
-
-
-def _whole_iterations(run: Run) -> pandas.DataFrame:
-    """The iterations of a run, without last iterations that were cut by the budget of evaluations.
-    Their mean would be over few gaits."""
-    rows = run.iterations
-    sizes = rows.groupby("trial")["evaluations"].diff()
-    is_last = ~rows.duplicated("trial", keep="last")
-    before = sizes.groupby(rows["trial"]).shift()
-    return rows[~(is_last & (sizes < before))]

@@ -29,8 +29,8 @@ from tetra_drake.figures.style import (
     shown_part,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.results.measures import Span, intervals, off_ground, share_of_time
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.measures import Span, intervals, off_ground, share_of_time
 
 _SECONDS = 4.0  # length of the part that is shown by default
 
@@ -47,23 +47,20 @@ _MIRRORED = 0.01  # two nodes share a panel if mean difference / mean force is a
 
 
 @figure_function
-def signals_and_tensions(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Actuation signals and the tensions of the cables that they drive, in the last 4 s.
 
     The title of a panel is the name of the cable. If a signal drives several cables, the first is
     shown. The start-up is shaded; signals are 0 there."""
-    unit, trajectory = result.scenario.units, shown_part(result.trajectory, time or _last(result))
+    unit, trajectory = result.scenario.units, _shown(result, time)
     forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
     driven = [signals.index(oscillator) for oscillator in oscillators]
     groups = len(driven) // len(np.unique(forces.cable_bodies[driven]))
     start_up = result.scenario.cpg.start_up
-    others = []
-    if float(trajectory.time[0]) < start_up:
-        others.append(Patch(color=SHADE, label="start-up"))
-    page, panels = _panels_over_time(figure, forces.cable.values[driven], groups=groups)
+    is_shown = float(trajectory.time[0]) < start_up
+    others = [Patch(color=SHADE, label="start-up")] if is_shown else []
+    page, panels = _panels_over_time(forces.cable.values[driven], groups=groups)
     for cable, oscillator, panel in zip(driven, oscillators, panels, strict=True):
         panel.axhline(0.0, color="0.6", linewidth=0.6)
         if others:
@@ -77,22 +74,24 @@ def signals_and_tensions(
 
 
 @figure_function
-def ground_forces(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Normal force and friction of the feet in the last 4 s.
 
     Friction is along x; on uneven ground, along x projected on the slope. Each foot that touches
     the ground has a panel; feet of one body with equal forces share a panel. Grey: stance. Peaks of
     impacts are cut off, because they are shorter than the time between samples."""
-    unit, end = result.scenario.units, shown_part(result.trajectory, time or _last(result))
+    unit, end = result.scenario.units, _shown(result, time)
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)
     _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)
     page, panels = _panels_over_time(
-        figure, list(feet.values()), groups=per_body.min(), beside="stands 100 %"
+        list(feet.values()), groups=per_body.min(), beside="stands 100 %"
     )
-    limits = _limits_between_impacts(forces)
+    touching = forces.where(forces.normal_force > 0.0)
+    both = touching.normal_force, touching.friction_force.sel(horizontal="x")
+    values = np.concatenate([*(each.values.ravel() for each in both), [0.0]])
+    low, high = np.nanquantile(values, [_IMPACTS, 1.0 - _IMPACTS])
+    margin = _MARGIN * (high - low)
     for foot, panel in zip(feet, panels, strict=True):
         node, stands = forces.sel(contact=foot), ~off_ground(end.sel(contact=foot))
         spans = intervals(stands.time.values, stands.values)
@@ -105,7 +104,8 @@ def ground_forces(
         panel.plot(landings, [_TOP] * len(landings), transform=above, **_LANDING)
         share = fixed(100.0 * share_of_time(stands), 0)
         panel.set_title(f"stands {share} %", loc="right", fontsize="small", pad=3.0)
-        panel.set_ylim(limits)
+        if margin > 0.0:
+            panel.set_ylim(low - margin, high + margin)
     along = "along x" if result.robot.ground.flat else "along the forward tangent"
     looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
     legend_below(page, looks, Patch(color=SHADE, label="stance"))
@@ -114,20 +114,10 @@ def ground_forces(
     return page
 
 
-def _last(result: SimulationResult) -> Span:
+def _shown(result: SimulationResult, time: Span | None) -> xarray.Dataset:
+    """The part of the trajectory between two times (s), by default its end."""
     end = float(result.trajectory.time[-1])
-    return max(0.0, end - _SECONDS), end
-
-
-def _limits_between_impacts(forces: xarray.Dataset) -> Span | None:
-    """Range of the y axis: the forces of touching nodes without impacts. None if no node touches
-    the ground."""
-    touching = forces.where(forces.normal_force > 0.0)
-    normal, friction = touching.normal_force, touching.friction_force.sel(horizontal="x")
-    values = np.concatenate([normal.values.ravel(), friction.values.ravel(), [0.0]])
-    low, high = np.nanquantile(values, [_IMPACTS, 1.0 - _IMPACTS])
-    margin = _MARGIN * (high - low)
-    return (low - margin, high + margin) if margin > 0.0 else None
+    return shown_part(result.trajectory, time or (max(0.0, end - _SECONDS), end))
 
 
 def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
@@ -151,19 +141,19 @@ def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
 
 
 def _panels_over_time(
-    figure: Page | None, names: Sequence[str], *, groups: int, beside: str = ""
+    names: Sequence[str], *, groups: int, beside: str = ""
 ) -> tuple[Page, list[Axes]]:
     """The page and a panel per name. If there are few groups of panels, each group has a column. A
     text `beside` the names has its own line if it needs one."""
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
-    width = _NAME / columns * page_width(figure)
+    width = _NAME / columns * page_width()
     names = [folded(name.replace("_", " "), width) for name in names]
     if most_lines(folded(f"{name} {beside}", width) for name in names) > most_lines(names):
         names = [f"{name}\n" for name in names]
     row = 1.05 + 0.15 * most_lines(names)
-    page = page_of(figure, height_in=1.0 + min(row * rows, 9.0))
+    page = page_of(height_in=1.0 + min(row * rows, 9.0))
     panels = panels_in_columns(
         page, len(names), columns, x_label="time (s)", sharex=True, sharey=True
     )

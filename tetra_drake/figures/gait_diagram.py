@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas
 import xarray
 from matplotlib import rcParams
 from matplotlib.axes import Axes
@@ -15,7 +16,6 @@ from tetra_drake.figures.style import (
     OKABE_ITO,
     REFERENCE,
     Drawn,
-    Page,
     figure_function,
     folded,
     most_lines,
@@ -28,10 +28,9 @@ from tetra_drake.figures.style import (
     write_beside,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.results import measures
-from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot import measures
+from tetra_drake.robot.measures import Span
 from tetra_drake.settings.units import Units
 
 _CYCLES = 3
@@ -55,57 +54,55 @@ _OTHER_FOOT = "0.35"
 
 
 @figure_function
-def gait_diagram(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
     speed of the centre of mass.
 
     A bar shows when a foot bears load. The front body is on top. The duty factor is the share of
     time during which a foot bears load. Dotted lines mark cycles. If no signal has two periods in
     the second half of the simulation, the last quarter is shown."""
-    structure, unit = result.robot.structure, result.scenario.units
-    cycle = measures.last_step(result.trajectory)
+    structure, cycle = result.robot.structure, measures.last_step(result.trajectory)
     first, end = (float(result.trajectory.time[i]) for i in (0, -1))
-    length = _LAST_SHARE * (end - first)
+    length, title = _LAST_SHARE * (end - first), "Gait diagram"
     if cycle is not None:
-        length, end = _CYCLES * (cycle[1] - cycle[0]), cycle[1]
+        period, end = cycle[1] - cycle[0], cycle[1]
+        length, title = _CYCLES * period, f"Gait diagram, cycle of {fixed(period)} s"
     trajectory = shown_part(result.trajectory, time or (max(first, end - length), end))
     # Feet are the bottom nodes of tetrahedra, and all other nodes that touch the ground.
     stands = ~measures.off_ground(trajectory)
     are_feet = np.isin(structure.contacts, structure.markers)
     stands = stands[:, stands.any("time").values | are_feet]
-    feet, width = _rows_of_feet(stands), _NAMES * page_width(figure)
+    feet, width = _rows_of_feet(stands), _NAMES * page_width()
     names_of_feet = {folded(name, width): row for name, row in _named_rows(stands, feet).items()}
     height = max(feet.values(), default=0.0) * _rows_of_names(names_of_feet)
     rows = [np.clip(height, *_ROWS), _SPEED_ROWS]
     if structure.signals:
         names = [folded(name, width) for name in own_words(structure.oscillators)]
         rows.insert(0, np.clip(structure.signals * _rows_of_names(names), *_ROWS))
-    page = page_of(figure, height_in=_ROW * sum(rows) + 1.25)
+    page = page_of(height_in=_ROW * sum(rows) + 1.25)
     panels = page.subplots(len(rows), sharex=True, height_ratios=rows)
     if structure.signals:
-        _draw_signals(panels[0], trajectory, names, unit)
+        _draw_signals(panels[0], trajectory, names, result.scenario.units)
     _draw_stance(panels[-2], stands, feet, names_of_feet)
-    _draw_speed(panels[-1], trajectory, structure, unit)
-    _mark_cycles(panels, trajectory.time.values, cycle)
-    of_cycle = "" if cycle is None else f", cycle of {fixed(cycle[1] - cycle[0])} s"
-    set_title(page, f"Gait diagram{of_cycle}")
+    _draw_speed(panels[-1], trajectory, result)
+    if cycle is not None:
+        start, stop = trajectory.time.values[[0, -1]]
+        marks = np.arange(end % period, stop, period)
+        for panel in panels:
+            panel.grid(visible=False, axis="x")
+            for mark in marks[marks >= start]:
+                panel.axvline(mark, **_CYCLE)
+    set_title(page, title)
     return page
 
 
 def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:
     """Height of each foot in the diagram, in rows. The first body (the rear) is at the bottom; a
     left foot is above the right foot."""
-    rows: dict[str, float] = {}
-    row = 0.5
-    bodies = stands.contact_body.values
-    for body in dict.fromkeys(bodies):
-        for foot in stands.contact.values[bodies == body][::-1]:
-            rows[foot] = row
-            row += 1.0
-        row += _BETWEEN_BODIES
-    return rows
+    bodies, _ = pandas.factorize(stands.contact_body.values)
+    order = sorted(range(len(bodies)), key=lambda foot: (bodies[foot], -foot))
+    heights = 0.5 + np.arange(len(order)) + _BETWEEN_BODIES * bodies[order]
+    return dict(zip(stands.contact.values[order].tolist(), heights.tolist(), strict=True))
 
 
 def _named_rows(stands: xarray.DataArray, rows: Mapping[str, float]) -> dict[str, float]:
@@ -113,10 +110,8 @@ def _named_rows(stands: xarray.DataArray, rows: Mapping[str, float]) -> dict[str
     many feet."""
     if len(rows) <= _NAMED:
         return {foot_name(foot): row for foot, row in rows.items()}
-    by_body: dict[str, list[float]] = {}
-    for foot, row in rows.items():
-        by_body.setdefault(str(stands.sel(contact=foot).contact_body.values), []).append(row)
-    return {body: float(np.mean(of)) for body, of in by_body.items()}
+    bodies = stands.contact_body.sel(contact=list(rows)).values
+    return pandas.Series(list(rows.values())).groupby(bodies, sort=False).mean().to_dict()
 
 
 def _rows_of_names(names: Iterable[str]) -> float:
@@ -162,48 +157,35 @@ def _draw_stance(
     for foot, row in rows.items():
         stance = stands.sel(contact=foot)
         spans = [(start, end - start) for start, end in measures.intervals(times, stance.values)]
-        side = foot.rpartition("_")[2]
-        colour = _STANCE.get(side, _OTHER_FOOT)
+        colour = _STANCE.get(foot.rpartition("_")[2], _OTHER_FOOT)
         panel.broken_barh(spans, (row - _BAR / 2, _BAR), facecolors=colour)
         if each:
             write_beside(panel, row, f"{fixed(100.0 * measures.share_of_time(stance), 0)} %")
     _write_names(panel, list(names), names.values())
+    name = "stance"
     if each:
         panel.set_title("duty factor", loc="right", fontsize=rcParams["ytick.labelsize"])
-        name_panel(panel, "stance")
-    else:
-        has_sides = any(foot.endswith("_left") for foot in rows)
-        name_panel(panel, "stance, left foot above right one" if has_sides else "stance")
+    elif any(foot.endswith("_left") for foot in rows):
+        name = "stance, left foot above right one"
+    name_panel(panel, name)
     panel.tick_params(axis="y", length=0)
     panel.set_ylim(-_EDGE, max(rows.values(), default=0.5) + 0.5 + _EDGE)
     panel.grid(visible=False, axis="y")
 
 
-def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, unit: Units) -> None:
-    velocity = np.einsum("tna,n->ta", trajectory.v_WN.values, structure.node_shares)
-    speed, name = velocity[:, 0], "speed along x"
+def _draw_speed(panel: Axes, trajectory: xarray.Dataset, result: SimulationResult) -> None:
+    structure, unit = result.robot.structure, result.scenario.units
+    velocity = np.einsum("tna,n->at", trajectory.v_WN.values, structure.node_shares)
+    speed, name, times = velocity[0], "speed along x", trajectory.time.values
     if structure.points_ahead:
         heading = measures.path_of_centre(trajectory, structure).heading
-        speed = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
+        speed = velocity[0] * np.cos(heading) + velocity[1] * np.sin(heading)
         name = "forward speed"
-    over_time = xarray.DataArray(speed / unit.length, {"time": trajectory.time})
-    mean = float(over_time.integrate("time") / np.ptp(trajectory.time.values))
+    speed = speed / unit.length
+    mean = float(np.trapezoid(speed, times) / np.ptp(times))
     panel.axhline(0.0, color="0.8", linewidth=0.5)
     panel.axhline(mean, **REFERENCE)
-    panel.plot(over_time.time, over_time, **_SPEED)
+    panel.plot(times, speed, **_SPEED)
     write_beside(panel, mean, f"mean\n{fixed(mean, unit.decimals + 1)}")
-    panel.set(xlabel="time (s)", xlim=trajectory.time.values[[0, -1]])
+    panel.set(xlabel="time (s)", xlim=times[[0, -1]])
     name_panel(panel, f"{name} ({unit.length_name}/s)")
-
-
-def _mark_cycles(panels: Iterable[Axes], times: np.ndarray, cycle: Span | None) -> None:
-    """Draws a line at the beginning of each cycle."""
-    if cycle is None:
-        return
-    start, end = cycle
-    period = end - start
-    first, last = np.ceil((times[0] - end) / period), np.floor((times[-1] - end) / period)
-    for panel in panels:
-        panel.grid(visible=False, axis="x")
-        for count in np.arange(first, last + 1.0):
-            panel.axvline(end + count * period, **_CYCLE)

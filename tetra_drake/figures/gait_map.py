@@ -19,18 +19,19 @@ from tetra_drake.analysis.elites import (
     notable_gaits,
 )
 from tetra_drake.evolution.run import Run, gait_label
-from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, page_of, set_title
+from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
 from tetra_drake.formatting import listed
 from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}
 _NUMBER: Any = {"ha": "center", "va": "center", "size": "small", "weight": "bold", "zorder": 4}
+_SHARES: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
 _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
 
 
 @figure_function
-def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
+def map_of_gaits(run: Run) -> Drawn:
     """Map of gaits: the fittest gait in each cell. White cells have no gait.
 
     If gaits were simulated on disturbed robots, the second panel shows the share of draws with
@@ -45,15 +46,14 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
     named = distinct_gaits(notable_gaits(run))
-    page = page_of(figure, height_in=3.9 + 0.17 * len(named))
+    page = page_of(height_in=3.9 + 0.17 * len(named))
     row = page.subplots(1, 1 + judged, squeeze=False, sharey=True)[0]
     title = f"fitness ({len(kept)} of {math.prod(kind.cells)} cells)"
-    _draw_cells(row[0], kept, kept["fitness"], edges, title=title, cmap="viridis")
+    _draw_cells(row[0], kept.set_index(CELLS)["fitness"], edges, title=title, cmap="viridis")
     if judged:
         row[0].plot(*_middles(gaits[gaits["kept"] < LUCKY], edges), **_LUCKY)
-        shares = 100.0 * gaits["kept"]
-        look: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
-        _draw_cells(row[1], gaits, shares, edges, title="draws kept (%)", **look)
+        shares = 100.0 * gaits.set_index(CELLS)["kept"]
+        _draw_cells(row[1], shares, edges, title="draws kept (%)", **_SHARES)
     named_units = {name.replace("_", " "): units.of(UNITS[name])[1] for name in kind.measures}
     x_label, y_label = (f"{name} ({unit})" if unit else name for name, unit in named_units.items())
     row[0].set(ylabel=y_label)
@@ -69,19 +69,12 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
 
 
 def _draw_cells(
-    axes: Axes,
-    gaits: pandas.DataFrame,
-    values: pandas.Series,
-    edges: Sequence[np.ndarray],
-    *,
-    title: str,
-    **look: Any,
+    axes: Axes, values: pandas.Series, edges: Sequence[np.ndarray], *, title: str, **look: Any
 ) -> None:
-    """Colours the cell of each gait by the value of the gait."""
-    grid = np.full([len(edge) - 1 for edge in edges], np.nan)
-    across, up = CELLS
-    grid[gaits[across], gaits[up]] = values
-    mesh = axes.pcolormesh(*edges, grid.T, rasterized=True, **look)
+    """Colours cells by their values; the index of a value is its cell."""
+    across, up = (range(len(edge) - 1) for edge in edges)
+    grid = values.unstack().reindex(index=across, columns=up)
+    mesh = axes.pcolormesh(*edges, grid.to_numpy().T, rasterized=True, **look)
     axes.figure.colorbar(mesh, ax=axes)
     axes.grid(visible=False)
     name_panel(axes, title)

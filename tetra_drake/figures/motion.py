@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from tetra_drake.figures.style import (
+    GIVEN,
     LINE_COLOURS,
     OKABE_ITO,
     Drawn,
@@ -29,13 +30,12 @@ from tetra_drake.figures.style import (
     shown_part,
 )
 from tetra_drake.formatting import fixed, signed
-from tetra_drake.results import measures
-from tetra_drake.results.measures import Span
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot import measures
 from tetra_drake.robot.ground import ground_heights
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.measures import Span
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
-from tetra_drake.settings.units import INCH, Units
+from tetra_drake.settings.units import INCH
 
 X, Y, Z = range(3)
 
@@ -57,19 +57,19 @@ _HEADING: Any = {"color": OKABE_ITO["vermillion"], "zorder": 2.5, "width": 0.004
 _HEADING_MARK: Any = {"color": OKABE_ITO["vermillion"], "marker": ">", "linestyle": "-"}
 _BEFORE: Any = {"color": "0.5", "linewidth": 1.3, "linestyle": "-"}
 _AFTER: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.6, "linestyle": "-"}
+_NAMED: Any = {"ha": "center", "va": "center", "fontsize": "small"}
+_NAMED["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 
 
 @figure_function
-def relative_distances(
-    result: SimulationResult, *, figure: Page | None = None, time: Span | None = None
-) -> Drawn:
+def relative_distances(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Distance along x of each body from the first body, over time. Distances are between centres
     of mass. Grey lines: the distances at the start."""
-    unit, trajectory = result.scenario.units, shown_part(result.trajectory, time)
-    distances = measures.relative_distances(trajectory) / unit.length
+    unit, x = result.scenario.units, shown_part(result.trajectory, time).p_WB.sel(axis="x")
+    distances = (x - x.isel(body=0)) / unit.length
     first, *names = distances.body.values
     height = np.clip(1.5 + 0.6 * len(names), 2.4, 6.5)
-    page, width = page_of(figure, height_in=height), 0.3 * page_width(figure)
+    page, width = page_of(height_in=height), 0.3 * page_width()
     panel = page.subplots()
     for i, name in enumerate(names):
         line = distances.sel(body=name)
@@ -85,23 +85,18 @@ def relative_distances(
 
 @figure_function
 def before_and_after(
-    initial: SimulationResult,
-    best: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
+    initial: SimulationResult, best: SimulationResult, *, time: Span | None = None
 ) -> Drawn:
     """Distance walked over time, before and after evolution: the best initial gait and the best
     gait of the best trial."""
     unit = best.scenario.units
-    page = page_of(figure, height_in=3.8)
+    page = page_of(height_in=3.8)
     panel = page.subplots()
     legend = {}
     for when, result, look in (("before", initial, _BEFORE), ("after", best, _AFTER)):
-        part = shown_part(result.trajectory, time)
-        walked = _distance_walked(result, unit).sel(time=part.time)
-        panel.plot(walked.time, walked, **look)
-        way = f"{fixed(float(walked[-1]), unit.decimals + 1)} {unit.length_name}"
+        part = shown_part(_with_distance(result), time)
+        panel.plot(part.time, part.walked, **look)
+        way = f"{fixed(float(part.walked[-1]), unit.decimals + 1)} {unit.length_name}"
         legend[f"{when}: {way}, {result.name}"] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
     legend_below(page, legend)
@@ -110,35 +105,29 @@ def before_and_after(
 
 
 @figure_function
-def time_lapse(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
-    instants: int = 6,
-) -> Drawn:
+def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: int = 6) -> Drawn:
     """Time lapse of the robot from above, to scale, with the distance walked. Forward is to the
     right. The line is the path of the centre so far, with a dot at each full second."""
     structure, unit = result.robot.structure, result.scenario.units
-    trajectory = shown_part(result.trajectory, time)
-    first, last = (float(trajectory.time[i]) for i in (0, -1))
+    trajectory = shown_part(_with_distance(result), time)
+    first, last = trajectory.time.values[[0, -1]]
     samples = _nearest(trajectory, np.linspace(first, last, instants))
-    nodes, walked = trajectory.p_WN.values / unit.length, _distance_walked(result, unit)
+    nodes = trajectory.p_WN.values[..., [X, Y]] / unit.length
     centre = structure.node_shares @ nodes
-    shown = np.concatenate([nodes[samples].reshape(-1, 3), centre])
-    wide, high = (_range(shown[:, axis], result.robot, unit) for axis in (X, Y))
-    columns, height = _fit(instants, wide, high, figure, height_in=6.0)
-    page = page_of(figure, height_in=height + 0.9)
+    shown = np.concatenate([nodes[samples].reshape(-1, 2), centre])
+    wide, high = (_range(shown[:, axis], result) for axis in (X, Y))
+    columns, height = _fit(instants, wide, high, height_in=6.0)
+    page = page_of(height_in=height + 0.9)
     x_label = f"x, forward ({unit.length_name}) →"
     panels = panels_in_columns(page, instants, columns, x_label=x_label)
     looks = [{"color": LINE_COLOURS[i % len(LINE_COLOURS)]} for i in range(len(structure.bodies))]
     for sample, panel in zip(samples, panels, strict=True):
         now = float(trajectory.time[sample])
-        _draw_struts(panel, nodes[sample][:, [X, Y]], structure, [look["color"] for look in looks])
+        _draw_struts(panel, nodes[sample], structure, [look["color"] for look in looks])
         seconds = _nearest(trajectory, np.arange(math.ceil(first), now + 1e-9))
-        panel.plot(centre[: sample + 1, X], centre[: sample + 1, Y], **_WAY)
-        panel.plot(centre[seconds, X], centre[seconds, Y], **_SECONDS)
-        way = signed(float(walked.sel(time=now)), unit.decimals + 1)
+        panel.plot(*centre[: sample + 1].T, **_WAY)
+        panel.plot(*centre[seconds].T, **_SECONDS)
+        way = signed(float(trajectory.walked[sample]), unit.decimals + 1)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
     legend = {"path of the centre": _WAY}
@@ -151,11 +140,7 @@ def time_lapse(
 
 @figure_function
 def path_of_the_centre(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
-    instants: int = 9,
+    result: SimulationResult, *, time: Span | None = None, instants: int = 9
 ) -> Drawn:
     """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
     straight, its height along x is shown instead."""
@@ -163,14 +148,22 @@ def path_of_the_centre(
     trajectory = shown_part(result.trajectory, time)
     path = measures.path_of_centre(trajectory, structure)
     points = path.centre / unit.length
-    if np.ptp(points[:, Y]) < _STRAIGHT * np.ptp(points[:, X]):
-        return _draw_height(page_of(figure, height_in=2.6), points, result.robot, unit)
-    least = _margin(result.robot) / unit.length
-    ratio = np.ptp(points[:, Y]) / max(np.ptp(points[:, X]), least)
-    page = page_of(figure, height_in=min(rcParams["figure.figsize"][0] * ratio, 5.0) + 1.4)
+    wide, high, _ = np.ptp(points, axis=0)
+    is_straight = high < _STRAIGHT * wide
+    ratio = high / max(wide, _margin(result))
+    to_scale = min(rcParams["figure.figsize"][0] * ratio, 5.0) + 1.4
+    page = page_of(height_in=2.6 if is_straight else to_scale)
     panel = page.subplots()
+    panel.set_xlabel(f"x ({unit.length_name})")
+    panel.plot(points[:, X], points[:, Z if is_straight else Y], **_PATH)
+    if is_straight:
+        if not result.robot.ground.flat:
+            panel.plot(points[:, X], _heights_below(points, result), **_GROUND)
+        panel.set_ylabel(f"height ({unit.length_name})")
+        panel.margins(x=0.02, y=0.1)
+        set_title(page, "Height of the centre along its path")
+        return page
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
-    panel.plot(points[:, X], points[:, Y], **_PATH)
     if structure.points_ahead:
         looks["heading"] = _HEADING_MARK
         samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
@@ -180,148 +173,118 @@ def path_of_the_centre(
     panel.plot(points[-1, X], points[-1, Y], **_END)
     panel.margins(0.1)
     panel.set_aspect("equal", adjustable="datalim")
-    panel.set(xlabel=f"x ({unit.length_name})", ylabel=f"y ({unit.length_name})")
+    panel.set_ylabel(f"y ({unit.length_name})")
     legend_below(page, looks)
     set_title(page, "Path of the centre from above")
     return page
 
 
-def _draw_height(page: Page, points: np.ndarray, robot: Robot, unit: Units) -> Page:
-    """Draws the height of a path (samples, 3) along x, and uneven ground below it."""
-    panel = page.subplots()
-    panel.plot(points[:, X], points[:, Z], **_PATH)
-    if not robot.ground.flat:
-        heights = ground_heights(points[:, :2] * unit.length, robot.ground) / unit.length
-        panel.plot(points[:, X], heights, **_GROUND)
-    panel.set(xlabel=f"x ({unit.length_name})", ylabel=f"height ({unit.length_name})")
-    panel.margins(x=0.02, y=0.1)
-    set_title(page, "Height of the centre along its path")
-    return page
-
-
 @figure_function
-def one_step(
-    result: SimulationResult,
-    *,
-    figure: Page | None = None,
-    time: Span | None = None,
-    instants: int = 6,
-) -> Drawn:
+def one_step(result: SimulationResult, *, time: Span | None = None, instants: int = 6) -> Drawn:
     """One step to scale, from above and from the side. Bodies off the ground are red.
 
     A body is off the ground if all its feet are higher than 2 % of the robot's height. The lower
     panels show the path of one bottom node per body, or of the centre. If no signal has two periods
     in the second half of the simulation, the last quarter is shown."""
-    robot, unit = result.robot, result.scenario.units
-    structure = robot.structure
-    ends, title = _shown_step(result, time)
-    step = shown_part(result.trajectory, ends)
-    samples, nodes = _nearest(step, np.linspace(*ends, instants)), step.p_WN.values / unit.length
-    grounds = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
-    heights = np.concatenate([nodes[..., Z].ravel(), *(ground[:, Z] for ground in grounds)])
-    wide, above, side = (_range(v, robot, unit) for v in (nodes[..., X], nodes[..., Y], heights))
-    shifts = {Y: 0.0, Z: above[0] - side[1]}  # of each view along the page
-    high = side[0] + shifts[Z], above[1]
-    columns, height = _fit(instants, wide, high, figure, height_in=5.5)
-    names = structure.bodies if structure.markers.size else (structure.followed,)
-    paths_height = 1.1 * math.ceil(len(names) / _PATHS) + 0.4
-    parts = [min(height + 0.4, 5.0 * paths_height), paths_height]
-    page = page_of(figure, height_in=sum(parts) + 0.5)
+    structure, unit = result.robot.structure, result.scenario.units
+    end = float(result.trajectory.time[-1])
+    cycle = time or measures.last_step(result.trajectory)
+    start, end = cycle or (0.75 * end, end)
+    step = shown_part(result.trajectory, (start, end))
+    samples = _nearest(step, np.linspace(start, end, instants))
+    nodes = step.p_WN.values / unit.length
+    lifted, least = _off_ground(step, result)
+    wide, across = (_range(nodes[..., axis], result) for axis in (X, Y))
+    x = np.arange(*wide, _PROFILE * structure.scale / unit.length)
+    middle = nodes[samples, :, Y].mean(axis=1, keepdims=True)
+    profiles = _heights_below(np.stack(np.broadcast_arrays(x, middle), axis=-1), result)
+    low, high = _range(np.append(nodes[..., Z], profiles), result)
+    below = across[0] - high  # the side view stands below the view from above
+    views = nodes[..., [X, Y]], nodes[..., [X, Z]] + [0.0, below]
+    tall = low + below, across[1]
+    columns, height = _fit(instants, wide, tall, height_in=5.5)
+    paths = followed_nodes(nodes, structure)[:, ::2]  # every second node is a left one
+    of_paths = 1.1 * math.ceil(paths.shape[1] / _PATHS) + 0.4
+    parts = [min(height + 0.4, 5.0 * of_paths), of_paths]
+    page = page_of(height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
     panels = panels_in_columns(upper, instants, columns, x_label=f"x ({unit.length_name})")
-    paths, (lifted, least) = followed_nodes(nodes, structure), _clear_of_ground(step, robot)
-    for sample, ground, panel in zip(samples, grounds, panels, strict=True):
-        name_panel(panel, f"{float(step.time[sample]) - ends[0]:.2f} s")
-        panel.plot(ground[:, X], ground[:, Z] + shifts[Z], **_GROUND)
+    for sample, profile, panel in zip(samples, profiles, panels, strict=True):
+        name_panel(panel, f"{float(step.time[sample]) - start:.2f} s")
+        panel.plot(x, profile + below, **_GROUND)
         colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
-        for axis, shift in shifts.items():
-            path, points = paths[: sample + 1], nodes[sample][:, [X, axis]] + [0.0, shift]
-            panel.plot(path[..., X], path[..., axis] + shift, **_PATH)
-            _draw_struts(panel, points, structure, colours)
-        _to_scale(panel, wide, high)
+        for view in views:
+            path = followed_nodes(view[: sample + 1], structure)
+            panel.plot(path[..., 0], path[..., 1], **_PATH)
+            _draw_struts(panel, view[sample], structure, colours)
+        _to_scale(panel, wide, tall)
     for panel in panels[::columns]:
-        panel.set_yticks([np.mean(above), np.mean(side) + shifts[Z]], ["above", "side"])
+        panel.set_yticks([np.mean(across), np.mean([low, high]) + below], ["above", "side"])
     if structure.markers.size:
-        _name_ends(panels[0], nodes[samples[0]], structure)
-    else:
-        lifted = np.all(lifted, axis=1, keepdims=True)
-    _draw_paths(lower, names, paths[:, ::2], lifted, robot, unit)  # every second node is a left one
+        for body in (0, len(structure.bodies) - 1):
+            middle = views[0][samples[0], structure.carriers == body].mean(axis=0)
+            panels[0].text(middle[0], middle[1], structure.bodies[body], **_NAMED)
+    _draw_paths(lower, paths, lifted, result)
     looks = {
-        f"over {least / unit.length:.1g} {unit.length_name} off the ground": {"color": _LIFTED},
+        f"over {least:.1g} {unit.length_name} off the ground": {"color": _LIFTED},
         "on the ground": {"color": _ON_GROUND},
         f"path of the {structure.followed}": _PATH,
     }
     legend_below(page, looks)
-    set_title(page, f"{title}, {ends[0]:.2f} to {ends[1]:.2f} s")
+    title = "One step" if cycle else "The last quarter"
+    set_title(page, f"{title}, {start:.2f} to {end:.2f} s")
     return page
 
 
-def _shown_step(result: SimulationResult, time: Span | None) -> tuple[Span, str]:
-    """Start and end (s) of the time to show, and its title."""
-    ends = time or measures.last_step(result.trajectory)
-    if ends is not None:
-        return ends, "One step"
-    end = float(result.trajectory.time[-1])
-    return (0.75 * end, end), "The last quarter"
-
-
-def _clear_of_ground(trajectory: xarray.Dataset, robot: Robot) -> tuple[np.ndarray, float]:
-    """True if all feet of a body are off the ground (samples, bodies), and the least height (m)
-    that counts as off the ground."""
-    structure = robot.structure
+def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[np.ndarray, float]:
+    """True if all feet of a body are off the ground (samples, bodies), and the least height that
+    counts as off the ground, in the unit of length."""
+    structure, ground = result.robot.structure, result.robot.ground
     start, contacts = node_positions(structure, structure.initial_state), structure.contacts
     feet, least = trajectory.p_WN.values[:, contacts], _CLEARANCE * float(np.ptp(start[:, Z]))
-    lowest = feet[..., Z] - robot.ground.radius
-    clear = lowest - ground_heights(feet[..., :2], robot.ground) > least
+    clear = feet[..., Z] - ground.radius - ground_heights(feet[..., :2], ground) > least
     bodies, of_foot = range(len(structure.bodies)), structure.carriers[contacts]
-    return np.stack([clear[:, of_foot == body].all(axis=1) for body in bodies], axis=1), least
-
-
-def _profile(nodes: np.ndarray, sample: int, robot: Robot) -> np.ndarray:
-    """Profile of the ground along x, as points (points, 3) in m.
-
-    It spans the range of all nodes (samples, nodes, 3); y is their mean in one sample.
-    """
-    x, margin, distance = nodes[..., X], _margin(robot), _PROFILE * robot.structure.scale
-    x = np.arange(x.min() - margin, x.max() + margin, distance)
-    y = np.full_like(x, nodes[sample, ..., Y].mean())
-    return np.column_stack([x, y, ground_heights(np.column_stack([x, y]), robot.ground)])
+    lifted = [clear[:, of_foot == body].all(axis=1) for body in bodies]
+    return np.stack(lifted, axis=1), least / result.scenario.units.length
 
 
 def _draw_paths(
-    page: Page,
-    names: Sequence[str],
-    paths: np.ndarray,
-    lifted: np.ndarray,
-    robot: Robot,
-    unit: Units,
+    page: Page, paths: np.ndarray, lifted: np.ndarray, result: SimulationResult
 ) -> None:
-    """Draws paths (samples, names, 3) enlarged; parts that are `lifted` (samples, names) are
-    red."""
-    columns, x_label = min(len(names), _PATHS), f"forward ({unit.length_name})"
+    """Draws the paths (samples, paths, 3) of one node per body, or of the centre, enlarged. They
+    are red where the body, or all bodies, are `lifted` (samples, bodies)."""
+    names, length = result.robot.structure.bodies, result.scenario.units.length_name
+    if not result.robot.structure.markers.size:
+        names, lifted = (result.robot.structure.followed,), np.all(lifted, axis=1, keepdims=True)
+    columns, x_label = min(len(names), _PATHS), f"forward ({length})"
     panels = panels_in_columns(page, len(names), columns, x_label=x_label, sharex=True, sharey=True)
     for i, (name, panel) in enumerate(zip(names, panels, strict=True)):
         path = paths[:, i]
         x, z = path[:, X] - path[0, X], path[:, Z]
-        if not robot.ground.flat:
-            below = ground_heights(path[:, :2] * unit.length, robot.ground) / unit.length
+        if not result.robot.ground.flat:
+            below = _heights_below(path, result)
             z, below = z - below[0], below - below[0]
             panel.plot(x, below, **_GROUND)
         panel.plot(x, z, **_PATH)
         panel.plot(x, np.where(lifted[:, i], z, np.nan), color=_LIFTED, linewidth=1.6)
         panel.plot(x[0], z[0], "o", color="black")
         panel.margins(0.08)
-        least = _margin(robot) / 6 / unit.length  # a range even for a node that does not move
+        least = _margin(result) / 6  # a range even for a node that does not move
         panel.update_datalim([(-least, z.min()), (least, z.min() + least)])
         name_panel(panel, name)
-    panels[0].set_ylabel(f"height ({unit.length_name})")
+    panels[0].set_ylabel(f"height ({length})")
 
 
-def _distance_walked(result: SimulationResult, unit: Units) -> xarray.DataArray:
-    """Distance walked since the start of the simulation (time,)."""
-    trajectory = result.trajectory
-    walked = measures.distance_walked(trajectory, result.robot.structure) / unit.length
-    return xarray.DataArray(walked, dims="time", coords={"time": trajectory.time})
+def _with_distance(result: SimulationResult) -> xarray.Dataset:
+    """The trajectory with the distance `walked` since the start of the simulation (time,)."""
+    walked = measures.distance_walked(result.trajectory, result.robot.structure)
+    return result.trajectory.assign(walked=("time", walked / result.scenario.units.length))
+
+
+def _heights_below(points: np.ndarray, result: SimulationResult) -> np.ndarray:
+    """Heights of the ground (...) below points (..., 2 or 3); all in the unit of length."""
+    length = result.scenario.units.length
+    return ground_heights(points[..., :2] * length, result.robot.ground) / length
 
 
 def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
@@ -329,35 +292,30 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
-def _margin(robot: Robot) -> float:
-    """Free space (m) around a robot."""
-    return _MARGIN * robot.structure.scale
+def _margin(result: SimulationResult) -> float:
+    """Free space around the robot, in the unit of length."""
+    return _MARGIN * result.robot.structure.scale / result.scenario.units.length
 
 
-def _range(values: np.ndarray, robot: Robot, unit: Units) -> Span:
-    """Range of coordinates with a margin."""
-    margin = _margin(robot) / unit.length
+def _range(values: np.ndarray, result: SimulationResult) -> Span:
+    """Range of coordinates with a margin, in the unit of length."""
+    margin = _margin(result)
     return float(values.min()) - margin, float(values.max()) + margin
 
 
-def _fit(
-    count: int, wide: Span, high: Span, figure: Page | None, *, height_in: float
-) -> tuple[int, float]:
+def _fit(count: int, wide: Span, high: Span, *, height_in: float) -> tuple[int, float]:
     """Number of columns for which `count` pictures are largest, and the height (in) of all rows.
 
     `wide` and `high` are the ranges that a picture shows. The pictures fill the caller's figure, or
     a page of the height `height_in`.
     """
-    whole = page_width(figure)
-    page_height = height_in if figure is None else figure.bbox.height / figure.dpi
+    page, columns = GIVEN.get(), np.arange(1, count + 1)
+    width, rows = page_width(), np.ceil(count / columns)
+    height = height_in if page is None else page.bbox.height / page.dpi
     ratio = (high[1] - high[0]) / (wide[1] - wide[0])
-
-    def width(columns: int) -> float:
-        return min(whole / columns, page_height / math.ceil(count / columns) / ratio)
-
-    columns = max(range(1, count + 1), key=width)
-    row = (whole / columns - _GAP) * ratio + _PANEL_NAME
-    return columns, row * math.ceil(count / columns)
+    best = np.minimum(width / columns, height / rows / ratio).argmax()
+    row = (width / columns[best] - _GAP) * ratio + _PANEL_NAME
+    return int(columns[best]), float(row * rows[best])
 
 
 def _to_scale(panel: Axes, wide: Span, high: Span) -> None:
@@ -375,13 +333,3 @@ def _draw_struts(
     of_struts = [colours[body] for body in structure.carriers[structure.struts[:, 0]]]
     lines = LineCollection(list(points[structure.struts]), colors=of_struts, linewidths=1.2)
     panel.add_collection(lines, autolim=False)
-
-
-def _name_ends(panel: Axes, nodes: np.ndarray, structure: Structure) -> None:
-    """Writes the names of the first and the last body at the centres of their nodes, as seen from
-    above. `nodes` (nodes, 3) are the positions of all nodes."""
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-    look: Any = {"ha": "center", "va": "center", "fontsize": "small", "bbox": box}
-    for body in (0, len(structure.bodies) - 1):
-        x, y, _ = nodes[structure.carriers == body].mean(axis=0)
-        panel.text(x, y, structure.bodies[body], **look)

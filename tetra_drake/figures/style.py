@@ -1,7 +1,8 @@
 """Common style of figures; saving of figures.
 
-A figure function has the decorator `@figure_function`, which adds the keywords of Look and `units`.
-It draws on page_of(): the caller's figure, or a new one with matplotlib's constrained layout.
+A figure function has the decorator `@figure_function`, which adds the keywords of Look, `units` and
+`figure`. It draws on page_of(): the caller's figure, or a new one with matplotlib's constrained
+layout.
 save_figure() writes a figure to files. Figures need neither a display nor pyplot.
 """
 
@@ -15,6 +16,7 @@ import json
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -32,7 +34,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file, write_whole
-from tetra_drake.results.measures import Span
+from tetra_drake.robot.measures import Span
 from tetra_drake.settings.units import shown_in
 
 Page: TypeAlias = Figure | SubFigure
@@ -40,6 +42,9 @@ Page: TypeAlias = Figure | SubFigure
 
 Drawn: TypeAlias = Figure | Any
 """A new figure. None if the caller gave the figure: a notebook would show a returned one twice."""
+
+GIVEN: ContextVar[Page | None] = ContextVar("figure", default=None)
+"""The figure of the caller on which a figure function draws; None for a new one."""
 
 OKABE_ITO = {
     "black": "#000000",
@@ -158,28 +163,31 @@ def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
     """
 
     @functools.wraps(draw)
-    def drawn(*args: Any, units: str | None = None, **kwargs: Any) -> Drawn:
-        figure = kwargs.get("figure")
+    def make(*args: Any, figure: Page | None = None, units: str | None = None, **own: Any) -> Drawn:
         if not isinstance(figure, Page | None):
             kind = type(figure).__name__
             problem = f"found a value of type {kind}, expected matplotlib's Figure or SubFigure"
             raise InputError(draw.__name__, "figure", problem)
-        look = Look(**{name: kwargs.pop(name) for name in vars(Look()) if name in kwargs})
-        with shown_in(units), common_style(look):
-            rcParams["text.parse_math"] = False  # a name may hold a dollar sign
-            page = draw(*args, **kwargs)
+        look = Look(**{name: own.pop(name) for name in vars(Look()) if name in own})
+        token = GIVEN.set(figure)
+        try:
+            with shown_in(units), common_style(look):
+                rcParams["text.parse_math"] = False  # a name may hold a dollar sign
+                page = draw(*args, **own)
+        finally:
+            GIVEN.reset(token)
         if not look.title:
             page.suptitle("").set_in_layout(False)
         return page if figure is None else None
 
     keyword = inspect.Parameter.KEYWORD_ONLY
     of_look = inspect.signature(Look).parameters.values()
-    added = [inspect.Parameter("units", keyword, default=None)]
+    added = [inspect.Parameter(name, keyword, default=None) for name in ("figure", "units")]
     added += [parameter.replace(kind=keyword) for parameter in of_look]
-    own = inspect.signature(draw)
-    shown: Any = drawn
-    shown.__signature__ = own.replace(parameters=[*own.parameters.values(), *added])
-    return drawn
+    before = inspect.signature(draw)
+    shown: Any = make
+    shown.__signature__ = before.replace(parameters=[*before.parameters.values(), *added])
+    return make
 
 
 class ShownFigure(Figure):
@@ -191,9 +199,10 @@ class ShownFigure(Figure):
         return file.getvalue()
 
 
-def page_of(figure: Page | None, *, height_in: float) -> Page:
+def page_of(*, height_in: float) -> Page:
     """The figure to draw on: the caller's, or a new one, `height_in` inches high with letters of
     the usual size. It gets the constrained layout, unless the caller has set another layout."""
+    figure = GIVEN.get()
     if figure is None:
         height = height_in * rcParams["font.size"] / Look.font_size
         return ShownFigure(figsize=(rcParams["figure.figsize"][0], height), layout="constrained")
@@ -211,9 +220,10 @@ def make_figure(
     return figure, figure.subplots(rows, columns, squeeze=False, **layout)
 
 
-def page_width(figure: Page | None) -> float:
-    """Width (in) of the page on which page_of() draws."""
-    return rcParams["figure.figsize"][0] if figure is None else figure.bbox.width / figure.dpi
+def page_width(page: Page | None = None) -> float:
+    """Width (in) of a page, by default of the page on which page_of() draws."""
+    page = page or GIVEN.get()
+    return rcParams["figure.figsize"][0] if page is None else page.bbox.width / page.dpi
 
 
 def folded(text: str, width_in: float, *, size: float | None = None) -> str:

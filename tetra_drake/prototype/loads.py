@@ -12,7 +12,6 @@ import xarray
 from tetra_drake.laws import actuator
 from tetra_drake.laws.actuator import DrivenCables
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
 
 _TOLERANCE = 1e-9
@@ -58,7 +57,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         _, _, drive_rate, limited, beside = pull(drives + _TOLERANCE, length, rate, signal, *law)
         load, left = tension - beside, actuator.wound(constants, drives, length)
         rate = actuator.wound(constants, drive_rate, rate)
-    power, steady = -load * rate, trajectory.time.values >= steady_start(robot.scenario)
+    settling_time, start_up = robot.scenario.simulation.settling_time, robot.scenario.cpg.start_up
+    power, steady = -load * rate, trajectory.time.values >= max(settling_time, start_up)
     columns = {
         "peak_force_N": load.max(axis=0),
         "limit_of_force_N": limits.max_force,

@@ -77,19 +77,28 @@ def load_result(folder: str | Path) -> SimulationResult:
         if not os.path.isfile(folder / name):
             problem = f"holds no {name}, so it was not written by `simulate`"
             raise InputError(folder, name, problem)
-    scenario, file = load_scenario(folder / SCENARIO), _read_result_file(folder / RESULT)
+    scenario, path = load_scenario(folder / SCENARIO), folder / RESULT
+    content = read_json(path, "result")
+    if isinstance(content, dict):
+        content = {name: content[name] for name in _ResultFile.model_fields if name in content}
+    file = _ResultFile.from_tree(content, path)
+    metrics = dict.fromkeys([*METRICS, "lifted_shares"], "") | file.metrics
+    if name := wrong_metric(metrics):
+        raise InputError(path, f"metrics.{name}", "is missing, or of a wrong type")
+    numbers = {name: math.nan if metrics[name] is None else metrics[name] for name in METRICS}
+    shares = tuple(metrics["lifted_shares"])
     if file.gait is None:  # a command was played
         gait, robot = None, robot_without_network(scenario)
     else:
-        gait, robot = load_gait(folder / RESULT, scenario, key="gait"), Robot.of(scenario)
+        gait, robot = load_gait(path, scenario, key="gait"), Robot.of(scenario)
     trajectory = _load_trajectory(folder / TRAJECTORY, robot.structure)
     return SimulationResult(
         scenario=scenario,
         robot=robot,
         name=file.name,
         gait=gait,
-        metrics=Metrics(**file.metrics, units=scenario.units),
-        fitness=_number(file.fitness),
+        metrics=Metrics(**numbers, lifted_shares=shares, units=scenario.units),
+        fitness=math.nan if file.fitness is None else file.fitness,
         duration=file.duration_s,
         wall_time=file.wall_time_s,
         integrator=file.integrator,
@@ -112,25 +121,6 @@ class _ResultFile(Section):
     gait: Any
     """See GaitFile; None if a command was played."""
     path: PathColumns
-
-
-def _read_result_file(path: Path) -> _ResultFile:
-    """Reads result.json. Raises InputError if a key is missing."""
-    content = read_json(path, "result")
-    if isinstance(content, dict):
-        content = {name: content[name] for name in _ResultFile.model_fields if name in content}
-    file = _ResultFile.from_tree(content, path)
-    metrics = dict.fromkeys([*METRICS, "lifted_shares"], "") | file.metrics
-    if name := wrong_metric(metrics):
-        raise InputError(path, f"metrics.{name}", "is missing, or of a wrong type")
-    numbers: dict[str, Any] = {name: _number(metrics[name]) for name in METRICS}
-    numbers["lifted_shares"] = tuple(metrics["lifted_shares"])
-    return file.model_copy(update={"metrics": numbers})
-
-
-def _number(value: float | None) -> float:
-    """A number of a JSON file; NaN for null."""
-    return math.nan if value is None else value
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:

@@ -5,8 +5,9 @@ A figure has the name of the function that draws it. The function's docstring is
 
 from __future__ import annotations
 
+import base64
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,10 +16,23 @@ import pandas
 
 from tetra_drake.analysis.elites import elites
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.run import Run, gait_label
-from tetra_drake.figures import fitness, forces, motion
+from tetra_drake.evolution.run import Run
+from tetra_drake.figures.fitness import (
+    fitness_of_trials,
+    initial_distances,
+    initial_extremes,
+    initial_fitness,
+)
+from tetra_drake.figures.forces import ground_forces, signals_and_tensions
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.gait_map import map_of_gaits
+from tetra_drake.figures.motion import (
+    before_and_after,
+    one_step,
+    path_of_the_centre,
+    relative_distances,
+    time_lapse,
+)
 from tetra_drake.figures.style import AS_USUAL, Print, save_figure
 from tetra_drake.results.result import SimulationResult
 
@@ -37,14 +51,9 @@ class RecordedGait:
     """Result of the new simulation, with trajectory."""
 
     @property
-    def label(self) -> str:
-        """Trial and evaluation of the gait, as text."""
-        return gait_label(self.recorded)
-
-    @property
-    def distance(self) -> float:
-        """Distance (m) in the new simulation."""
-        return self.result.metrics.distance
+    def change(self) -> float:
+        """Difference (m) between the distances in the new simulation and in the record."""
+        return abs(self.result.metrics.distance - self.recorded["distance"])
 
 
 @dataclass(frozen=True)
@@ -56,11 +65,6 @@ class ShownGaits:
     """Fittest gait of the run."""
     initial: RecordedGait
     """Fittest initial gait of the same trial; see Run.initial_best()."""
-
-    @property
-    def trial(self) -> int:
-        """Trial with the fittest gait."""
-        return int(self.best.recorded["trial"])
 
 
 def simulate_shown_gaits(run: Run) -> ShownGaits:
@@ -82,57 +86,65 @@ def simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
     return RecordedGait(recorded, simulate(run.scenario, gait, record=True))
 
 
-class DrawnFigure(NamedTuple):
-    """A figure that was written to a folder."""
+class Picture(NamedTuple):
+    """A figure of a report."""
 
     part: str
     """Part of the report that shows it: "gait", "evolution" or "forces"."""
-    name: str
-    caption: str
+    is_there: bool
+    """False if there is nothing to draw."""
+    draw: Callable[..., Any]
+    """Figure function."""
+    data: Sequence[Any]
+    """Arguments of the figure function."""
+
+    @property
+    def name(self) -> str:
+        """Name of the figure and of its files."""
+        return self.draw.__name__
+
+    @property
+    def caption(self) -> str:
+        """Caption of the figure, in one line."""
+        return " ".join((inspect.getdoc(self.draw) or "").split())
+
+    def image(self, folder: Path) -> str:
+        """URL with the figure's content. Embedded directly, ids of two SVGs would clash."""
+        content = base64.b64encode((folder / f"{self.name}.svg").read_bytes()).decode()
+        return f"data:image/svg+xml;base64,{content}"
 
 
-def draw_trajectory(
-    result: SimulationResult, folder: Path, printed: Print = AS_USUAL
-) -> list[DrawnFigure]:
-    """Writes the figures of one simulation. Raises InputError if a file cannot be written."""
-    of_gait = [(gait_diagram, result), (motion.time_lapse, result)]
-    of_forces = [
-        (motion.path_of_the_centre, result),
-        (motion.relative_distances, result),
-        (motion.one_step, result),
+def pictures_of_gait(result: SimulationResult) -> list[Picture]:
+    """The figures of one simulation."""
+    structure = result.robot.structure
+    return [
+        Picture("gait", True, gait_diagram, [result]),
+        Picture("gait", True, time_lapse, [result]),
+        Picture("forces", True, path_of_the_centre, [result]),
+        Picture("forces", True, relative_distances, [result]),
+        Picture("forces", True, one_step, [result]),
+        Picture("forces", structure.signals > 0, signals_and_tensions, [result]),
+        Picture("forces", len(structure.contacts) > 0, ground_forces, [result]),
     ]
-    if result.robot.structure.signals:
-        of_forces.append((forces.signals_and_tensions, result))
-    if len(result.robot.structure.contacts):
-        of_forces.append((forces.ground_forces, result))
-    drawn = _save(folder, "gait", of_gait, printed)
-    return drawn + _save(folder, "forces", of_forces, printed)
 
 
-def draw_run(shown: ShownGaits, folder: Path, printed: Print = AS_USUAL) -> list[DrawnFigure]:
-    """Writes the figures of a run and of its best gait."""
-    run = shown.run
-    pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
-    trials = fitness.initial_extremes(run).index
-    if len(trials):
-        pictures.append((fitness.initial_distances, run))
-    if shown.trial in trials:
-        pictures.append((fitness.initial_fitness, run, shown.trial))
-    if len(elites(run)):
-        pictures.append((map_of_gaits, run))
-    pictures.append((motion.before_and_after, shown.initial.result, shown.best.result))
-    of_run = _save(folder, "evolution", pictures, printed)
-    return of_run + draw_trajectory(shown.best.result, folder, printed)
+def pictures_of_run(shown: ShownGaits) -> list[Picture]:
+    """The figures of a run and of its best gait."""
+    run, trial = shown.run, shown.best.recorded["trial"]
+    best, initial, trials = shown.best.result, shown.initial.result, initial_extremes(run).index
+    return [
+        Picture("evolution", True, fitness_of_trials, [run]),
+        Picture("evolution", len(trials) > 0, initial_distances, [run]),
+        Picture("evolution", trial in trials, initial_fitness, [run, trial]),
+        Picture("evolution", len(elites(run)) > 0, map_of_gaits, [run]),
+        Picture("evolution", True, before_and_after, [initial, best]),
+        *pictures_of_gait(best),
+    ]
 
 
-def _save(
-    folder: Path, part: str, pictures: Sequence[tuple[Any, ...]], printed: Print
-) -> list[DrawnFigure]:
-    """Draws and saves the figures of a part. A picture is a figure function and its arguments."""
-    drawn = []
-    for draw, *data in pictures:
-        figure = draw(*data, **vars(printed.look))
-        save_figure(figure, folder, draw.__name__, kinds=printed.kinds)
-        caption = " ".join((inspect.getdoc(draw) or "").split())
-        drawn.append(DrawnFigure(part, draw.__name__, caption))
-    return drawn
+def draw(pictures: Sequence[Picture], folder: Path, printed: Print = AS_USUAL) -> None:
+    """Draws figures and writes them to a folder. Raises InputError if a file cannot be written."""
+    for picture in pictures:
+        if picture.is_there:
+            figure = picture.draw(*picture.data, **vars(printed.look))
+            save_figure(figure, folder, picture.name, kinds=printed.kinds)

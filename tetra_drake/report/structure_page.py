@@ -12,7 +12,7 @@ import numpy as np
 
 from tetra_drake.analysis.equilibrium import EquilibriumStudy
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import TextTable, fixed, listed, rounded
+from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.laws.terrain import Flat
@@ -63,50 +63,62 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     scenario = given.with_sections(friction=friction, engine=Mujoco())
     try:
         robot = Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
-        return robot if is_scenario else _on_firm_ground(robot)
+        p_WN = node_positions(robot.structure, robot.structure.initial_state)
+        # With this stiffness, a single node bears the weight.
+        least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
+        if is_scenario or least <= given.ground.stiffness:
+            return robot
+        damping = given.ground.damping * least / given.ground.stiffness
+        firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
+        return Robot.of(firm, undisturbed_structure(firm, may_overlap=True))
     except InputError as error:
         key = error.key if is_scenario else error.key.removeprefix("robot.")
         raise InputError(name_or_file, key, error.problem) from error
 
 
-def _on_firm_ground(robot: Robot) -> Robot:
-    """The robot on a ground that is stiff enough to bear its weight at a single node."""
-    scenario, p_WN = robot.scenario, node_positions(robot.structure, robot.structure.initial_state)
-    least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
-    ground = scenario.ground
-    if least <= ground.stiffness:
-        return robot
-    damping = ground.damping * least / ground.stiffness
-    firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
-    return Robot.of(firm, undisturbed_structure(firm, may_overlap=True))
-
-
 def structure_text(study: EquilibriumStudy) -> str:
     """Description of a robot and its equilibrium, with tables in g and the robot's units."""
-    robot, statics = study.robot, study.statics
-    structure = robot.structure
+    robot, statics, structure = study.robot, study.statics, study.robot.structure
+    units = robot.scenario.units
+    length, force = units.length_name, units.force_name
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
     on_ground = ground = ""
     if structure.contacts.size:
-        stiffness = robot.scenario.units.shown(robot.scenario.ground.stiffness, "N/m")
+        stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")
         on_ground, ground = " on the ground", f", on a ground of {stiffness} per node"
-    bodies = len(structure.bodies)
-    count = f"{bodies} {'body' if bodies == 1 else 'bodies'}, {len(structure.node_names)} nodes"
+    bodies, height = [], functools.partial(fixed, digits=units.decimals + 1)
+    by_body = study.nodes.groupby("body", sort=False)
+    for (body, nodes), mass in zip(by_body, structure.mass, strict=True):
+        load = rounded(nodes["load"].sum() / units.force)
+        heights = _range(nodes["z"] / units.length, height)
+        bodies.append([str(body), rounded(1e3 * mass, 4), heights, load])
+    headings = ["body", "mass (g)", f"heights of nodes ({length})", f"load on the ground ({force})"]
+    number = f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}"
     lines = [
-        f"{robot.scenario.name}: {count}, {len(structure.cables)} cables, "
+        f"{robot.scenario.name}: {number}, {len(structure.node_names)} nodes, "
+        f"{len(structure.cables)} cables, "
         f"{structure.signals} oscillators, {rounded(1e3 * structure.mass.sum(), 4)} g",
         f"Without weight: self-stress states {len(statics.self_stresses)}, "
         f"infinitesimal mechanisms {statics.mechanisms}.",
         f"Lowest natural frequencies{on_ground}, undamped: {lowest or 'none'} Hz.",
         f"At rest, without actuation{ground}:",
-        _bodies_table(study).text(),
+        TextTable(headings, bodies).text(),
     ]
     if len(structure.cables):
-        lines.append(_cables_table(study).text())
+        rows = []
+        for group, cables in study.cables.groupby("group", sort=False):
+            lengths = (_range(cables[name] / units.length) for name in ("free_length", "length"))
+            tension = _range(cables["tension"] / units.force)
+            rows.append([str(group), str(len(cables)), *lengths, tension])
+        names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
+        lines.append(TextTable(["cables", "number", *names], rows).text())
     if structure.held.any():
-        lines.append(_anchors_table(study).text())
-    lines += _faults(study)
-    return "\n\n".join(lines)
+        forces = study.nodes.loc[structure.held.any(axis=1), "anchor_x":"anchor_z"]
+        forces = forces.where(forces.abs() > _NOISE * forces.abs().to_numpy().max(), 0.0)
+        rows = [[str(node), *map(rounded, row / units.force)] for node, row in forces.iterrows()]
+        names = [f"force along {axis} ({force})" for axis in "xyz"]
+        lines.append(TextTable(["anchor", *names], rows).text())
+    return "\n\n".join(lines + _faults(study))
 
 
 def _faults(study: EquilibriumStudy) -> list[str]:
@@ -114,9 +126,7 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     and the struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
-    lines = []
-    if sinking := robot.sinking_remark():
-        lines.append(f"{sinking[0].upper()}{sinking[1:]}.")
+    lines = [sentence(robot.sinking_remark())] if robot.sinking_remark() else []
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
         depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]
@@ -126,41 +136,6 @@ def _faults(study: EquilibriumStudy) -> list[str]:
         pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), (depth, _) in through.items()]
         lines.append(f"Struts that pass through each other: {listed(pairs)}.")
     return lines
-
-
-def _bodies_table(study: EquilibriumStudy) -> TextTable:
-    rows, structure, units = [], study.robot.structure, study.robot.scenario.units
-    height = functools.partial(fixed, digits=units.decimals + 1)
-    for body, mass in zip(structure.bodies, structure.mass, strict=True):
-        nodes = study.nodes[study.nodes["body"] == body]
-        heights = _range(nodes["z"] / units.length, height)
-        load = rounded(nodes["load"].sum() / units.force)
-        rows.append([body, rounded(1e3 * mass, 4), heights, load])
-    heights = f"heights of nodes ({units.length_name})"
-    load = f"load on the ground ({units.force_name})"
-    return TextTable(["body", "mass (g)", heights, load], rows)
-
-
-def _anchors_table(study: EquilibriumStudy) -> TextTable:
-    units = study.robot.scenario.units
-    forces = study.nodes.loc[study.robot.structure.held.any(axis=1), "anchor_x":"anchor_z"]
-    noise = _NOISE * forces.abs().to_numpy().max()
-    shown = (forces.where(forces.abs() > noise, 0.0) / units.force).itertuples()
-    rows = [[str(node), *map(rounded, pushes)] for node, *pushes in shown]
-    return TextTable(
-        ["anchor", *(f"force along {axis} ({units.force_name})" for axis in "xyz")], rows
-    )
-
-
-def _cables_table(study: EquilibriumStudy) -> TextTable:
-    rows, units = [], study.robot.scenario.units
-    for group, cables in study.cables.groupby("group", sort=False):
-        lengths = (_range(cables[name] / units.length) for name in ("free_length", "length"))
-        tension = _range(cables["tension"] / units.force)
-        rows.append([str(group), str(len(cables)), *lengths, tension])
-    length, force = units.length_name, units.force_name
-    names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
-    return TextTable(["cables", "number", *names], rows)
 
 
 def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> str:

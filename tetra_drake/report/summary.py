@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
-from tetra_drake.formatting import TextTable, fixed, rounded
-from tetra_drake.results.metrics import headline_metric, unmet_requirements
+from tetra_drake.formatting import TextTable, fixed, rounded, sentence
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.metrics import METRICS, UNITS
+from tetra_drake.scenario.metrics import METRICS, UNITS, headline_metric, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import Units
 
@@ -37,27 +36,25 @@ _NOISE = 1e-5
 
 
 def metrics_table(
-    gaits: Mapping[str, Mapping[str, Any] | pandas.Series], scenario: Scenario
+    names: Sequence[str], gaits: Sequence[Mapping[str, Any] | pandas.Series], scenario: Scenario
 ) -> TextTable:
     """Table of fitness and metrics, with a column per gait. A gait is a row of `Run.evaluations`.
 
     The first row is the main metric of the objective. Numbers that are zero for all gaits are left
     out, unless the scenario's objective or requirements name them.
     """
-    *_, last = gaits.values()
-    first = headline_metric(scenario.objective, last)
-    names = dict.fromkeys([first, "fitness", "worst_distance", *METRICS, "kept"])
+    first = headline_metric(scenario.objective, gaits[-1])
     always = {"fitness", "distance", *scenario.objective, *scenario.require}
     rows = []
-    for name in names:
+    for name in dict.fromkeys([first, "fitness", "worst_distance", *METRICS, "kept"]):
         size, title = _size_and_title(name, scenario.units)
-        values = [gait.get(name, math.nan) / size for gait in gaits.values()]
+        values = [gait.get(name, math.nan) / size for gait in gaits]
         has_some = any(math.isfinite(value) and abs(value) >= _NOTHING for value in values)
         if has_some or name in always:
             whole = name in _SHARES
             digits = [fixed(x, 0) if whole or abs(x) < _NOISE else rounded(x) for x in values]
             rows.append([title, *digits, _NOTES.get(name, "")])
-    return TextTable(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))
+    return TextTable(["", *names, ""], rows, text_columns=(0, len(gaits) + 1))
 
 
 def _size_and_title(name: str, units: Units) -> tuple[float, str]:
@@ -73,13 +70,14 @@ def result_text(result: SimulationResult) -> str:
     """Text about a simulation: metrics, requirements that are not met, wall time."""
     scenario, metrics = result.scenario, result.metrics
     lines = [result.title, f"scenario {scenario.name}, {ground_text(scenario)}"]
-    lines.append(metrics_table({"": {"fitness": result.fitness} | vars(metrics)}, scenario).text())
+    gait = {"fitness": result.fitness} | vars(metrics)
+    lines.append(metrics_table([""], [gait], scenario).text())
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
     still = robot.stillness_remark(metrics.distance) if result.gait else ""
-    for remark in filter(None, [robot.start_up_remark() or still, robot.sinking_remark()]):
-        lines.append(f"{remark[0].upper()}{remark[1:]}.")
+    remarks = robot.start_up_remark() or still, robot.sinking_remark()
+    lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]
     time, factor = _time(result.wall_time), rounded(result.duration / result.wall_time)
@@ -102,10 +100,10 @@ def run_text(run: Run) -> str:
         texts.append(trials_table(run).text())
     if not run.best().empty:
         best = run.fittest()
-        gaits = {"initially": run.initial_best(best["trial"]), "best": best}
-        texts.append(metrics_table(gaits, run.scenario).text())
+        gaits = [run.initial_best(best["trial"]), best]
+        texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
         if still := Robot.of(run.scenario).stillness_remark(best["distance"]):
-            texts.append(f"{still[0].upper()}{still[1:]}.")
+            texts.append(sentence(still))
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
         texts.append(f"to watch the best gait:  {replay}\nfigures and numbers:     {report}")
@@ -118,17 +116,13 @@ def results(run: Run) -> list[tuple[str, str]]:
     Gaits are described by the main metric of the objective, such as the distance. The best gait is
     the fittest.
     """
-    statuses, best = run.statuses, run.best()
-    evaluations = sum(status.evaluations for status in statuses)
-    failures = sum(status.failures for status in statuses)
-    wall_time = sum(status.wall_time for status in statuses)
-    count = f"{evaluations} ({failures} failed)" if failures else f"{evaluations}"
-    effort = [("evaluations", count)]
-    if evaluations:
-        effort.append(("time per evaluation", _time(wall_time / evaluations)))
+    table, best = run.evaluations, run.best()
+    failures = table["failure"].notna().sum()
+    effort = [("evaluations", f"{len(table)} ({failures} failed)" if failures else f"{len(table)}")]
+    if len(table):
+        effort.append(("time per evaluation", _time(table["wall_time_s"].mean())))
     if best.empty:
-        last = run.evaluations["failure"].tail(1)
-        return effort + [("last failure", failure) for failure in last]
+        return effort + [("last failure", failure) for failure in table["failure"].tail(1)]
     fittest = run.fittest()
     starts = [run.initial_best(trial) for trial in best["trial"]]
     initial = max(starts, key=lambda gait: gait["fitness"])
@@ -156,6 +150,8 @@ def trials_table(run: Run) -> TextTable:
     Gaits are described by the main metric of the objective. "in Drake" is the final best gait,
     evaluated again on the Drake diagram. Columns without values are left out.
     """
+    import pandas
+
     name = _about(run)
     size, title = _size_and_title(name, run.scenario.units)
     best = run.best().set_index("trial")
@@ -173,10 +169,10 @@ def trials_table(run: Run) -> TextTable:
         counts = [f"{status.evaluations}", f"{status.failures or ''}"]
         end = "not finished" if status.stop is None else status.stop.replace(ALL_DONE, "")
         rows.append([f"{status.number}", *cells, *counts, end])
-    shown = [i for i, cells in enumerate(zip(*rows, strict=True)) if {*cells} - {"-", ""}]
-    rows = [[row[i] for i in shown] for row in rows]
-    names = [columns[i] for i in shown]
-    return TextTable(names, rows, text_columns=(0, names.index("end") if "end" in names else 0))
+    table = pandas.DataFrame(rows, columns=columns)
+    table = table.loc[:, ~table.isin(["-", ""]).all()]
+    texts = [place for place, name in enumerate(table) if name in ("trial", "end")]
+    return TextTable([*table], table.to_numpy().tolist(), text_columns=texts)
 
 
 def _about(run: Run) -> str:

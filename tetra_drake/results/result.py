@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import html
 import json
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -15,19 +17,25 @@ import pydantic
 from tetra_drake import __version__
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, write_whole
-from tetra_drake.formatting import heading_html
+from tetra_drake.formatting import fixed, heading_html
 from tetra_drake.laws.tally import Tally
 from tetra_drake.machine import versions
-from tetra_drake.results.metrics import compute_fitness, compute_metrics, headline
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.path import PERIOD, CentrePath, follow
+from tetra_drake.robot.measures import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario
-from tetra_drake.scenario.metrics import UNITS, Metrics
+from tetra_drake.scenario.metrics import (
+    UNITS,
+    Metrics,
+    Poses,
+    Walk,
+    compute_fitness,
+    headline_metric,
+)
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
@@ -104,17 +112,14 @@ class SimulationResult:
     engine: str
     """Name of the scenario's engine."""
     path: CentrePath = field(repr=False, compare=False)
-    """Path of the robot's centre from start to end, in steps of robot.path.PERIOD."""
+    """Path of the robot's centre from start to end, in steps of robot.measures.PERIOD."""
     recorded: xarray.Dataset | None = field(default=None, repr=False)
     """Data of the trajectory (see results.trajectory.make_dataset); None if it was not recorded."""
 
     def __str__(self) -> str:
         kept = "not recorded" if self.recorded is None else "recorded"
-        return (
-            f"{self.title}\n"
-            f"scenario {self.scenario.name}, engine {self.engine}, trajectory {kept}, "
-            f"fitness {self.fitness:.4g}\n{self.metrics}"
-        )
+        about = f"scenario {self.scenario.name}, engine {self.engine}, trajectory {kept}"
+        return f"{self.title}\n{about}, fitness {self.fitness:.4g}\n{self.metrics}"
 
     def __repr__(self) -> str:
         return f"<SimulationResult {self.title}>"
@@ -206,10 +211,7 @@ def make_result(
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
     ends = motion.at(np.array([0.0, simulation.settling_time, simulation.duration]))
-    trajectory = None
-    if record:
-        samples = sample_times(simulation.duration, simulation.sample_period)
-        trajectory = make_dataset(robot, motion.at(samples))
+    samples = sample_times(simulation.duration, simulation.sample_period)
     poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses, structure)
     metrics = compute_metrics(
@@ -231,8 +233,61 @@ def make_result(
         integrator=work,
         engine=robot.scenario.engine_name,
         path=path,
-        recorded=trajectory,
+        recorded=make_dataset(robot, motion.at(samples)) if record else None,
     )
+
+
+def compute_metrics(
+    robot: Robot, *, nodes: np.ndarray, path: CentrePath, totals: Tally, signals: np.ndarray
+) -> Metrics:
+    """The metrics of a simulation.
+
+    Args:
+        nodes: positions p_WN (3, nodes, 3) in m at 0, at `simulation.steady_from` and at the end.
+        path: path of the centre.
+        totals: tally of the whole simulation, as plain arrays.
+        signals: signals (k, m) in N at evenly spaced times from `simulation.steady_from` on.
+    """
+    structure, scenario = robot.structure, robot.scenario
+    steady_from = scenario.simulation.settling_time
+    walk = Walk(
+        **vars(poses_of(structure, nodes, float(path.times[-1] - steady_from))),
+        path=path.centre[np.searchsorted(path.times, steady_from) :, :2],
+        heading=path.heading,
+        signals=signals,
+        scale=structure.scale,
+        weight=robot.weight,
+        actuators=robot.driven.size,
+        tally=totals,
+    )
+    return Metrics.of(walk, lacking=scenario.lacking, units=scenario.units)
+
+
+def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) -> Poses:
+    """The poses of a structure, from positions p_WN (3, nodes, 3) in m at three times. The last two
+    are `since_steady_from` (s) apart."""
+    return Poses(
+        markers=followed_nodes(nodes, structure),
+        tip=nodes[:, structure.p_WN[:, 0].argmax()],
+        centre=structure.node_shares @ nodes,
+        since_steady_from=since_steady_from,
+    )
+
+
+def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
+    """Short result of a gait, chosen by the scenario's objective, such as "walks 14.3 inches in
+    15 s"."""
+    seconds = f"in {scenario.simulation.duration:g} s"
+    units, distance = scenario.units, metrics["distance"]
+    length = fixed(abs(distance) / units.length, units.decimals)
+    way = [f"walks {length} {units.length_word}", "backward" if distance < 0.0 else ""]
+    walk = " ".join(filter(None, [*way, scenario.terrain.where, seconds]))
+    name = headline_metric(scenario.objective, metrics)
+    if name == "distance":
+        return walk
+    if name == "heading_change":
+        return f"turns {fixed(abs(math.degrees(metrics[name])), 0)} degrees {seconds}"
+    return f"{name.replace('_', ' ')} {units.shown(metrics[name], UNITS[name])}, {walk}"
 
 
 def save_result(path: str | Path, result: SimulationResult) -> None:

@@ -121,7 +121,16 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (modes[..., 1:], "1", robot.scenario.friction.modes),
     }
-    data: dict[str, Any] = {name: _stored(name, *about) for name, about in variables.items()}
+    data: dict[str, Any] = {}
+    for name, (values, unit, meaning) in variables.items():
+        kind: Any = np.float32 if name == "v_WN" else np.float64
+        attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
+        if flags := _FLAGS.get(name):
+            kind = np.int8
+            attributes["flag_values"] = np.array(list(flags), dtype=kind)
+            attributes["flag_meanings"] = " ".join(flags.values())
+        # The values are a copy, because a view would keep a whole table in memory.
+        data[name] = DIMENSIONS[name], np.array(values, dtype=kind), attributes
     clock = {"units": "s", "long_name": "time since the start"}
     data["time"] = "time", motion.times, clock, {"_FillValue": None}
     named = tuple((name, along, *values) for name, (along, values) in labels(structure).items())
@@ -136,18 +145,6 @@ def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
 
     given = {name: (along, list(values)) for name, along, *values in named}
     return with_indexes(xarray.Dataset(coords=given)).coords
-
-
-def _stored(name: str, values: np.ndarray, unit: str, meaning: str) -> tuple[Any, ...]:
-    """Dimensions, values and attributes of a variable. Flags are as the CF convention for netCDF
-    has them. The values are a copy, because a view would keep a whole table in memory."""
-    kind: Any = np.float32 if name == "v_WN" else np.float64
-    attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
-    if flags := _FLAGS.get(name):
-        kind = np.int8
-        attributes["flag_values"] = np.array(list(flags), dtype=kind)
-        attributes["flag_meanings"] = " ".join(flags.values())
-    return DIMENSIONS[name], np.array(values, dtype=kind), attributes
 
 
 def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:

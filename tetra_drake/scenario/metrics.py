@@ -68,7 +68,7 @@ class Walk(Poses):
     path: np.ndarray
     """Path (k, 2) of the centre of mass in the plane from `simulation.steady_from` on."""
     heading: np.ndarray
-    """Heading (k,) of the robot during the whole simulation; see robot.path."""
+    """Heading (k,) of the robot during the whole simulation; see robot.measures."""
     signals: np.ndarray
     """Signals (k, m) at evenly spaced times from `simulation.steady_from` on."""
     scale: float
@@ -144,7 +144,7 @@ class WalkMetrics:
         "rad", "left positive", lambda walk: walk.heading[-1] - walk.heading[0], needs=ROW
     )
     """Angle by which the robot has turned to the left at the end. Whole turns count. See
-    robot.path."""
+    robot.measures."""
     path_curvature: float = metric(
         "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path, scale=walk.scale)
     )
@@ -263,3 +263,43 @@ def looks_for_distance(objective: Mapping[str, float]) -> bool:
 def looks_for_turns(objective: Mapping[str, float]) -> bool:
     """True if an objective is about turning, not about distances."""
     return "heading_change" in objective and not looks_for_distance(objective)
+
+
+def pose_fitness(poses: Poses, objective: Mapping[str, float]) -> float:
+    """The part of the fitness that follows from poses alone."""
+    parts = {name: weight for name, weight in objective.items() if METRICS[name].of_pose}
+    return sum(weight * float(METRICS[name].compute(poses)) for name, weight in parts.items())
+
+
+def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
+    """Fitness: the sum of metrics times the objective's weights (SI)."""
+    total = 0.0
+    for name, weight in objective.items():
+        # Inches give Eq. 10 the constants of the thesis, and keep the digits of recorded numbers.
+        unit = INCH if UNITS[name] == "m" else 1.0
+        total += (weight * unit) * (getattr(metrics, name) / unit)
+    return total
+
+
+def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:
+    """Name of the most important metric of a gait: the distance if the objective rewards it,
+    otherwise the metric with the largest part in the fitness. Metrics that it only punishes do not
+    count beside one that it rewards."""
+    if looks_for_distance(objective):
+        return "distance"
+    rewarded = {name: weight for name, weight in objective.items() if weight > 0.0} or objective
+    parts = {name: abs(weight * metrics[name]) for name, weight in rewarded.items()}
+    return max(parts, key=lambda name: -1.0 if math.isnan(parts[name]) else parts[name])
+
+
+def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
+    """Texts about the metrics that do not meet their required SI values, such as "clearance is
+    0.05 in, less than 0.125 in". NaN meets no requirement."""
+    texts, shown = [], current(metrics.units).shown
+    for name, limit in require.items():
+        value, unit, is_cost = getattr(metrics, name), UNITS[name], METRICS[name].is_cost
+        is_met = value <= limit if is_cost else value >= limit
+        if not is_met:
+            beyond = "more" if is_cost else "less"
+            texts.append(f"{name} is {shown(value, unit)}, {beyond} than {shown(limit, unit)}")
+    return texts

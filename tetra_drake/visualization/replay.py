@@ -9,7 +9,6 @@ import logging
 import math
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -21,7 +20,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render, rounded
 from tetra_drake.robot.ground import ground_axes
-from tetra_drake.robot.path import follow
+from tetra_drake.robot.measures import distance_walked, path_of_centre
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metrics import looks_for_turns
@@ -93,11 +92,12 @@ def save_replay(
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
     page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
     if viewer is not None:
-        if not os.path.exists(viewer):
-            write_whole(viewer, script)
-        elif not os.path.isfile(viewer) or Path(viewer).read_bytes() != script.encode("utf-8"):
+        file = Path(viewer)
+        if not file.exists():
+            write_whole(file, script)
+        elif not file.is_file() or file.read_bytes() != script.encode("utf-8"):
             problem = "is not the viewer of this version of Drake; delete it or name another file"
-            raise InputError(viewer, "", problem)
+            raise InputError(file, "", problem)
     write_whole(path, page)
 
 
@@ -118,7 +118,21 @@ def replay_page(
         reader = render("visualization/viewer.html.jinja", address=address)
         # Before the body, so that nothing of the body is shown if the file is missing.
         page = (before + after).replace("</head>", f"{reader}</head>", 1)
-    page = _with_overlay(page, title, film_of(robot, frames))
+    name, _, deed = title.rpartition(": ")
+    overlay = render(
+        "visualization/overlay.html.jinja",
+        name=name,
+        deed=deed,
+        film=film_of(robot, frames),
+        script=render("visualization/film.js"),
+    )
+    page = _COMMAND.sub(r"handle(\1);", page)
+    # The replacements are functions, because backslashes in a text would be interpreted.
+    named = f"<title>{html.escape(title)}</title>{_IN_HEAD}"
+    page = page.replace("<html>", '<html lang="en">', 1)
+    page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
+    page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
+    page = "</main></body>".join(page.rsplit("</body>", 1))
     return pack_page(page, title=title), script
 
 
@@ -131,7 +145,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     structure = robot.structure
     bodies, contacts = structure.bodies, structure.contacts
     nodes = {
-        "path": [_parts(path) for path in node_paths(structure)],
+        "path": [path.split("/")[1:] for path in node_paths(structure)],
         "body": structure.carriers.tolist(),
         "place": structure.p_BN.round(6).tolist(),
         "colour": [COLOURS[name] for name in node_colours(structure)],
@@ -147,7 +161,8 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     force_of_square = round_force(usual_force / max(arrow, 1.0), units)
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
     ends = structure.cables[["node_a", "node_b"]].tolist()
-    cables = zip(cable_paths(structure), ends, strict=True)
+    paths = [path.split("/")[1:] for path in cable_paths(structure)]
+    cables = zip(paths, ends, strict=True)
     return {
         "times": frames["time"].values.round(5).tolist(),
         "resolution": RESOLUTION,
@@ -157,7 +172,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "nodes": [
             dict(zip(nodes, node, strict=True)) for node in zip(*nodes.values(), strict=True)
         ],
-        "cables": [{"path": _parts(path), "nodes": joined} for path, joined in cables],
+        "cables": [{"path": path, "nodes": joined} for path, joined in cables],
         "contacts": contacts.tolist(),
         "colours": COLOURS,
         "anchored": bool(structure.held.any()),
@@ -204,19 +219,13 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     heading."""
     structure, objective = robot.structure, robot.scenario.objective
     if structure.points_ahead and looks_for_turns(objective):
-        poses = np.concatenate([frames["q_WB"].values, frames["p_WB"].values], axis=-1)
-        heading = np.rad2deg(follow(frames["time"].values, poses, structure).heading)
+        heading = np.rad2deg(path_of_centre(frames, structure).heading)
         values, what, unit, digits = heading - heading[0], "turned", "°", 0
     else:
         units = robot.scenario.units
-        x = followed_nodes(frames["p_WN"].values, structure)[:, 0, 0] / units.length
-        values, what, unit = x - x[0], "walked", f" {units.length_name}"
-        digits = units.decimals
+        values = distance_walked(frames, structure) / units.length
+        what, unit, digits = "walked", f" {units.length_name}", units.decimals
     return {"what": what, "unit": unit, "digits": digits, "values": values.round(digits).tolist()}
-
-
-def _parts(path: str) -> list[str]:
-    return path.strip("/").split("/")
 
 
 def _steps(values: np.ndarray) -> list[list[int]]:
@@ -252,31 +261,3 @@ def pack_page(page: str, *, title: str) -> str:
     """A compressed page that unpacks itself in the browser. `title` is plain text."""
     packed = base64.b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
-
-
-def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
-    """Adds the film, a heading, a legend and a control bar to Meshcat's page."""
-    name, _, deed = title.rpartition(": ")
-    overlay = render(
-        "visualization/overlay.html.jinja",
-        name=name,
-        deed=deed,
-        film=film,
-        script=render("visualization/film.js"),
-    )
-    page = _COMMAND.sub(r"handle(\1);", page)
-    # The replacements are functions, because backslashes in a text would be interpreted.
-    named = f"<title>{html.escape(title)}</title>{_IN_HEAD}"
-    page = page.replace("<html>", '<html lang="en">', 1)
-    page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
-    page = re.sub(r"<body[^>]*>", lambda tag: f"{tag[0]}<main>{overlay}", page, count=1)
-    return "</main></body>".join(page.rsplit("</body>", 1))
-
-
-def _write_once(path: Path, text: str) -> None:
-    """Writes a file that does not exist yet. Raises InputError if it exists with another text."""
-    if not path.exists():
-        write_whole(path, text)
-    elif not path.is_file() or path.read_bytes() != text.encode("utf-8"):
-        problem = "is not the viewer of this version of Drake; delete it or name another file"
-        raise InputError(path, "", problem)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -167,7 +166,8 @@ def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float)
 def set_surroundings(
     meshcat: Meshcat, robot: Robot, points: np.ndarray, *, seen: np.ndarray
 ) -> None:
-    """Adds floor and light and sets the camera. Without ground there is no floor.
+    """Adds floor and light and sets the camera. Without ground there is no floor. The light casts
+    shadows.
 
     The floor surrounds `points` (..., 3), and the camera sees nodes at all of `seen` (..., 3), both
     in m.
@@ -190,7 +190,7 @@ def set_surroundings(
     for unused in ("PointLightPositiveX", "PointLightNegativeX", "SpotLight"):
         meshcat.SetProperty(f"/Lights/{unused}", "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", AMBIENT)
-    light = {
+    settings = {
         "intensity": SUN,
         "position": (4.0 * reach * TO_SUN / np.linalg.norm(TO_SUN)).tolist(),
         "castShadow": True,
@@ -200,17 +200,18 @@ def set_surroundings(
         "shadow.bias": -0.0005,
         "shadow.normalBias": 0.002,
     }
-    for name, value in light.items():
+    for name, value in settings.items():
         meshcat.SetProperty("/Lights/FillLight/<object>", name, value)
 
 
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
-    """Adds the floor around `points` (..., 3). `reach` (m) is half of the robot's length."""
+    """Adds the floor around `points` (..., 3), with lines around its squares. `reach` (m) is half
+    of the robot's length."""
     ground, units = robot.ground, robot.scenario.units
-    x_y, dark = points.reshape(-1, 3)[:, :2], units.squares * units.square
+    x_y, side = points.reshape(-1, 3)[:, :2], units.squares * units.square
     margin = (FLOOR_MARGIN if ground.flat else UNEVEN_MARGIN) * reach
     low, high = x_y.min(axis=0) - margin, x_y.max(axis=0) + margin
-    corners = np.array([np.floor(low / dark), np.ceil(high / dark)], dtype=int)  # on dark lines
+    corners = np.array([np.floor(low / side), np.ceil(high / side)], dtype=int)  # on dark lines
     floor = floor_points(ground, units.squares * corners, units)
     contacts = robot.structure.contacts
     sunk = drawn_radii(robot.structure)[1][contacts] - robot.structure.contact_radius[contacts]
@@ -223,7 +224,25 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
         meshcat.SetTransform("/floor/slab", RigidTransform(middle))
     else:
         _add_relief(meshcat, floor, scale=robot.structure.scale)
-    _add_grid(meshcat, floor, units, colour="square" if ground.flat else "square_on_relief")
+    light: list[np.ndarray] = []
+    dark: list[np.ndarray] = []
+    for axis in (0, 1):
+        for line in np.moveaxis(floor, axis, 0):
+            position = line[0, axis] / units.square
+            if abs(position - round(position)) > 1e-6:
+                continue
+            # A straight line has pieces, too: some browsers lose lines that pass the camera.
+            points = line[:: units.squares] if np.ptp(line[:, 2]) == 0.0 else line
+            (light if round(position) % units.squares else dark).append(points)
+    # Lines are a little above the floor. Otherwise the floor would hide parts of them.
+    square = "square" if ground.flat else "square_on_relief"
+    looks = [("squares", light, 0.0002, square), ("dark", dark, 0.0004, "dark_line")]
+    for name, lines, lift, look in looks:
+        raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
+        if raised:
+            start = np.vstack([line[:-1] for line in raised])
+            end = np.vstack([line[1:] for line in raised])
+            meshcat.SetLineSegments(f"/floor/{name}", start.T, end.T, rgba=rgba(look))
 
 
 def floor_points(ground: Ground, corners: np.ndarray, units: Units) -> np.ndarray:
@@ -304,31 +323,3 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
         np.column_stack([a, b, c, a, c, d]).reshape(-1, 3).T,
         ((colours.clip(0.0, 1.0) * 255).round() / 255).reshape(-1, 3).T ** _GAMMA,
     )
-
-
-def _add_grid(meshcat: Meshcat, floor: np.ndarray, units: Units, *, colour: str) -> None:
-    """Adds lines along and across the floor (rows, columns, 3), around its squares."""
-    light: list[np.ndarray] = []
-    dark: list[np.ndarray] = []
-    for axis in (0, 1):
-        for line in np.moveaxis(floor, axis, 0):
-            position = line[0, axis] / units.square
-            if abs(position - round(position)) > 1e-6:
-                continue
-            # A straight line has pieces, too: some browsers lose lines that pass the camera.
-            points = line[:: units.squares] if np.ptp(line[:, 2]) == 0.0 else line
-            (light if round(position) % units.squares else dark).append(points)
-    # Lines are a little above the floor. Otherwise the floor would hide parts of them.
-    if light:
-        _add_lines(meshcat, "/floor/squares", light, lift=0.0002, colour=rgba(colour))
-    _add_lines(meshcat, "/floor/dark", dark, lift=0.0004, colour=rgba("dark_line"))
-
-
-def _add_lines(
-    meshcat: Meshcat, path: str, lines: Sequence[np.ndarray], *, lift: float, colour: Rgba
-) -> None:
-    """Adds lines through points (points, 3), raised by `lift`; all in m."""
-    raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
-    start = np.vstack([line[:-1] for line in raised])
-    end = np.vstack([line[1:] for line in raised])
-    meshcat.SetLineSegments(path, start.T, end.T, rgba=colour)

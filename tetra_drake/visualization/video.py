@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -118,12 +118,8 @@ def encode(frames: Iterable[bytes], path: Path, *, size: tuple[int, int], fps: f
     with whole_file(path) as temporary, tempfile.TemporaryFile() as log:
         try:
             ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-v", "error"]
-            process = subprocess.Popen(
-                [*ffmpeg, *given, *KINDS[path.suffix], str(temporary)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=log,
-            )
+            command = [*ffmpeg, *given, *KINDS[path.suffix], str(temporary)]
+            process = Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=log)
         except (OSError, RuntimeError) as error:
             hint = "reinstall imageio-ffmpeg, or set IMAGEIO_FFMPEG_EXE to an ffmpeg"
             raise InputError("video", "", f"ffmpeg does not start: {error}; {hint}") from error

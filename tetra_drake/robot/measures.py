@@ -1,13 +1,16 @@
-"""Measures of a recorded trajectory (see trajectory.make_dataset), in SI units."""
+"""Measures of motion, in SI units: path of the centre, distances, contact and cycles.
+
+results.trajectory.make_dataset() makes trajectories.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from tetra_drake.robot.path import CentrePath, follow
 from tetra_drake.robot.structure import Structure, followed_nodes
 
 if TYPE_CHECKING:
@@ -16,6 +19,10 @@ if TYPE_CHECKING:
 Span: TypeAlias = tuple[float, float]
 """Start and end, such as of a time in s; or least and greatest coordinate."""
 
+PERIOD = 0.25
+"""Time (s) between points of a result's path. It is at most half of the fastest gait's period. The
+robot turns by far less than half a turn in this time, so its heading can be unwrapped."""
+
 _STEADY = 0.01
 """Least swing of an oscillating signal, as a share of its largest value."""
 
@@ -23,24 +30,52 @@ _PADDING = 16
 """Factor by which zero-padding lengthens a signal, for a finer spectrum."""
 
 
-def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> np.ndarray:
-    """Displacement along x since the start (time,), in m: of the first marker (the bottom left node
-    of T1), or of the centre for a robot without markers."""
-    x = followed_nodes(trajectory.p_WN.values, structure)[:, 0, 0]
-    return x - x[0]
+@dataclass(frozen=True)
+class CentrePath:
+    """Path of the robot's centre of mass, and the robot's heading."""
+
+    times: np.ndarray
+    """Times (k,) in s, ascending."""
+    centre: np.ndarray
+    """Positions (k, 3) in the world frame, in m."""
+    heading: np.ndarray
+    """Angles (k,) from the world's x axis to the left, in rad, without jumps at full turns. NaN for
+    robots other than rows of tetrahedra."""
 
 
-def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """Distance along x from the first body to each body (time, body), between centres of mass, in
-    m."""
-    x = trajectory.p_WB.sel(axis="x")
-    return x - x.isel(body=0)
+def follow(times: np.ndarray, poses: np.ndarray, structure: Structure) -> CentrePath:
+    """The path of a robot, from the poses (k, n, 7) of its n bodies at times (k,) in s.
+
+    A pose is a quaternion, w first, and the position of the body's origin in m. The heading of a
+    row of tetrahedra is the horizontal direction of the sum of the bodies' x axes, which point
+    forward. Other structures have no heading: they may roll over, and bars may spin about their
+    axes.
+    """
+    # The shares are exactly 1 if all bodies have the same mass.
+    shares = structure.mass / structure.mass[0]
+    weighted = shares[:, np.newaxis] * np.ascontiguousarray(poses[..., 4:].T)
+    centre = weighted.sum(axis=1).T / shares.sum()
+    if not structure.points_ahead:
+        return CentrePath(times, centre, np.full(len(times), math.nan))
+    w, x, y, z = np.ascontiguousarray(poses.T)[:4]
+    ahead, left = (w * w + x * x - y * y - z * z).sum(axis=0), 2.0 * (x * y + w * z).sum(axis=0)
+    heading = np.arctan2(left, ahead)
+    # The same as np.unwrap(), but much faster.
+    heading[1:] -= math.tau * np.round((heading[1:] - heading[:-1]) / math.tau).cumsum()
+    return CentrePath(times, centre, heading)
 
 
 def path_of_centre(trajectory: xarray.Dataset, structure: Structure) -> CentrePath:
     """Path of the robot's centre at all samples."""
     poses = np.concatenate([trajectory.q_WB.values, trajectory.p_WB.values], axis=2)
     return follow(trajectory.time.values, poses, structure)
+
+
+def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> np.ndarray:
+    """Displacement along x since the start (time,), in m: of the first marker (the bottom left node
+    of T1), or of the centre for a robot without markers."""
+    x = followed_nodes(trajectory.p_WN.values, structure)[:, 0, 0]
+    return x - x[0]
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
