@@ -1,4 +1,4 @@
-"""Queue of simulations: threads, each of which keeps a batch full until the queue is empty."""
+"""Queue of simulations. Each of its threads keeps a batch full until the queue is empty."""
 
 from __future__ import annotations
 
