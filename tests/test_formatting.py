@@ -36,6 +36,7 @@ def test_a_table_aligns_numbers_to_the_right():
     assert table.text() == "name          in\na           1.00\nlong name  10.00"
     rule = "| --- | ---: |"
     assert table.markdown() == f"| name | in |\n{rule}\n| a | 1.00 |\n| long name | 10.00 |"
+    assert TextTable(["name", "in"], []).text() == "name  in"
     broken = TextTable(["a word", "m"], [["a word", "5 (4–6)"]]).markdown()
     assert broken.splitlines()[-1] == "| a word | 5\u00a0(4–\u20606) |", "numbers stay on one line"
 

@@ -124,7 +124,7 @@ class TextTable:
         columns, texts = list(zip(self.headings, *self.rows, strict=True)), self._holds_texts
         widths = [max(map(len, cells)) for cells in columns]
         least = [
-            _NARROW if is_text else max(_NARROW, *map(len, cells[1:]))
+            _NARROW if is_text else max([_NARROW, *map(len, cells[1:])])
             for cells, is_text in zip(columns, texts, strict=True)
         ]
         while sum(widths) + 2 * (len(widths) - 1) > most:

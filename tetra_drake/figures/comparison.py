@@ -28,7 +28,7 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import TextTable, fixed, ranged, rounded
 
 _FIRST = 10  # simulations; the axes of costs begin here
-_END_MARK: Any = {"marker": "o", "markevery": [-1]}
+_STEPS: Any = {"drawstyle": "steps-post", "marker": "o", "markevery": [-1]}
 _POWERS = 10.0 ** np.arange(9)
 _BESIDE = 5.5  # least width (in) of two panels side by side, with letters of the usual size
 
@@ -114,12 +114,7 @@ def comparison(compared: Compared) -> Drawn:
     ends = compared.curves.groupby("run", sort=False)["cost"].max()
     first = min(_FIRST, ends.min())
     for series, label in enumerate(compared.runs.index):
-        style: Any = {
-            **line_style(series),
-            "drawstyle": "steps-post",
-            "marker": "o",
-            "markevery": [-1],
-        }
+        style: Any = line_style(series) | _STEPS
         curve = compared.curves.query("run == @label").replace(-math.inf, math.nan)
         curve["cost"] = curve["cost"].clip(lower=first)
         curve = curve.drop_duplicates("cost", keep="last")

@@ -63,10 +63,12 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     scenario = given.with_sections(friction=friction, engine=Mujoco())
     try:
         robot = Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
+        if is_scenario:
+            return robot
         p_WN = node_positions(robot.structure, robot.structure.initial_state)
         # With this stiffness, a single node bears the weight.
         least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
-        if is_scenario or least <= given.ground.stiffness:
+        if least <= given.ground.stiffness:
             return robot
         damping = given.ground.damping * least / given.ground.stiffness
         firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
