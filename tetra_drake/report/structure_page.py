@@ -89,11 +89,11 @@ def structure_text(study: EquilibriumStudy) -> str:
         stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")
         on_ground, ground = " on the ground", f", on a ground of {stiffness} per node"
     bodies, height = [], functools.partial(fixed, digits=units.decimals + 1)
-    by_body = study.nodes.groupby("body", sort=False)
-    for (body, nodes), mass in zip(by_body, structure.mass, strict=True):
+    for body, mass in zip(structure.bodies, structure.mass, strict=True):
+        nodes = study.nodes[study.nodes["body"] == body]
         load = rounded(nodes["load"].sum() / units.force)
         heights = _range(nodes["z"] / units.length, height)
-        bodies.append([str(body), rounded(1e3 * mass, 4), heights, load])
+        bodies.append([body, rounded(1e3 * mass, 4), heights, load])
     headings = ["body", "mass (g)", f"heights of nodes ({length})", f"load on the ground ({force})"]
     number = f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}"
     lines = [
