@@ -12,7 +12,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tetra_drake.settings.quantities import Speed, Time
+from tetra_drake.settings.quantities import Keyed, Speed, Time
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
 
@@ -125,7 +125,7 @@ class Disturbances(Section):
 
     draws: int = Field(ge=1, le=10_000)
     """Number of draws. Each gait is simulated once in each draw."""
-    spreads: Annotated[dict[str, Spread], AfterValidator(different_keys)] = Field(default={})
+    spreads: Annotated[Keyed[str, Spread], AfterValidator(different_keys)] = Field(default={})
     """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
     1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)

@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -149,6 +149,8 @@ class Metrics:
     `cpg.start_up` if it is later, and lasts to the end. A metric that does not apply to a robot is
     NaN.
     """
+
+    __pydantic_config__: ClassVar = {"use_attribute_docstrings": True}  # for the page of keys
 
     distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0], of_pose=True)
     """Displacement of x₁ from the start to the end."""

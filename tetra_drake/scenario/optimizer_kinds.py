@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metrics import UNITS
-from tetra_drake.settings.quantities import Time, UnitsByName
+from tetra_drake.settings.quantities import Time, by_name
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section
 
@@ -74,7 +74,7 @@ class QualityDiversity(Section):
     gaits above the levels of cells. A level follows the fittest gait of its cell slowly.
     """
 
-    measures: Annotated[dict[str, Range], UnitsByName(UNITS)] = Field(
+    measures: Annotated[dict[str, Range], *by_name(UNITS)] = Field(
         default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
     """Two metrics with their ranges on the map. Values outside belong to the cells at the edge."""

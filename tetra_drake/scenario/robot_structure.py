@@ -33,6 +33,7 @@ from tetra_drake.settings.quantities import (
     Damping,
     Density,
     ForceQuantity,
+    Keyed,
     Length,
     Mass,
     Position,
@@ -60,6 +61,9 @@ def _check_name(name: object) -> object:
 
 
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
+BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
+"""A length that needs no unit where the structure has one."""
+Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
@@ -178,29 +182,32 @@ class StructureFile(Section):
     """A tensegrity: nodes, struts, cables and the oscillators that actuate cables."""
 
     tag: ClassVar[str] = "Structure"
+    keys_of_files: ClassVar[dict[str, str]] = {
+        "file": "Name or file of a structure; the other keys change it."
+    }
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
     """Properties that some metrics need and this robot does not have."""
     slack: ClassVar[bool] = True
     """Cables never push."""
 
-    nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
+    nodes: Keyed[Name, Coordinates] = Field(max_length=MOST_NODES)
     """Coordinates [x, y, z] of each node, near an equilibrium. A node that nothing else names is
     left out."""
     unit: str | None = None
     """Unit of coordinates that are bare numbers, such as cm. A robot in mm is shown in mm."""
-    struts: dict[Name, StrutGroup] = Field(default={})
-    cables: dict[Name, CableGroup] = Field(default={})
-    spheres: dict[Name, SphereGroup] = Field(default={})
-    actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
+    struts: Keyed[Name, StrutGroup] = Field(default={})
+    cables: Keyed[Name, CableGroup] = Field(default={})
+    spheres: Keyed[Name, SphereGroup] = Field(default={})
+    actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, their nodes in either order."""
-    masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
+    masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload that cables hold."""
-    loads: dict[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
+    loads: Keyed[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    anchors: dict[str, AnchorAxes] = Field(default={})
+    anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness = Field(default=1e5, gt=0)

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
-import pydantic
-from pydantic import Field, ValidationInfo
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.settings.refusals import described, hint, refuse
-from tetra_drake.settings.units import plainest, quantity_to_si
+from tetra_drake.settings.units import PATTERN, plainest, quantity_to_si
 
 
 class Quantity(float):
@@ -34,64 +31,89 @@ class Quantity(float):
         return plainest(self, self.unit)
 
 
-@dataclass(frozen=True)
-class Unit:
-    """Annotation of a type of numbers with the SI unit `name`."""
+def quantity(unit: str, **words: float) -> tuple[Any, ...]:
+    """Annotations of a type of numbers with an SI unit. In a file, each of `words` stands for a
+    number."""
 
-    name: str
+    def read(value: Any, info: ValidationInfo) -> Any:
+        is_word = isinstance(value, str) and value in words
+        return words[value] if is_word else _si_number(value, unit, info)
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: pydantic.GetCoreSchemaHandler
-    ) -> CoreSchema:
-        def read(value: Any, info: ValidationInfo) -> Any:
-            return _si_number(value, self.name, info)
+    def write(number: float) -> Any:
+        return Quantity(number, unit)
 
-        def write(number: float) -> Quantity:
-            return Quantity(number, self.name)
-
-        return _converted(handler(source), read, write)
+    schema = Field(json_schema_extra=_text_schema(unit, *words))
+    return BeforeValidator(read), PlainSerializer(write), schema
 
 
-Length = Annotated[float, Unit("m")]
-Angle = Annotated[float, Unit("rad")]
-Mass = Annotated[float, Unit("kg")]
-Density = Annotated[float, Unit("kg/m^3")]
-Time = Annotated[float, Unit("s")]
-Speed = Annotated[float, Unit("m/s")]
-InverseSpeed = Annotated[float, Unit("s/m")]
-Acceleration = Annotated[float, Unit("m/s^2")]
-ForceQuantity = Annotated[float, Unit("N")]
-Stiffness = Annotated[float, Unit("N/m")]
-Damping = Annotated[float, Unit("N*s/m")]
-DampingPerLength = Annotated[float, Unit("N*s/m^2")]
+def _text_schema(unit: str, *words: str) -> dict[str, Any]:
+    """JSON Schema of a quantity in a file: a text, or the number 0."""
+    expected = f"Expected a quantity that converts to {unit}."
+    return {
+        "type": ["string", "number"],
+        "pattern": f"^({'|'.join((*words, PATTERN))})$",
+        "patternErrorMessage": expected,
+        "if": {"type": "number"},
+        "then": {"const": 0, "errorMessage": expected},
+        "unit": unit,
+    }
+
+
+Length = Annotated[float, *quantity("m")]
+Angle = Annotated[float, *quantity("rad")]
+Mass = Annotated[float, *quantity("kg")]
+Density = Annotated[float, *quantity("kg/m^3")]
+Time = Annotated[float, *quantity("s")]
+Frequency = Annotated[float, *quantity("Hz")]
+Speed = Annotated[float, *quantity("m/s")]
+InverseSpeed = Annotated[float, *quantity("s/m")]
+Acceleration = Annotated[float, *quantity("m/s^2")]
+ForceQuantity = Annotated[float, *quantity("N")]
+Stiffness = Annotated[float, *quantity("N/m")]
+Damping = Annotated[float, *quantity("N*s/m")]
+DampingPerLength = Annotated[float, *quantity("N*s/m^2")]
 
 Position = Annotated[list[Length], Field(min_length=3, max_length=3)]
 """Coordinates x, y and z."""
 
+EMPTY = {"type": ["object", "null"]}
+"""JSON Schema of a mapping that may be left empty in a file."""
 
-@dataclass(frozen=True)
-class UnitsByName:
-    """Annotation of a type of mappings of numbers, or of lists of numbers, with SI units by
-    name."""
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
-    units: Mapping[str, str]
-    """Units by name; "" for a number without a unit."""
+Keyed = Annotated[
+    dict[Key, Value],
+    BeforeValidator(lambda given: {} if given is None else given),
+    Field(json_schema_extra=EMPTY),
+]
+"""A mapping with names of the user's choice. Nothing is an empty mapping."""
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: pydantic.GetCoreSchemaHandler
-    ) -> CoreSchema:
-        def read(given: Any, info: ValidationInfo) -> Any:
-            if not isinstance(given, dict):
-                return given
-            for name in given:
-                if name not in self.units:
-                    refuse(str(name), f"unknown name; {hint(name, self.units)}")
-            return _each(given, lambda x, name: _si_number(x, self.units[name], info, key=name))
 
-        def write(numbers: dict[str, Any]) -> dict[str, Any]:
-            return _each(numbers, lambda x, name: Quantity(x, self.units[name]))
+def by_name(units: Mapping[str, str]) -> tuple[Any, ...]:
+    """Annotations of a type of mappings of numbers, or of lists of numbers, with SI units by name;
+    "" for a number without a unit."""
 
-        return _converted(handler(source), read, write)
+    def read(given: Any, info: ValidationInfo) -> Any:
+        if not isinstance(given, dict):
+            return {} if given is None else given
+        for name in given:
+            if name not in units:
+                refuse(str(name), f"unknown name; {hint(name, units)}")
+        return _each(given, lambda x, name: _si_number(x, units[name], info, key=name))
+
+    def write(numbers: dict[str, Any]) -> Any:
+        return _each(numbers, lambda x, name: Quantity(x, units[name]))
+
+    def describe(schema: dict[str, Any]) -> None:
+        value = schema["additionalProperties"]
+        texts = {name: _text_schema(unit) if unit else {} for name, unit in units.items()}
+        if "items" in value:
+            texts = {name: {"items": value["items"] | text} for name, text in texts.items()}
+        properties = {name: value | text for name, text in texts.items()}
+        schema |= EMPTY | {"properties": properties, "additionalProperties": False}
+
+    return BeforeValidator(read), PlainSerializer(write), Field(json_schema_extra=describe)
 
 
 def _each(given: dict[str, Any], change: Callable[[Any, str], Any]) -> dict[str, Any]:
@@ -100,14 +122,6 @@ def _each(given: dict[str, Any], change: Callable[[Any, str], Any]) -> dict[str,
         name: [change(x, name) for x in value] if isinstance(value, list) else change(value, name)
         for name, value in given.items()
     }
-
-
-def _converted(
-    schema: CoreSchema, read: Callable[[Any, ValidationInfo], Any], write: Callable[[Any], Any]
-) -> CoreSchema:
-    """A schema with functions that convert values before validation and when they are dumped."""
-    serializer = core_schema.plain_serializer_function_ser_schema(write)
-    return core_schema.with_info_before_validator_function(read, schema, serialization=serializer)
 
 
 def _si_number(value: Any, unit: str, info: ValidationInfo, *, key: str = "") -> Any:
@@ -130,9 +144,10 @@ def _si_number(value: Any, unit: str, info: ValidationInfo, *, key: str = "") ->
 
 def unit_of(field: FieldInfo) -> str:
     """Unit of the numbers of a field; "" if they have none."""
-    parts = [field.annotation, *field.metadata]
+    parts = [field, field.annotation]
     for part in parts:
-        if isinstance(part, Unit):
-            return part.name
+        extra = getattr(part, "json_schema_extra", None)
+        if isinstance(extra, dict) and "unit" in extra:
+            return str(extra["unit"])
         parts += typing.get_args(part)
     return ""

@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
-from pydantic_core import PydanticCustomError
+from tetra_drake.errors import InputError
 
 TAG = "_tag"
 """Key of a mapping in a tree that holds the tag of its kind."""
@@ -22,7 +22,7 @@ _MOST_NAMES, _LONGEST_NAME = 2000, 100
 
 def refuse(key: str, problem: str) -> NoReturn:
     """Ends a validation with a problem. `key` is relative to the validated value."""
-    raise PydanticCustomError("refused", "{key}: {problem}", {"key": key, "problem": problem})
+    raise InputError("", key, problem)
 
 
 def described(value: Any) -> str:

@@ -11,40 +11,84 @@ import functools
 import os
 import re
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, Union
 
 import pydantic
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, ErrorDetails, core_schema
+from pydantic_core import CoreSchema, ErrorDetails
 
 from tetra_drake.errors import InputError
-from tetra_drake.settings.quantities import Quantity, unit_of
-from tetra_drake.settings.refusals import TAG, described, hint, refuse
+from tetra_drake.settings.quantities import EMPTY, Quantity, unit_of
+from tetra_drake.settings.refusals import TAG, described, hint
+from tetra_drake.settings.units import plainest
 
 Tree = dict[str, Any]
 Show = Callable[[float, str], str]
 """Function that makes a text from a number and its SI unit."""
 
+_PYDANTIC_NAMES = {"gt": "exclusiveMinimum", "ge": "minimum", "le": "maximum", "oneOf": "anyOf"}
+"""What pydantic writes in a JSON Schema, and what belongs there. Tags are no part of a mapping, so
+a mapping may fit several kinds."""
+
+
+def _complete_schema(schema: Tree, section: type[Section]) -> None:
+    """Changes pydantic's JSON Schema of a section to what files may contain."""
+    del schema["title"]
+    schema.pop("required", None)  # a base may have the keys
+    schema |= EMPTY
+    for key, text in section.keys_of_files.items():
+        schema["properties"][key] = {"type": "string", "default": None, "description": text}
+    _correct_schema(schema)
+
+
+def _correct_schema(node: Any) -> None:
+    """Corrects a part of pydantic's JSON Schema. Defaults become texts with units."""
+    if isinstance(node, list):
+        for item in node:
+            _correct_schema(item)
+    if not isinstance(node, dict):
+        return
+    for name, correct in _PYDANTIC_NAMES.items():
+        if name in node:
+            node[correct] = node.pop(name)
+    if not str(node.get("title", "!")).startswith("!"):
+        del node["title"]
+    default = node.get("default")
+    if "anyOf" in node and isinstance(default, dict):
+        del node["default"]
+    if "unit" in node and isinstance(default, float):
+        node["default"] = plainest(default, node["unit"])
+    for item in node.values():
+        _correct_schema(item)
+
 
 class Section(BaseModel):
     """Section of settings. Numbers are SI; values cannot be changed in place."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+        json_schema_extra=_complete_schema,
+    )
 
-    has_base: ClassVar[bool] = False
-    """True if a file may have a `base` that provides missing values."""
+    keys_of_files: ClassVar[dict[str, str]] = {}
+    """Keys that only files have, and what they are."""
 
     tag: ClassVar[str] = ""
     """Name of the kind in files; the name of the class if not given."""
 
     def __init__(self, **values: Any) -> None:
+        values = python_value(values)
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise _input_error(error, type(self).__name__) from None
+            raise _input_error(error, type(self), values, type(self).__name__) from None
 
     # Otherwise pydantic would also call it in the validation of a tree.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
@@ -59,43 +103,13 @@ class Section(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         cls.tag = cls.__dict__.get("tag", cls.__name__)
 
-    @pydantic.model_validator(mode="wrap")
-    @classmethod
-    def _explain(
-        cls,
-        tree: Any,
-        validate: pydantic.ModelWrapValidatorHandler[Self],
-        info: pydantic.ValidationInfo,
-    ) -> Self:
-        """Replaces pydantic's errors by one message."""
-        try:
-            return validate(tree)
-        except ValidationError as error:
-            errors = error.errors(include_url=False)
-            # A value that fits no member of a union has an error per member. The innermost is best.
-            of_field = [one for one in errors if one["loc"][:1] == errors[0]["loc"][:1]]
-            first = max(of_field, key=lambda one: _place(one, tree)[1])
-        key, problem = _in_words(first, cls, tree)
-        if first["type"] == "missing" and info.context and info.context["has_base"]:
-            whole = f", as !{cls.tag} replaces a base's kind"
-            problem += whole if TAG in (tree or {}) else ", or name a `base` that has it"
-        refuse(key, problem)
-
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _check_keys(cls, tree: Any) -> Any:
-        tree = {} if tree is None else tree
-        if not isinstance(tree, dict) or tree.get(TAG, cls.tag) != cls.tag:
-            refuse("", f"found {described(tree)}, expected a mapping of keys")
-        fields, values = keys_of(cls), {}
-        for name, value in tree.items():
-            if name != TAG and name not in fields:
-                named = [f"'{key}'" for key in dict.fromkeys(_keys_named(str(name), cls))]
-                advice = f"did you mean {' or '.join(named)}?" if named else hint(name, fields)
-                refuse(str(name), f"unknown key; {advice}")
-            if name != TAG:
-                values[name] = _with_mappings(python_value(value), fields[name].annotation)
-        return values
+    def _without_tag(cls, tree: Any) -> Any:
+        """The keys of a mapping. Nothing is a section of defaults."""
+        if not isinstance(tree, dict) or tree.get(TAG) != cls.tag:
+            return {} if tree is None else tree
+        return {name: value for name, value in tree.items() if name != TAG}
 
     def __eq__(self, other: object) -> bool:
         # The order counts: it numbers the bodies and oscillators of a structure.
@@ -117,17 +131,39 @@ class Section(BaseModel):
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
         """The section of a tree at `key`. Raises InputError that names `source` and key."""
-        # A context means that quantities need units. Without one, numbers are SI.
+        tree = python_value(tree)
         try:
-            return cls.model_validate(tree, context={"has_base": cls.has_base})
+            return cls.model_validate(tree, context=IN_FILE)
         except ValidationError as error:
-            raise _input_error(error, source, key) from None
+            raise _input_error(error, cls, tree, source, key) from None
 
 
-def _input_error(error: ValidationError, source: object, key: str = "") -> InputError:
-    """The error of a section at `key` as an InputError that names `source`."""
-    refused = error.errors(include_url=False)[0]["ctx"]
-    return InputError(source, joined(key, refused["key"]), refused["problem"])
+IN_FILE = "in a file"
+"""Context of a validation where quantities need units. Without it, numbers are SI."""
+
+
+class Kinds:
+    """Annotation of a union of sections as tagged kinds. A mapping without a tag is of the first
+    kind."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: pydantic.GetCoreSchemaHandler
+    ) -> CoreSchema:
+        kinds = typing.get_args(source)
+
+        def tag_of(value: Any) -> str | None:
+            if isinstance(value, dict | None):
+                return str((value or {}).get(TAG, kinds[0].tag))
+            return value.tag if isinstance(value, Section) else None
+
+        def write(section: Section, dump: pydantic.SerializerFunctionWrapHandler) -> Any:
+            return {TAG: section.tag} | dump(section)
+
+        tagged = [Annotated[kind, Tag(kind.tag), Field(title=f"!{kind.tag}")] for kind in kinds]
+        union = Union[tuple(tagged)]  # noqa: UP007
+        return handler.generate_schema(
+            Annotated[union, Discriminator(tag_of), pydantic.WrapSerializer(write)]
+        )
 
 
 def _hashable(value: Any) -> Any:
@@ -142,64 +178,12 @@ def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
     return {field.alias or name: field for name, field in section.model_fields.items()}
 
 
-def _with_mappings(value: Any, annotation: Any) -> Any:
-    """A value with an empty mapping in place of nothing, where its type is a mapping."""
-    if typing.get_origin(annotation) is not dict or not isinstance(value, dict | None):
-        return value
-    _, of_items = typing.get_args(annotation)
-    return {name: _with_mappings(item, of_items) for name, item in (value or {}).items()}
-
-
-def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
-    """Dotted keys in a section that end with a name."""
-    for key, field in keys_of(section).items():
-        for kind in _union(field.annotation):
-            if isinstance(kind, type) and issubclass(kind, Section):
-                if name in keys_of(kind):
-                    yield f"{key}.{name}"
-                yield from (f"{key}.{inner}" for inner in _keys_named(name, kind))
-
-
-class Kinds:
-    """Annotation of a union of sections as tagged kinds. A mapping without a tag is of the first
-    kind."""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: pydantic.GetCoreSchemaHandler
-    ) -> CoreSchema:
-        kinds = {kind.tag: kind for kind in _union(source)}
-
-        def read(value: Any, info: core_schema.ValidationInfo) -> Section:
-            if type(value) in kinds.values():
-                return typing.cast(Section, value)
-            return _kind(value, kinds).model_validate(value, context=info.context)
-
-        def write(section: Section) -> Tree:
-            return {TAG: section.tag} | section.model_dump()
-
-        serializer = core_schema.plain_serializer_function_ser_schema(write)
-        return core_schema.with_info_plain_validator_function(read, serialization=serializer)
-
-
-def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
-    """The kind of a mapping. Refuses a key that only another kind has."""
-    value = {} if value is None else value
-    tags = [f"!{name}" for name in kinds]
-    if not isinstance(value, dict):
-        refuse("", f"found {described(value)}; {hint('!', tags)}")
-    name = value.get(TAG, next(iter(kinds)))
-    if f"!{name}" not in tags:
-        refuse("", f"found !{name}; {hint(f'!{name}', tags)}")
-    for key in value:
-        others = [f"!{other}" for other, kind in kinds.items() if key in keys_of(kind)]
-        if others and f"!{name}" not in others:
-            refuse(key, f"unknown key of !{name}; did you mean {' or '.join(others)}?")
-    return kinds[name]
-
-
-def _union(annotation: Any) -> tuple[Any, ...]:
-    """Members of a union type; the type itself if it is no union."""
-    return typing.get_args(annotation) or (annotation,)
+def sections_in(annotation: Any) -> Iterator[type[Section]]:
+    """All sections that a type names."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        yield annotation
+    for part in typing.get_args(annotation):
+        yield from sections_in(part)
 
 
 @dataclass(frozen=True)
@@ -234,49 +218,98 @@ def python_value(value: Any) -> Any:
     return value
 
 
-def _place(error: ErrorDetails, tree: Any) -> tuple[str, int, Any]:
-    """Key of an error, number of the key's parts, and the tree's value there."""
-    key, depth = "", 0
-    for part in error["loc"]:  # also contains names of union members, which are no keys
+_UNKNOWN = "extra_forbidden", "invalid_key"
+"""Types of pydantic's errors of keys that a section does not have."""
+
+
+def _input_error(
+    error: ValidationError, section: type[Section], tree: Any, source: object, key: str = ""
+) -> InputError:
+    """The error of a section at `key` as an InputError that names `source`."""
+    errors = error.errors(include_url=False)
+    # An unknown key tells why another is missing. A value that fits no member of a union has an
+    # error per member; the innermost is best.
+    first = max(errors, key=lambda one: (one["type"] in _UNKNOWN, len(one["loc"])))
+    place = _place(first["loc"], section, tree)
+    inner, problem = _in_words(first, place)
+    if first["type"] == "missing" and "base" in section.keys_of_files:
+        tag = (place.value or {}).get(TAG)
+        whole = f", as !{tag} replaces a base's kind" if tag else ""
+        problem += whole or ", or name a `base` that has it"
+    return InputError(source, joined(key, inner), problem)
+
+
+class _Place(NamedTuple):
+    """What a tree has at a place, and what is declared there."""
+
+    key: str
+    value: Any
+    sections: list[type[Section]]
+    """Sections that are possible there."""
+    kinds: list[type[Section]]
+    """These, and the other kinds of a section whose tag is known."""
+    unit: str
+
+
+def _place(loc: Sequence[str | int], section: type[Section], tree: Any) -> _Place:
+    """The place of pydantic's error in the validation of a tree as a section."""
+    key, sections, kinds, unit, is_name = "", [section], [section], "", False
+    for part in loc:  # also contains tags and names of union members, which are no keys
         if isinstance(tree, list) and isinstance(part, int):
-            key = joined(key, f"[{part}]")
-        elif isinstance(tree, dict) and part in tree:
-            key = joined(key, str(part))
-        else:
-            continue
-        tree, depth = tree[part], depth + 1
-    if error["type"] == "missing":
-        return joined(key, str(error["loc"][-1])), depth + 1, None
-    return key, depth, tree
+            key, tree = joined(key, f"[{part}]"), tree[part]
+        elif isinstance(tree, dict) and part in tree and part != TAG:
+            key, tree = joined(key, str(part)), tree[part]
+        tagged = [kind for kind in kinds if kind.tag == part]
+        fields = keys_of(sections[0]) if len(sections) == 1 else {}
+        if is_name:
+            is_name = False
+        elif len(sections) > 1 and tagged:
+            sections = tagged
+        elif part in fields:
+            field = fields[str(part)]
+            sections = kinds = list(sections_in(field.annotation))
+            unit, is_name = unit_of(field), typing.get_origin(field.annotation) is dict
+    return _Place(key, tree, sections, kinds, unit)
 
 
-def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[str, str]:
-    """Key and problem of an error in the validation of a tree as a section."""
-    key, _, value = _place(error, tree)
-    context = error.get("ctx", {})
-    if error["type"] == "refused":
-        return joined(key, context["key"]), context["problem"]
-    if error["type"] == "missing":
-        return key, "is missing; give it"
-    expected = error["msg"].removeprefix("Input should be ")
-    if error["type"] in LIMIT_WORDS:
-        name, words, _ = LIMIT_WORDS[error["type"]]
-        unit = unit_of(keys_of(section)[str(error["loc"][0])])
-        if "length" in name:
-            unit = f"items, not {len(value or ())}"
-        expected = f"{words} {context[name]:.4g} {unit}".rstrip()
-    return key, f"found {described(value)}, expected {expected}"
+def _in_words(error: ErrorDetails, place: _Place) -> tuple[str, str]:
+    """Key and problem of an error at a place."""
+    key, kind, context = place.key, error["type"], error.get("ctx", {})
+    found = f"found {described(place.value)}"
+    name = str(error["loc"][-1]) if error["loc"] else ""
+    if kind == "value_error":
+        cause = context["error"]
+        return joined(key, getattr(cause, "key", "")), getattr(cause, "problem", str(cause))
+    if kind == "missing":
+        return joined(key, name), "is missing; give it"
+    if name == TAG:
+        return key, f"{found}, expected a mapping of keys"
+    if kind in _UNKNOWN:
+        return key, f"unknown key; {_advice(name, place)}"
+    if kind.startswith("union_tag"):
+        return key, f"{found}; {hint(found, [f'!{one.tag}' for one in place.kinds])}"
+    expected = re.sub(".* should (be|have) ", "", error["msg"]).replace(" after validation", "")
+    for limit in {"gt", "ge", "le"} & context.keys():
+        expected = f"{expected.rpartition(' ')[0]} {plainest(context[limit], place.unit)}"
+    return key, f"{found}, expected {re.sub('a valid dict.*', 'a mapping of keys', expected)}"
 
 
-LIMIT_WORDS = {
-    "greater_than": ("gt", "more than", "> {}"),
-    "greater_than_equal": ("ge", "at least", "≥ {}"),
-    "less_than_equal": ("le", "at most", "≤ {}"),
-    "too_short": ("min_length", "at least", "≥ {} items"),
-    "too_long": ("max_length", "at most", "≤ {} items"),
-}
-"""Limits by pydantic's types of errors: pydantic's names of their numbers, words for them in
-errors, and their texts on the page of keys."""
+def _advice(name: str, place: _Place) -> str:
+    """Advice about an unknown key: other kinds or inner sections that have it, or a similar one."""
+    named = [f"!{kind.tag}" for kind in place.kinds if name in keys_of(kind)]
+    named += [f"'{key}'" for section in place.sections for key in _keys_named(name, section)]
+    if named:
+        return f"did you mean {' or '.join(dict.fromkeys(named))}?"
+    return hint(name, [key for section in place.sections for key in keys_of(section)])
+
+
+def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
+    """Dotted keys in a section that end with a name."""
+    for key, field in keys_of(section).items():
+        for kind in sections_in(field.annotation):
+            if name in keys_of(kind):
+                yield f"{key}.{name}"
+            yield from (f"{key}.{inner}" for inner in _keys_named(name, kind))
 
 
 def joined(key: str, inner: str) -> str:

@@ -141,7 +141,8 @@ LARGEST = 1e15
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
 _FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*")
+PATTERN = rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*"
+"""Regular expression of a quantity: groups of its number, a "1 /" before its unit, and its unit."""
 
 
 @functools.lru_cache(maxsize=1000)  # a base is read again for each file
@@ -153,7 +154,7 @@ def quantity_to_si(text: str, unit: str) -> float:
     import pint
 
     example = f"expected a quantity that converts to {unit}"
-    match = _QUANTITY.fullmatch(text)
+    match = re.fullmatch(PATTERN, text)
     if match is None:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
     try:
