@@ -6,16 +6,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from pydantic import TypeAdapter
 
 from tetra_drake.formatting import TextTable
 from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.section import Tree, joined
+from tetra_drake.settings.refusals import Tree, keys_in, members_of
 from tetra_drake.settings.units import plainest
 
 PAGE, SCHEMA = (Path(__file__).parent / name for name in ("KEYS.md", "schema.json"))
@@ -33,9 +32,6 @@ _WORDS = {"string": "text", "boolean": "true or false"}
 _LIMITS = {"exclusiveMinimum": "> {}", "minimum": "≥ {}", "maximum": "≤ {}"}
 _LENGTHS = {"minItems": "≥ {} items", "maxItems": "≤ {} items"}
 
-Row = tuple[str, str, str, str]
-"""Key, value, default and meaning."""
-
 
 def schema_text() -> str:
     """The JSON Schema of scenario files, for editors and other tools.
@@ -50,22 +46,23 @@ def keys_page() -> str:
     parts, others = [_INTRODUCTION], []
     schema = Scenario.model_json_schema()
     for key, node in schema["properties"].items():
-        sections = [part for part in _parts(node) if "$ref" in part]
+        sections = [member for member in members_of(node, schema) if "$ref" in member]
         for section in sections:
-            content = _resolved(section, schema)
             parts.append(f"## `{key}`" + (f": `{section['title']}`" if "title" in section else ""))
-            parts.append(_line(content["description"]))
-            rows = list(_rows(key, content, schema))
+            parts.append(_line(section["description"]))
+            rows = [row for row in keys_in(section, schema, key) if "description" in row[1]]
             parts += [_table_of_keys(rows)] if rows else []
-        others += [] if sections else [(key, *_cells(node))]
+        others += [] if sections else [(key, node)]
     parts += ["## Other keys", _table_of_keys(others)]
     metrics = TypeAdapter(Metrics).json_schema()
     parts += ["## Metrics", _line(metrics["description"]), _table_of_metrics(metrics["properties"])]
     return "\n\n".join(parts) + "\n"
 
 
-def _table_of_keys(rows: Iterable[Row]) -> str:
-    cells = [(f"`{key}`", *rest) for key, *rest in rows]
+def _table_of_keys(rows: Iterable[tuple[str, Tree]]) -> str:
+    cells = [
+        (f"`{key}`", _value(node), _default(node), _line(node["description"])) for key, node in rows
+    ]
     return TextTable(["key", "value", "default", "what it is"], cells, range(4)).markdown()
 
 
@@ -78,35 +75,14 @@ def _table_of_metrics(properties: Tree) -> str:
     return TextTable(headings, rows, range(5)).markdown()
 
 
-def _rows(key: str, section: Tree, schema: Tree) -> Iterator[Row]:
-    """All keys of a section and of its inner sections."""
-    for name, node in section["properties"].items():
-        inner, item = joined(key, name), node
-        if isinstance(node.get("additionalProperties"), dict):
-            inner, item = f"{inner}.NAME", node["additionalProperties"]
-        if "$ref" in item:
-            yield from _rows(inner, _resolved(item, schema), schema)
-        else:
-            yield inner, *_cells(node)
-
-
-def _parts(node: Tree) -> list[Tree]:
-    """Members of a union; a type itself if it is no union."""
-    return list(node.get("anyOf", [node]))
-
-
-def _resolved(node: Tree, schema: Tree) -> Any:
-    """The section that a node refers to."""
-    return schema["$defs"][node["$ref"].rpartition("/")[2]]
-
-
-def _cells(node: Tree) -> tuple[str, str, str]:
-    """Value, default and meaning of a key."""
-    text = json.dumps(node["default"]).strip('"') if "default" in node else ""
-    is_quantity = any("unit" in part for part in _parts(node))
-    default = text if is_quantity or not text else f"`{text}`"
-    none = text in ("null", "[]", "{}")
-    return _value(node), "none" if none else default, _line(node["description"])
+def _default(node: Tree) -> str:
+    """The default as text of a file; empty if there is none."""
+    if "default" not in node:
+        return ""
+    text = json.dumps(node["default"]).strip('"')
+    if text in ("null", "[]", "{}"):
+        return "none"
+    return text if "unit" in node else f"`{text}`"
 
 
 def _value(node: Tree) -> str:

@@ -36,7 +36,7 @@ from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_structure import RobotKind
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.settings.quantities import by_name
+from tetra_drake.settings.quantities import ByName
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Section, Tree, flattened, written
 from tetra_drake.settings.units import (
@@ -81,11 +81,13 @@ class Scenario(Section):
     simulation: SimulationSection
     engine: EngineKind = Drake()
     objective: Annotated[
-        dict[str, float], *by_name({name: inverse(unit) for name, unit in UNITS.items()})
-    ] = Field(min_length=1)
+        dict[str, float],
+        ByName({name: inverse(unit) for name, unit in UNITS.items()}),
+        Field(min_length=1),
+    ]
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
-    require: Annotated[dict[str, float], *by_name(UNITS)] = Field(default={})
+    require: Annotated[dict[str, float], ByName(UNITS)] = Field(default={})
     """Limits of metrics: a gait beyond one counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection

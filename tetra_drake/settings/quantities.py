@@ -6,14 +6,15 @@ and mappings may have such types, too.
 
 from __future__ import annotations
 
-import typing
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
+import pydantic
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo
-from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema, core_schema
 
-from tetra_drake.settings.refusals import described, hint, refuse
+from tetra_drake.settings.refusals import described
 from tetra_drake.settings.units import PATTERN, plainest, quantity_to_si
 
 
@@ -33,23 +34,25 @@ class Quantity(float):
 
 def quantity(unit: str, **words: float) -> tuple[Any, ...]:
     """Annotations of a type of numbers with an SI unit. In a file, each of `words` stands for a
-    number."""
+    number.
+
+    In a validation with a context (of a file), numbers without a unit are refused, except 0.
+    """
+    expected = f"expected a quantity that converts to {unit}"
 
     def read(value: Any, info: ValidationInfo) -> Any:
-        is_word = isinstance(value, str) and value in words
-        return words[value] if is_word else _si_number(value, unit, info)
+        if isinstance(value, Quantity):
+            return float(value)
+        if isinstance(value, str):
+            return words[value] if value in words else quantity_to_si(value, unit)
+        if info.context and type(value) in (int, float) and value != 0:
+            raise ValueError(f"found {described(value)} without a unit, {expected}")
+        return value
 
     def write(number: float) -> Any:
         return Quantity(number, unit)
 
-    schema = Field(json_schema_extra=_text_schema(unit, *words))
-    return BeforeValidator(read), PlainSerializer(write), schema
-
-
-def _text_schema(unit: str, *words: str) -> dict[str, Any]:
-    """JSON Schema of a quantity in a file: a text, or the number 0."""
-    expected = f"Expected a quantity that converts to {unit}."
-    return {
+    schema: dict[str, Any] = {
         "type": ["string", "number"],
         "pattern": f"^({'|'.join((*words, PATTERN))})$",
         "patternErrorMessage": expected,
@@ -57,6 +60,7 @@ def _text_schema(unit: str, *words: str) -> dict[str, Any]:
         "then": {"const": 0, "errorMessage": expected},
         "unit": unit,
     }
+    return BeforeValidator(read), PlainSerializer(write), Field(json_schema_extra=schema)
 
 
 Length = Annotated[float, *quantity("m")]
@@ -90,64 +94,26 @@ Keyed = Annotated[
 """A mapping with names of the user's choice. Nothing is an empty mapping."""
 
 
-def by_name(units: Mapping[str, str]) -> tuple[Any, ...]:
-    """Annotations of a type of mappings of numbers, or of lists of numbers, with SI units by name;
-    "" for a number without a unit."""
+@dataclass(frozen=True)
+class ByName:
+    """Annotation of a type of mappings with a number, or several, by each name."""
 
-    def read(given: Any, info: ValidationInfo) -> Any:
-        if not isinstance(given, dict):
-            return {} if given is None else given
-        for name in given:
-            if name not in units:
-                refuse(str(name), f"unknown name; {hint(name, units)}")
-        return _each(given, lambda x, name: _si_number(x, units[name], info, key=name))
+    units: Mapping[str, str]
+    """SI units by name; "" for a number without a unit."""
+    value: Callable[[Any], Any] = lambda number: number
+    """Function that makes the type of a value from the type of its numbers."""
 
-    def write(numbers: dict[str, Any]) -> Any:
-        return _each(numbers, lambda x, name: Quantity(x, units[name]))
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: pydantic.GetCoreSchemaHandler
+    ) -> CoreSchema:
+        def in_order(given: Any, read: pydantic.ValidatorFunctionWrapHandler) -> Any:
+            values = read({} if given is None else given)
+            return {name: values[name] for name in given or ()}
 
-    def describe(schema: dict[str, Any]) -> None:
-        value = schema["additionalProperties"]
-        texts = {name: _text_schema(unit) if unit else {} for name, unit in units.items()}
-        if "items" in value:
-            texts = {name: {"items": value["items"] | text} for name, text in texts.items()}
-        properties = {name: value | text for name, text in texts.items()}
-        schema |= EMPTY | {"properties": properties, "additionalProperties": False}
-
-    return BeforeValidator(read), PlainSerializer(write), Field(json_schema_extra=describe)
-
-
-def _each(given: dict[str, Any], change: Callable[[Any, str], Any]) -> dict[str, Any]:
-    """A mapping with change(number, name) in place of each number. Values are numbers or lists."""
-    return {
-        name: [change(x, name) for x in value] if isinstance(value, list) else change(value, name)
-        for name, value in given.items()
-    }
-
-
-def _si_number(value: Any, unit: str, info: ValidationInfo, *, key: str = "") -> Any:
-    """The SI number of a quantity. Other values are returned as they are, for pydantic's errors.
-
-    In a validation with a context (for a file), numbers without a unit are refused, except 0.
-    """
-    if isinstance(value, Quantity):
-        return float(value)
-    if isinstance(value, str) and unit:
-        try:
-            return quantity_to_si(value, unit)
-        except ValueError as error:
-            refuse(key, str(error))
-    if info.context and unit and type(value) in (int, float) and value != 0:
-        expected = f"expected a quantity that converts to {unit}"
-        refuse(key, f"found {described(value)} without a unit, {expected}")
-    return value
-
-
-def unit_of(field: FieldInfo) -> str:
-    """Unit of the numbers of a field; "" if they have none."""
-    parts = [field, field.annotation]
-    for part in parts:
-        extra = getattr(part, "json_schema_extra", None)
-        if isinstance(extra, dict) and "unit" in extra:
-            return str(extra["unit"])
-        parts += typing.get_args(part)
-    return ""
+        fields = {}
+        for name, unit in self.units.items():
+            number = Annotated[float, *quantity(unit)] if unit else float
+            value = handler.generate_schema(self.value(number))
+            fields[name] = core_schema.typed_dict_field(value, required=False)
+        table = core_schema.typed_dict_schema(fields, extra_behavior="forbid")
+        return core_schema.no_info_wrap_validator_function(in_order, table)

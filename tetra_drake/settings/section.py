@@ -11,58 +11,47 @@ import functools
 import os
 import re
 import typing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, Union
+from typing import Annotated, Any, ClassVar, Self, Union
 
 import pydantic
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, ErrorDetails
+from pydantic_core import CoreSchema
 
 from tetra_drake.errors import InputError
-from tetra_drake.settings.quantities import EMPTY, Quantity, unit_of
-from tetra_drake.settings.refusals import TAG, described, hint
+from tetra_drake.settings.quantities import EMPTY, Quantity
+from tetra_drake.settings.refusals import TAG, Tree, input_error, joined
 from tetra_drake.settings.units import plainest
 
-Tree = dict[str, Any]
 Show = Callable[[float, str], str]
 """Function that makes a text from a number and its SI unit."""
-
-_PYDANTIC_NAMES = {"gt": "exclusiveMinimum", "ge": "minimum", "le": "maximum", "oneOf": "anyOf"}
-"""What pydantic writes in a JSON Schema, and what belongs there. Tags are no part of a mapping, so
-a mapping may fit several kinds."""
 
 
 def _complete_schema(schema: Tree, section: type[Section]) -> None:
     """Changes pydantic's JSON Schema of a section to what files may contain."""
-    del schema["title"]
-    schema.pop("required", None)  # a base may have the keys
     schema |= EMPTY
+    schema.pop("required", None)  # a base may have the keys
     for key, text in section.keys_of_files.items():
         schema["properties"][key] = {"type": "string", "default": None, "description": text}
-    _correct_schema(schema)
+    for node in parts_in(schema):
+        if not isinstance(node, dict):
+            continue
+        for name, correct in _CORRECT_NAMES.items():
+            if name in node:
+                node[correct] = node.pop(name)
+        if not str(node.get("title", "!")).startswith("!"):
+            del node["title"]
+        default = node.get("default")
+        if "anyOf" in node and isinstance(default, dict):
+            del node["default"]
+        if "unit" in node and isinstance(default, float):
+            node["default"] = plainest(default, node["unit"])
 
 
-def _correct_schema(node: Any) -> None:
-    """Corrects a part of pydantic's JSON Schema. Defaults become texts with units."""
-    if isinstance(node, list):
-        for item in node:
-            _correct_schema(item)
-    if not isinstance(node, dict):
-        return
-    for name, correct in _PYDANTIC_NAMES.items():
-        if name in node:
-            node[correct] = node.pop(name)
-    if not str(node.get("title", "!")).startswith("!"):
-        del node["title"]
-    default = node.get("default")
-    if "anyOf" in node and isinstance(default, dict):
-        del node["default"]
-    if "unit" in node and isinstance(default, float):
-        node["default"] = plainest(default, node["unit"])
-    for item in node.values():
-        _correct_schema(item)
+_CORRECT_NAMES = {"gt": "exclusiveMinimum", "ge": "minimum", "le": "maximum", "oneOf": "anyOf"}
+"""Names in a JSON Schema by those that pydantic writes. A mapping may be of several kinds."""
 
 
 class Section(BaseModel):
@@ -88,7 +77,7 @@ class Section(BaseModel):
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise _input_error(error, type(self), values, type(self).__name__) from None
+            raise input_error(error, type(self), values, type(self).__name__) from None
 
     # Otherwise pydantic would also call it in the validation of a tree.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
@@ -125,7 +114,7 @@ class Section(BaseModel):
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
         """All lengths in m. A copy with disturbed numbers keeps them."""
-        numbers = _quantities(self.model_dump())
+        numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
 
     @classmethod
@@ -135,7 +124,7 @@ class Section(BaseModel):
         try:
             return cls.model_validate(tree, context=IN_FILE)
         except ValidationError as error:
-            raise _input_error(error, cls, tree, source, key) from None
+            raise input_error(error, cls, tree, source, key) from None
 
 
 IN_FILE = "in a file"
@@ -160,7 +149,7 @@ class Kinds:
             return {TAG: section.tag} | dump(section)
 
         tagged = [Annotated[kind, Tag(kind.tag), Field(title=f"!{kind.tag}")] for kind in kinds]
-        union = Union[tuple(tagged)]  # noqa: UP007
+        union: Any = Union[tuple(tagged)]  # noqa: UP007
         return handler.generate_schema(
             Annotated[union, Discriminator(tag_of), pydantic.WrapSerializer(write)]
         )
@@ -176,14 +165,6 @@ def _hashable(value: Any) -> Any:
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
     """Fields of a section by their keys in files."""
     return {field.alias or name: field for name, field in section.model_fields.items()}
-
-
-def sections_in(annotation: Any) -> Iterator[type[Section]]:
-    """All sections that a type names."""
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        yield annotation
-    for part in typing.get_args(annotation):
-        yield from sections_in(part)
 
 
 @dataclass(frozen=True)
@@ -216,105 +197,6 @@ def python_value(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: python_value(item) for name, item in value.items()}
     return value
-
-
-_UNKNOWN = "extra_forbidden", "invalid_key"
-"""Types of pydantic's errors of keys that a section does not have."""
-
-
-def _input_error(
-    error: ValidationError, section: type[Section], tree: Any, source: object, key: str = ""
-) -> InputError:
-    """The error of a section at `key` as an InputError that names `source`."""
-    errors = error.errors(include_url=False)
-    # An unknown key tells why another is missing. A value that fits no member of a union has an
-    # error per member; the innermost is best.
-    first = max(errors, key=lambda one: (one["type"] in _UNKNOWN, len(one["loc"])))
-    place = _place(first["loc"], section, tree)
-    inner, problem = _in_words(first, place)
-    if first["type"] == "missing" and "base" in section.keys_of_files:
-        tag = (place.value or {}).get(TAG)
-        whole = f", as !{tag} replaces a base's kind" if tag else ""
-        problem += whole or ", or name a `base` that has it"
-    return InputError(source, joined(key, inner), problem)
-
-
-class _Place(NamedTuple):
-    """What a tree has at a place, and what is declared there."""
-
-    key: str
-    value: Any
-    sections: list[type[Section]]
-    """Sections that are possible there."""
-    kinds: list[type[Section]]
-    """These, and the other kinds of a section whose tag is known."""
-    unit: str
-
-
-def _place(loc: Sequence[str | int], section: type[Section], tree: Any) -> _Place:
-    """The place of pydantic's error in the validation of a tree as a section."""
-    key, sections, kinds, unit, is_name = "", [section], [section], "", False
-    for part in loc:  # also contains tags and names of union members, which are no keys
-        if isinstance(tree, list) and isinstance(part, int):
-            key, tree = joined(key, f"[{part}]"), tree[part]
-        elif isinstance(tree, dict) and part in tree and part != TAG:
-            key, tree = joined(key, str(part)), tree[part]
-        tagged = [kind for kind in kinds if kind.tag == part]
-        fields = keys_of(sections[0]) if len(sections) == 1 else {}
-        if is_name:
-            is_name = False
-        elif len(sections) > 1 and tagged:
-            sections = tagged
-        elif part in fields:
-            field = fields[str(part)]
-            sections = kinds = list(sections_in(field.annotation))
-            unit, is_name = unit_of(field), typing.get_origin(field.annotation) is dict
-    return _Place(key, tree, sections, kinds, unit)
-
-
-def _in_words(error: ErrorDetails, place: _Place) -> tuple[str, str]:
-    """Key and problem of an error at a place."""
-    key, kind, context = place.key, error["type"], error.get("ctx", {})
-    found = f"found {described(place.value)}"
-    name = str(error["loc"][-1]) if error["loc"] else ""
-    if kind == "value_error":
-        cause = context["error"]
-        return joined(key, getattr(cause, "key", "")), getattr(cause, "problem", str(cause))
-    if kind == "missing":
-        return joined(key, name), "is missing; give it"
-    if name == TAG:
-        return key, f"{found}, expected a mapping of keys"
-    if kind in _UNKNOWN:
-        return key, f"unknown key; {_advice(name, place)}"
-    if kind.startswith("union_tag"):
-        return key, f"{found}; {hint(found, [f'!{one.tag}' for one in place.kinds])}"
-    expected = re.sub(".* should (be|have) ", "", error["msg"]).replace(" after validation", "")
-    for limit in {"gt", "ge", "le"} & context.keys():
-        expected = f"{expected.rpartition(' ')[0]} {plainest(context[limit], place.unit)}"
-    return key, f"{found}, expected {re.sub('a valid dict.*', 'a mapping of keys', expected)}"
-
-
-def _advice(name: str, place: _Place) -> str:
-    """Advice about an unknown key: other kinds or inner sections that have it, or a similar one."""
-    named = [f"!{kind.tag}" for kind in place.kinds if name in keys_of(kind)]
-    named += [f"'{key}'" for section in place.sections for key in _keys_named(name, section)]
-    if named:
-        return f"did you mean {' or '.join(dict.fromkeys(named))}?"
-    return hint(name, [key for section in place.sections for key in keys_of(section)])
-
-
-def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
-    """Dotted keys in a section that end with a name."""
-    for key, field in keys_of(section).items():
-        for kind in sections_in(field.annotation):
-            if name in keys_of(kind):
-                yield f"{key}.{name}"
-            yield from (f"{key}.{inner}" for inner in _keys_named(name, kind))
-
-
-def joined(key: str, inner: str) -> str:
-    """Joins a key and an inner key, such as "robot" and "gravity", or "pairs" and "[0]"."""
-    return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 
 def parts_of(key: str) -> list[str | int]:
@@ -353,13 +235,12 @@ def written(value: Any, show: Show = "{!r} {}".format) -> Any:
     return value
 
 
-def _quantities(value: Any) -> Iterator[Quantity]:
-    """All quantities in a tree's value."""
-    if isinstance(value, Quantity):
-        yield value
-    elif isinstance(value, (dict, list)):
+def parts_in(value: Any) -> Iterator[Any]:
+    """A tree's value and all values in it."""
+    yield value
+    if isinstance(value, (dict, list)):
         for item in value.values() if isinstance(value, dict) else value:
-            yield from _quantities(item)
+            yield from parts_in(item)
 
 
 def flattened(tree: Tree, key: str = "") -> dict[str, Any]:
