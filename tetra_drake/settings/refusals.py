@@ -41,18 +41,21 @@ def input_error(
     # An unknown key tells why another is missing. A value that fits no member of a union has an
     # error per member; the innermost is best.
     first = max(errors, key=lambda one: (one["type"] in _UNKNOWN, len(one["loc"])))
+    is_unknown, name = first["type"] in _UNKNOWN, str(first["loc"][-1]) if first["loc"] else ""
     schema = section.model_json_schema()
     members = kinds = [schema]
-    for part in first["loc"]:  # also contains tags and names of union members, which are no keys
+    # The place also contains tags and names of union members, which are no keys.
+    for part in first["loc"][:-1] if is_unknown else first["loc"]:
         if isinstance(tree, list) and isinstance(part, int):
             key, tree = joined(key, f"[{part}]"), tree[part]
-        elif isinstance(tree, dict) and part in tree and part != TAG:
+        elif isinstance(tree, dict) and part in tree:
             key, tree = joined(key, str(part)), tree[part]
         inner = _inner(part, members, schema)
         if inner is not members:
             members, kinds = inner, members if len(members) > 1 else inner
-    if first["type"] in _UNKNOWN and part != TAG:
-        return InputError(source, key, f"unknown key; {_advice(str(part), members, kinds, schema)}")
+    if is_unknown and name != TAG:
+        advice = _advice(name, members, kinds, schema)
+        return InputError(source, joined(key, name), f"unknown key; {advice}")
     inner_key, problem = _in_words(first, tree, members)
     if first["type"] == "missing" and "base" in schema["properties"]:
         whole = f", as !{tree[TAG]} replaces a base's kind" if TAG in (tree or {}) else ""
@@ -97,12 +100,13 @@ def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
 
 def _advice(name: str, members: list[Tree], kinds: list[Tree], schema: Tree) -> str:
     """Advice about a key that a section does not have."""
-    meant = [kind["title"] for kind in kinds if name in kind.get("properties", {})]
+    meant = [kind["title"] for kind in kinds if "title" in kind and name in kind["properties"]]
     keys = [key for member in members for key, _ in keys_in(member, schema)]
     meant += [f"'{key}'" for key in keys if key.endswith(f".{name}")]
     if meant:
         return f"did you mean {' or '.join(dict.fromkeys(meant))}?"
-    return hint(name, [key for member in members for key in member["properties"]])
+    known = [key for member in members for key in member["properties"] if key != name]
+    return hint(name, known)
 
 
 def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str, str]:

@@ -73,7 +73,7 @@ class Section(BaseModel):
     """Name of the kind in files; the name of the class if not given."""
 
     def __init__(self, **values: Any) -> None:
-        values = python_value(values)
+        values = tree_value(values)
         try:
             super().__init__(**values)
         except ValidationError as error:
@@ -120,7 +120,7 @@ class Section(BaseModel):
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
         """The section of a tree at `key`. Raises InputError that names `source` and key."""
-        tree = python_value(tree)
+        tree = tree_value(tree)
         try:
             return cls.model_validate(tree, context=IN_FILE)
         except ValidationError as error:
@@ -186,17 +186,26 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
                 yield from varied(item, joined(inner, part))
 
 
-def python_value(value: Any) -> Any:
-    """Converts tuples, arrays and numbers of numpy, and paths to lists, numbers and texts."""
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    if isinstance(value, (list, tuple)):
-        return [python_value(item) for item in value]
+def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
+    """A tree's value with change(x) in place of each x that is no list and no mapping."""
     if isinstance(value, Mapping):
-        return {name: python_value(item) for name, item in value.items()}
-    return value
+        return {name: mapped(item, change) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [mapped(item, change) for item in value]
+    return change(value)
+
+
+def tree_value(value: Any) -> Any:
+    """Converts sections, tuples, arrays and numbers of numpy, and paths to what trees hold."""
+
+    def convert(part: Any) -> Any:
+        if isinstance(part, Section):
+            return {TAG: part.tag} | part.model_dump()
+        if isinstance(part, os.PathLike):
+            return os.fspath(part)
+        return part.tolist() if hasattr(part, "tolist") else part
+
+    return mapped(value, convert)
 
 
 def parts_of(key: str) -> list[str | int]:
@@ -215,24 +224,22 @@ _ITEMS = re.compile(r"[^\[](\[\d+\])+$")
 def value_at(tree: Any, key: str) -> Any:
     """Value of a tree at a dotted key; None if there is none."""
     for part in parts_of(key):
-        if isinstance(tree, dict):
-            tree = tree.get(part)
-        elif isinstance(tree, list) and isinstance(part, int) and part < len(tree):
+        try:
             tree = tree[part]
-        else:
+        except (KeyError, IndexError, TypeError):
             return None
     return tree
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
     """A tree's value for a file. `show` makes the texts of quantities."""
-    if isinstance(value, Quantity):
-        return show(float(value), value.unit) if value.unit else float(value)
-    if isinstance(value, dict):
-        return {name: written(item, show) for name, item in value.items()}
-    if isinstance(value, list):
-        return [written(item, show) for item in value]
-    return value
+
+    def write(part: Any) -> Any:
+        if not isinstance(part, Quantity):
+            return part
+        return show(float(part), part.unit) if part.unit else float(part)
+
+    return mapped(value, write)
 
 
 def parts_in(value: Any) -> Iterator[Any]:
