@@ -18,7 +18,7 @@ class Flat(Section):
 
 
 class Incline(Section):
-    slope: Angle
+    slope: Angle = Field(le=4)
     surface: Literal["rough", "smooth"] = "rough"
 
 
@@ -79,11 +79,11 @@ def test_a_section_from_python_is_checked_and_does_not_change(refused):
 
 BAD = [
     ("terrain: !Flat 5", "", "!Flat"),
-    ("cont: 3", "cont", "'count'"),
+    ("terrain: !Incline {slop: 1 rad}", "terrain.slop", "'slope'"),  # which is missing, too
     ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
     ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
     ("terrain: !Incline", "terrain.slope", "missing"),
-    ("inner: {slope: }", "inner.slope", "nothing"),
+    ("inner: {slope: 300 deg}", "inner.slope", "less than or equal to 4 rad"),
     ("terrain: !Cells {cells: [1 m, 1 m, 1 m, one]}", "terrain.cells[3]", "'one'"),
     ("limits: {a: 1}", "limits.a", "1 without a unit"),
     ("limits: {b: 1}", "limits.b", "of a, share"),

@@ -41,7 +41,7 @@ from tetra_drake.settings.quantities import (
     Time,
 )
 from tetra_drake.settings.refusals import described, hint, refuse
-from tetra_drake.settings.section import Kinds, Section, Tree, Varied
+from tetra_drake.settings.section import Kinds, Section, Tree, Varied, mapped
 from tetra_drake.settings.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
@@ -415,17 +415,11 @@ class StructureFile(Section):
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
-
-        def with_unit(place: Any) -> Any:
-            """The coordinates of a node with unit. Wrong values, such as lists, stay as they
-            are."""
-            if not isinstance(place, list):
-                return place
-            return [f"{x!r} {unit}" if type(x) in (int, float) else x for x in place]
-
         tree = tree | {"unit": "mm" if unit == "mm" else None}
-        if isinstance(tree.get("nodes"), dict):
-            tree["nodes"] = {name: with_unit(place) for name, place in tree["nodes"].items()}
+        if "nodes" in tree:
+            tree["nodes"] = mapped(
+                tree["nodes"], lambda x: f"{x!r} {unit}" if type(x) in (int, float) else x
+            )
         return tree
 
     @pydantic.model_validator(mode="before")

@@ -105,7 +105,7 @@ def _advice(name: str, members: list[Tree], kinds: list[Tree], schema: Tree) -> 
     meant += [f"'{key}'" for key in keys if key.endswith(f".{name}")]
     if meant:
         return f"did you mean {' or '.join(dict.fromkeys(meant))}?"
-    known = [key for member in members for key in member["properties"] if key != name]
+    known = [key for one in members for key in one.get("properties", {}) if key != name]
     return hint(name, known)
 
 
