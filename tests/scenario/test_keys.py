@@ -32,9 +32,7 @@ def test_an_editor_knows_units_defaults_tags_and_keys_that_files_alone_have():
     schema = json.loads(schema_text())
     assert "base" in schema["properties"]
     spacing = schema["$defs"]["Tetrahedra"]["properties"]["spacing"]
-    accepted = [
-        text for text in ("3 in", "balanced", "3", "in") if re.match(spacing["pattern"], text)
-    ]
+    accepted = [t for t in ("3 in", "balanced", "3", "in") if re.match(spacing["pattern"], t)]
     assert (accepted, spacing["unit"], spacing["minimum"]) == (["3 in", "balanced"], "m", 0)
     assert schema["$defs"]["Compiled"]["properties"]["max_step"]["default"] == "3 ms"
     kinds = (one for node in schema["properties"].values() for one in members_of(node, schema))

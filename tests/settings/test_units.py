@@ -1,13 +1,11 @@
 """Text with units becomes SI numbers; anything else is refused."""
 
 import math
-from pathlib import Path
 
 import pytest
 
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.units import SYSTEMS, Units, plainest, quantity_to_si, shown_in
+from tetra_drake.settings.units import SYSTEMS, plainest, quantity_to_si, shown_in
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
 # standard gravity (9.80665 m/s^2), whose product is the pound-force.
@@ -25,12 +23,8 @@ def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
     assert quantity_to_si(text, unit) == pytest.approx(expected, rel=1e-14)
 
 
-READ = [
-    ("in", "m", "in", IN),
-    ("in", "N", "lbf", LBF),
-    ("in", "N*s/m^2", "lbf*s/in^2", LBF / IN**2),
-]
-READ += [("in", "1/rad", "/deg", 180 / math.pi), ("cm", "m/s", "cm/s", 0.01)]
+READ = [("in", "N*s/m^2", "lbf*s/in^2", LBF / IN**2), ("in", "1/rad", "/deg", 180 / math.pi)]
+READ += [("in", "m", "in", IN), ("in", "N", "lbf", LBF), ("cm", "m/s", "cm/s", 0.01)]
 READ += [("mm", "1/m", "/mm", 1000), ("SI", "N/m", "N/m", 1), ("in", "kg", "kg", 1)]
 
 
@@ -38,15 +32,6 @@ READ += [("mm", "1/m", "/mm", 1000), ("SI", "N/m", "N/m", 1), ("in", "kg", "kg",
 def test_people_read_numbers_of_the_same_size(system, unit, read, size):
     assert SYSTEMS[system].of(unit) == (pytest.approx(size, rel=1e-14), read)
     assert SYSTEMS[system].shown(2.5 * size, unit) == f"2.5 {read}"
-
-
-def units_of(scenario: Scenario, folder: Path) -> Units:
-    """The same as those of its record, which is in SI, and of a disturbed one."""
-    (folder / "record.yaml").write_text(dump_scenario(scenario))
-    recorded = load_scenario(folder / "record.yaml")
-    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
-    assert scenario.units == recorded.units == disturbed.units
-    return scenario.units
 
 
 SMALL = {"robot.strut_length": "15 cm", "robot.strut_diameter": "3 mm"}
@@ -59,10 +44,12 @@ OF_ROBOTS += [("prism", {"robot.unit": "mm"}, "mm")]  # given in mm
 @pytest.mark.parametrize(("base", "changes", "expected"), OF_ROBOTS)
 def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, tmp_path):
     scenario = load_scenario(base).with_changes(changes)
-    assert units_of(scenario, tmp_path) == SYSTEMS[expected]
+    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))  # in SI
+    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
+    for each in (scenario, load_scenario(tmp_path / "record.yaml"), disturbed):
+        assert each.units == SYSTEMS[expected]
     with shown_in("SI"):
         assert scenario.units == SYSTEMS["SI"]
-    assert scenario.units == SYSTEMS[expected]
 
 
 ROUND = {"6 in": "m", "240 mm/s": "m/s", "27 lbf*s/in^2": "N*s/m^2", "9.80665 m/s^2": "m/s^2"}
