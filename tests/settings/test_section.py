@@ -87,6 +87,7 @@ BAD = [
     ("terrain: !Cells {cells: [1 m, 1 m, 1 m, one]}", "terrain.cells[3]", "'one'"),
     ("limits: {a: 1}", "limits.a", "1 without a unit"),
     ("limits: {b: 1}", "limits.b", "of a, share"),
+    ("limits: {share: true}", "limits.share", "true"),
 ]
 
 

@@ -115,5 +115,6 @@ class ByName:
             number = Annotated[float, *quantity(unit)] if unit else float
             value = handler.generate_schema(self.value(number))
             fields[name] = core_schema.typed_dict_field(value, required=False)
-        table = core_schema.typed_dict_schema(fields, extra_behavior="forbid")
+        strict = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
+        table = core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=strict)
         return core_schema.no_info_wrap_validator_function(in_order, table)
