@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tetra_drake.settings.quantities import Keyed, Speed, Time
+from tetra_drake.settings.quantities import Keyed, Speed, Time, Value
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
-
-Value = TypeVar("Value")
 
 
 class GaitBounds(Section):

@@ -182,9 +182,7 @@ class StructureFile(Section):
     """A tensegrity: nodes, struts, cables and the oscillators that actuate cables."""
 
     tag: ClassVar[str] = "Structure"
-    keys_of_files: ClassVar[dict[str, str]] = {
-        "file": "Name or file of a structure; the other keys change it."
-    }
+    keys_of_files: ClassVar = {"file": "Name or file of a structure; the other keys change it."}
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
     """Properties that some metrics need and this robot does not have."""
     slack: ClassVar[bool] = True

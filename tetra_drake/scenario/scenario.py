@@ -57,6 +57,9 @@ need about 3 GB."""
 _WIDTH, _ROWS = 100, 20
 """Largest number of characters in a line of a printed scenario, and of rows in a notebook."""
 
+_OF_WEIGHTS = {name: inverse(unit) for name, unit in UNITS.items()}
+"""Units of the weights in an objective."""
+
 MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
 
@@ -64,9 +67,7 @@ MOST_SAMPLES = 2_000_000
 class Scenario(Section):
     """Scenario: all settings of an experiment except the gait."""
 
-    keys_of_files: ClassVar[dict[str, str]] = {
-        "base": "Name or file of a scenario that provides what this file does not give."
-    }
+    keys_of_files: ClassVar = {"base": "Name or file of a scenario that has the other values."}
 
     name: str
     """Label of the scenario; equal scenarios may have different names."""
@@ -80,11 +81,7 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: EngineKind = Drake()
-    objective: Annotated[
-        dict[str, float],
-        ByName({name: inverse(unit) for name, unit in UNITS.items()}),
-        Field(min_length=1),
-    ]
+    objective: Annotated[dict[str, float], ByName(_OF_WEIGHTS), Field(min_length=1)]
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
     require: Annotated[dict[str, float], ByName(UNITS)] = Field(default={})
