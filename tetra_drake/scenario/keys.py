@@ -54,8 +54,8 @@ def keys_page() -> str:
             parts += [_table_of_keys(rows)] if rows else []
         others += [] if sections else [(key, node)]
     parts += ["## Other keys", _table_of_keys(others)]
-    metrics = TypeAdapter(Metrics).json_schema()
-    parts += ["## Metrics", _line(metrics["description"]), _table_of_metrics(metrics["properties"])]
+    metrics = TypeAdapter(Metrics).json_schema()["properties"]
+    parts += ["## Metrics", _line(Metrics.__doc__ or ""), _table_of_metrics(metrics)]
     return "\n\n".join(parts) + "\n"
 
 
