@@ -38,6 +38,7 @@ class Settings(Section):
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
     groups: Keyed[str, Keyed[str, int]] = Field(default={})
+    free: Keyed[str, Any] = Field(default={})
     inner: Incline
 
 
@@ -56,6 +57,7 @@ GOOD: list[tuple[str, str, Any]] = [
     ("probe:", "probe", None),
     ("terrain:", "terrain", Flat()),
     ("groups: {a: }", "groups", {"a": {}}),
+    ("free: {a: [1, {b: x}]}", "free", {"a": [1, {"b": "x"}]}),
     ("inner: {surface: smooth}", "inner", Incline(slope=0.0, surface="smooth")),
 ]
 

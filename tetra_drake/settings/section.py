@@ -43,6 +43,8 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
                 node[correct] = node.pop(name)
         if not str(node.get("title", "!")).startswith("!"):
             del node["title"]
+        if node.get("additionalProperties") is True:  # as if it were not given
+            del node["additionalProperties"]
         default = node.get("default")
         if "anyOf" in node and isinstance(default, dict):
             del node["default"]
