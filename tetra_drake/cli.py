@@ -82,6 +82,7 @@ def make_parser() -> Parser:
         _fit,
         _cpg,
         _structure,
+        _schema,
         _prepare,
     ]
     parser.add_commands(commands, common=common)
@@ -590,6 +591,21 @@ def _structure(
         write_whole(sdf, make_sdf(robot.structure, rest, name=robot.scenario.name))
         text += f"\nwrote {sdf}"
     print(text)
+
+
+def _schema() -> None:
+    """Print the JSON Schema of scenario files.
+
+    Editors and other tools read it: each key with its text, limits and default, each kind with its
+    tag as title, each quantity as a text with a pattern, with its SI unit beside it.
+
+    Args:
+
+    Example: tetra-drake schema
+    """
+    from tetra_drake.scenario.keys import schema_text
+
+    print(schema_text(), end="")
 
 
 def _prepare() -> None:

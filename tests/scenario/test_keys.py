@@ -1,13 +1,15 @@
 """The page of all keys."""
 
+import json
 import re
 
 import pytest
 
-from tetra_drake.scenario.keys import PAGE, keys_page
+from tetra_drake.cli import main
+from tetra_drake.scenario.keys import PAGE, SCHEMA, keys_page, schema_text
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
-from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.refusals import TAG, members_of
 
 
 @pytest.fixture(scope="module")
@@ -19,9 +21,24 @@ def rows() -> dict[str, list[str]]:
     return {key.strip("`"): rest for key, *rest in cells}
 
 
-def test_the_page_is_as_the_kinds_say():
-    written = PAGE.read_text(encoding="utf-8")
-    assert written == keys_page(), "write it: python -m tetra_drake.scenario.keys"
+def test_the_page_and_the_schema_are_as_the_kinds_say(capsys):
+    advice = "write them: python -m tetra_drake.scenario.keys"
+    assert PAGE.read_text(encoding="utf-8") == keys_page(), advice
+    assert main(["schema"]) == 0
+    assert SCHEMA.read_text(encoding="utf-8") == capsys.readouterr().out, advice
+
+
+def test_an_editor_knows_units_defaults_tags_and_keys_that_files_alone_have():
+    schema = json.loads(schema_text())
+    assert "base" in schema["properties"]
+    spacing = schema["$defs"]["Tetrahedra"]["properties"]["spacing"]
+    accepted = [t for t in ("3 in", "balanced", "3", "in") if re.match(spacing["pattern"], t)]
+    assert (accepted, spacing["unit"], spacing["minimum"]) == (["3 in", "balanced"], "m", 0)
+    assert schema["$defs"]["Compiled"]["properties"]["max_step"]["default"] == "3 ms"
+    kinds = (one for node in schema["properties"].values() for one in members_of(node, schema))
+    tags = [kind["title"] for kind in kinds if "title" in kind]
+    told = re.search(r'"yaml.customTags": \[(.*?)\]', (PAGE.parent / "README.md").read_text(), re.S)
+    assert re.findall(r'"(!\w+) mapping"', told[1]) == list(dict.fromkeys(tags))
 
 
 def test_each_key_and_each_metric_is_explained(rows):

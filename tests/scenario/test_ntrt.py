@@ -212,14 +212,12 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "key", "fact"),
     [
-        ("nodes: {}\nnods: {}", "nods", "'nodes'"),
         (PRISM.replace("[low1, high2]", "[low1, hihg2]"), "pair_groups.prism_rod[0]", "'high2'"),
         (PRISM.replace("RodInfo", "BoxInfo"), "builders.prism_rod.parameters.radius", "width"),
         (PRISM.replace("tgRodInfo", "tgRoadInfo"), "builders.prism_rod.class", "'tgRodInfo'"),
         (SPINE.replace("1.5]", "9e14]"), "substructures.v1/v2/v3", "'v3'"),
         (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), f"{ROD}[0]", "'prism_rod'"),
         (PRISM.replace("[low2, high3]", "[high2, low1]"), f"{ROD}[1]", f"{ROD}[0]"),
-        (PRISM.replace("1200", "1e6"), "builders.vertical.parameters.pretension", "100000.0 N"),
         (SPINE.replace("v3/node_node", "edge_node"), "bond_groups.string.v1/v2/edge_node", "'A/B"),
         (SPINE.replace("node_node", "node_edge"), f"{EDGES}[0]", "NODE/NODE"),
         (DOCKED.replace("low2/low3", "low1/high2"), "bond_groups.string.a/b/node_edge[1]", "rod"),

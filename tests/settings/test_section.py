@@ -9,7 +9,7 @@ from pydantic import Field
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.settings.quantities import Angle, Length, UnitsByName
+from tetra_drake.settings.quantities import Angle, ByName, Keyed, Length
 from tetra_drake.settings.section import Kinds, Section, written
 
 
@@ -18,7 +18,7 @@ class Flat(Section):
 
 
 class Incline(Section):
-    slope: Angle
+    slope: Angle = Field(le=4)
     surface: Literal["rough", "smooth"] = "rough"
 
 
@@ -34,10 +34,11 @@ class Probe(Section):
 class Settings(Section):
     count: int = Field(ge=2)
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
-    limits: Annotated[dict[str, float], UnitsByName({"a": "N", "share": ""})] = Field(default={})
+    limits: Annotated[dict[str, float], ByName({"a": "N", "share": ""})] = Field(default={})
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
-    groups: dict[str, dict[str, int]] = Field(default={})
+    groups: Keyed[str, Keyed[str, int]] = Field(default={})
+    free: Keyed[str, Any] = Field(default={})
     inner: Incline
 
 
@@ -56,6 +57,7 @@ GOOD: list[tuple[str, str, Any]] = [
     ("probe:", "probe", None),
     ("terrain:", "terrain", Flat()),
     ("groups: {a: }", "groups", {"a": {}}),
+    ("free: {a: [1, {b: x}]}", "free", {"a": [1, {"b": "x"}]}),
     ("inner: {surface: smooth}", "inner", Incline(slope=0.0, surface="smooth")),
 ]
 
@@ -79,14 +81,15 @@ def test_a_section_from_python_is_checked_and_does_not_change(refused):
 
 BAD = [
     ("terrain: !Flat 5", "", "!Flat"),
-    ("cont: 3", "cont", "'count'"),
+    ("terrain: !Incline {slop: 1 rad}", "terrain.slop", "'slope'"),  # which is missing, too
     ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
     ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
     ("terrain: !Incline", "terrain.slope", "missing"),
-    ("inner: {slope: }", "inner.slope", "nothing"),
+    ("inner: {slope: 300 deg}", "inner.slope", "less than or equal to 4 rad"),
     ("terrain: !Cells {cells: [1 m, 1 m, 1 m, one]}", "terrain.cells[3]", "'one'"),
     ("limits: {a: 1}", "limits.a", "1 without a unit"),
     ("limits: {b: 1}", "limits.b", "of a, share"),
+    ("limits: {share: true}", "limits.share", "true"),
 ]
 
 

@@ -1,13 +1,11 @@
 """Text with units becomes SI numbers; anything else is refused."""
 
-from pathlib import Path
+import math
 
 import pytest
 
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.structure_files import read_structure
-from tetra_drake.settings.units import SYSTEMS, Units, plainest, quantity_to_si, shown_in
+from tetra_drake.settings.units import SYSTEMS, plainest, quantity_to_si, shown_in
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
 # standard gravity (9.80665 m/s^2), whose product is the pound-force.
@@ -25,55 +23,33 @@ def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
     assert quantity_to_si(text, unit) == pytest.approx(expected, rel=1e-14)
 
 
-READ = [("in", "m", "in"), ("in", "N", "lbf"), ("in", "N*s/m^2", "lbf*s/in^2")]
-READ += [("in", "1/rad", "/deg"), ("cm", "m/s", "cm/s"), ("mm", "1/m", "/mm"), ("SI", "rad", "deg")]
+READ = [("in", "N*s/m^2", "lbf*s/in^2", LBF / IN**2), ("in", "1/rad", "/deg", 180 / math.pi)]
+READ += [("in", "m", "in", IN), ("in", "N", "lbf", LBF), ("cm", "m/s", "cm/s", 0.01)]
+READ += [("mm", "1/m", "/mm", 1000), ("SI", "N/m", "N/m", 1), ("in", "kg", "kg", 1)]
 
 
-@pytest.mark.parametrize(("system", "unit", "read"), READ)
-def test_people_read_numbers_of_the_same_size(system, unit, read):
-    units = SYSTEMS[system]
-    size, name = units.of(unit)
-    assert name == read
-    assert size == pytest.approx(quantity_to_si(f"1 {name}", unit), rel=1e-14)
-    assert units.shown(2.5 * size, unit) == f"2.5 {read}"
-
-
-def units_of(scenario: Scenario, folder: Path) -> Units:
-    """The same as those of its record, which is in SI, and of a disturbed one."""
-    (folder / "record.yaml").write_text(dump_scenario(scenario))
-    recorded = load_scenario(folder / "record.yaml")
-    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
-    assert scenario.units == recorded.units == disturbed.units
-    return scenario.units
+@pytest.mark.parametrize(("system", "unit", "read", "size"), READ)
+def test_people_read_numbers_of_the_same_size(system, unit, read, size):
+    assert SYSTEMS[system].of(unit) == (pytest.approx(size, rel=1e-14), read)
+    assert SYSTEMS[system].shown(2.5 * size, unit) == f"2.5 {read}"
 
 
 SMALL = {"robot.strut_length": "15 cm", "robot.strut_diameter": "3 mm"}
-OF_ROBOTS = [("thesis", {}, "in"), ("thesis", SMALL, "cm")]
+LARGE = {"robot.strut_length": "2 m", "robot.strut_diameter": "1 dm", "robot.node_diameter": "2 dm"}
+OF_ROBOTS = [("thesis", {}, "in"), ("thesis", SMALL, "cm"), ("thesis", LARGE, "SI")]
 OF_ROBOTS += [("prism", {}, "cm")]  # a radius of 0.1 m, a height of 0.16 m
+OF_ROBOTS += [("prism", {"robot.unit": "mm"}, "mm")]  # given in mm
 
 
 @pytest.mark.parametrize(("base", "changes", "expected"), OF_ROBOTS)
 def test_a_scenario_is_shown_in_the_units_of_its_robot(base, changes, expected, tmp_path):
     scenario = load_scenario(base).with_changes(changes)
-    assert units_of(scenario, tmp_path) == SYSTEMS[expected]
+    (tmp_path / "record.yaml").write_text(dump_scenario(scenario))  # in SI
+    disturbed = scenario.with_numbers({"robot.gravity": 9.7})
+    for each in (scenario, load_scenario(tmp_path / "record.yaml"), disturbed):
+        assert each.units == SYSTEMS[expected]
     with shown_in("SI"):
         assert scenario.units == SYSTEMS["SI"]
-    assert scenario.units == SYSTEMS[expected]
-
-
-GIVEN = [
-    ("unit: mm\nnodes: {a: [0, 0, 0], b: [300, 0, 100]}", "mm"),
-    ("nodes: {a: [0 m, 0 m, 0 m], b: [3 m, 0 m, 1 m]}", "SI"),
-]
-
-
-@pytest.mark.parametrize(("nodes", "expected"), GIVEN)
-def test_a_structure_is_shown_in_the_unit_in_which_it_is_given(nodes, expected, tmp_path):
-    strut = "{pairs: [[a, b]], diameter: 6 mm, density: 2.7 g/cm^3, node_diameter: 6 mm}"
-    (tmp_path / "own.yaml").write_text(f"{nodes}\nstruts: {{rod: {strut}}}")
-    robot = read_structure(tmp_path / "own.yaml")
-    scenario = load_scenario("prism").with_sections(robot=robot)
-    assert units_of(scenario, tmp_path) == SYSTEMS[expected]
 
 
 ROUND = {"6 in": "m", "240 mm/s": "m/s", "27 lbf*s/in^2": "N*s/m^2", "9.80665 m/s^2": "m/s^2"}

@@ -31,7 +31,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.common_sections import different_keys
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.yaml_text import read_mapping
-from tetra_drake.settings.quantities import ForceQuantity, Length, Time, Unit
+from tetra_drake.settings.quantities import ForceQuantity, Frequency, Keyed, Length, Time
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of
 from tetra_drake.settings.units import given_quantity
@@ -49,8 +49,6 @@ CUT = 0.05
 LEAST, MOST = 1e-12, 1e12
 """Least uncertainty of a measured number, and its largest size, in SI."""
 INSTALL = "pip install 'tetra_drake[parquet]'"
-
-Frequency = Annotated[float, Unit("Hz")]
 
 _SIZE, _UNCERTAINTY = Field(ge=-MOST, le=MOST), Field(ge=LEAST, le=MOST)
 
@@ -184,11 +182,11 @@ class Rest(Section):
     Numbers are SI; changes are as in Scenario.with_changes().
     """
 
-    changes: dict[str, Any] = Field(default={})
+    changes: Keyed[str, Any] = Field(default={})
     """Values of scenario keys in this case, such as loads."""
-    positions: dict[str, Annotated[Length, _SIZE]] = Field(default={})
+    positions: Keyed[str, Annotated[Length, _SIZE]] = Field(default={})
     """Coordinates by node and axis, such as "n3 z"."""
-    tensions: dict[str, Annotated[ForceQuantity, _SIZE]] = Field(default={})
+    tensions: Keyed[str, Annotated[ForceQuantity, _SIZE]] = Field(default={})
     """Tensions by the names of the cables."""
     frequencies: list[Annotated[Frequency, _SIZE]] = Field(default=[])
     """Natural frequencies, the lowest one first."""
@@ -254,7 +252,7 @@ Measurement = Annotated[MotionCapture | Rest, Kinds()]
 class FitFile(Section):
     """What a fit needs beside the scenario."""
 
-    parameters: Annotated[dict[str, _Pair], Field(min_length=1), AfterValidator(different_keys)]
+    parameters: Annotated[Keyed[str, _Pair], Field(min_length=1), AfterValidator(different_keys)]
     """Bounds, least and most, by scenario key. Keys joined by commas get the same value."""
     measurements: list[Measurement] = Field(min_length=1)
 

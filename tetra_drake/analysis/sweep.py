@@ -17,7 +17,7 @@ from tetra_drake.scenario.changes import given_changes
 from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
-from tetra_drake.settings.section import Section, python_value, value_at
+from tetra_drake.settings.section import Section, value_at
 
 if TYPE_CHECKING:
     import xarray
@@ -105,7 +105,8 @@ def sweep(
 
 def _values(key: str, given: Any) -> Collection[Any]:
     """The values for a key; `given` may be a single value."""
-    given = python_value(given)
+    if hasattr(given, "tolist"):
+        given = given.tolist()
     is_one = isinstance(given, (str, bytes, Mapping, Section)) or not isinstance(given, Collection)
     values = [given] if is_one else given
     if not len(values):

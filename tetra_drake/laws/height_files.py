@@ -8,11 +8,10 @@ import os
 import re
 import tokenize
 import warnings
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-import pydantic
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, PlainValidator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
@@ -64,16 +63,19 @@ class HeightFile(str):
         write_whole(os.path.join(folder, self), content.getvalue())
 
     @classmethod
-    def __get_pydantic_core_schema__(
-        cls, source: Any, handler: pydantic.GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(cls._of)
-
-    @classmethod
-    def _of(cls, given: Any) -> HeightFile:
+    def of(cls, given: Any) -> HeightFile:
+        """The height file of a setting, which is a path. Refuses anything else."""
         if not isinstance(given, str):
             refuse("", f"found {described(given)}, expected the path of a height file")
         return given if isinstance(given, HeightFile) else cls.read(given)
+
+
+HeightPath = Annotated[
+    HeightFile,
+    PlainValidator(HeightFile.of, json_schema_input_type=str),
+    Field(json_schema_extra={"format": "file name"}),
+]
+"""Setting of a section: in files a path."""
 
 
 def _read_heights(path: str) -> np.ndarray:

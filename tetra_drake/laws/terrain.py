@@ -35,7 +35,7 @@ from tetra_drake.kernels.lanes import (
     minimum,
     select,
 )
-from tetra_drake.laws.height_files import HeightFile
+from tetra_drake.laws.height_files import HeightPath
 from tetra_drake.laws.kinematics import P_WN
 from tetra_drake.laws.vectors import Vector3, put_vector
 from tetra_drake.settings.kind_text import settings_text
@@ -391,7 +391,7 @@ class HeightField(Relief):
     heights.
     """
 
-    file: HeightFile
+    file: HeightPath
     """File of heights in m."""
     cell: Length = Field(gt=0)
     """Distance between neighbours, along x and y."""

@@ -8,7 +8,7 @@ from typing import Any
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.yaml_text import parse_yaml
 from tetra_drake.settings.refusals import TAG
-from tetra_drake.settings.section import Section, Tree, joined, parts_of, python_value
+from tetra_drake.settings.section import Tree, joined, mapped, parts_of, tree_value
 
 REPLACED = ("objective", "require", "robot.actuated")
 """Mappings that a file replaces as a whole."""
@@ -79,20 +79,11 @@ def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
                 place = place.setdefault(section, Part())
         if not isinstance(place, dict) or name in place:
             raise InputError(source, key, "is given twice")
-        place[name] = _given(changes[key], source, key)
+        place[name] = mapped(tree_value(changes[key]), _parsed)
     return tree
 
 
-def _given(value: Any, source: object, key: str) -> Any:
-    """Converts a value from Python to the value in a file. Sections are validated again, because
-    copies of sections are not validated."""
-    value = python_value(value)
-    if isinstance(value, Section):
-        return type(value).from_tree(value.model_dump(), source, key=key)
-    if isinstance(value, str) and value.startswith("!"):
-        return parse_yaml(value, value)
-    if isinstance(value, list):
-        return [_given(item, source, f"{key}[{i}]") for i, item in enumerate(value)]
-    if isinstance(value, Mapping):
-        return {name: _given(item, source, f"{key}.{name}") for name, item in value.items()}
-    return value
+def _parsed(value: Any) -> Any:
+    """A text with the tag of a kind as the kind; other values as they are."""
+    is_kind = isinstance(value, str) and value.startswith("!")
+    return parse_yaml(value, value) if is_kind else value

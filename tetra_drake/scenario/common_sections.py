@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
-from tetra_drake.settings.quantities import Speed, Time
+from tetra_drake.settings.quantities import Keyed, Speed, Time, Value
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
-
-Value = TypeVar("Value")
 
 
 class GaitBounds(Section):
@@ -125,7 +123,7 @@ class Disturbances(Section):
 
     draws: int = Field(ge=1, le=10_000)
     """Number of draws. Each gait is simulated once in each draw."""
-    spreads: Annotated[dict[str, Spread], AfterValidator(different_keys)] = Field(default={})
+    spreads: Annotated[Keyed[str, Spread], AfterValidator(different_keys)] = Field(default={})
     """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
     1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)

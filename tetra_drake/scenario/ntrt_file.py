@@ -9,6 +9,7 @@ import pydantic
 from pydantic import Field
 
 from tetra_drake.scenario.robot_structure import Pair
+from tetra_drake.settings.quantities import Keyed
 from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Section
 from tetra_drake.settings.units import LARGEST
@@ -137,7 +138,7 @@ class Builder(Section):
     def _read_parameters(cls, given: Any, info: pydantic.ValidationInfo) -> Any:
         if "made_as" not in info.data:
             return given
-        return CLASSES[info.data["made_as"]][1].model_validate({} if given is None else given)
+        return CLASSES[info.data["made_as"]][1].from_tree(given, "")
 
     @property
     def kind(self) -> str:
@@ -154,13 +155,13 @@ class Builder(Section):
 class NtrtFile(Section):
     """Content of a file, in NTRT's axes and unit of length."""
 
-    nodes: dict[str, Point] = Field(default={})
+    nodes: Keyed[str, Point] = Field(default={})
     """Nodes. A key is the tags of its node, separated by blanks."""
-    pair_groups: dict[str, list[Pair]] = Field(default={})
+    pair_groups: Keyed[str, list[Pair]] = Field(default={})
     """Lists of pairs of nodes. A key is the tags of its pairs, separated by blanks."""
-    builders: dict[str, Builder] = Field(default={})
+    builders: Keyed[str, Builder] = Field(default={})
     """Builders. A key is the tags that a pair or a node must have, separated by blanks."""
-    substructures: dict[str, Substructure] = Field(default={})
-    bond_groups: dict[str, dict[str, list[Pair]]] = Field(default={})
+    substructures: Keyed[str, Substructure] = Field(default={})
+    bond_groups: Keyed[str, Keyed[str, list[Pair]]] = Field(default={})
     """Lists of pairs of nodes, by their tags and the bond of two parts (outer key and inner key, in
     either order)."""

@@ -33,6 +33,7 @@ from tetra_drake.settings.quantities import (
     Acceleration,
     Density,
     ForceQuantity,
+    Keyed,
     Length,
     Mass,
     Position,
@@ -40,7 +41,7 @@ from tetra_drake.settings.quantities import (
     Time,
 )
 from tetra_drake.settings.refusals import described, hint, refuse
-from tetra_drake.settings.section import Kinds, Section, Tree, Varied
+from tetra_drake.settings.section import Kinds, Section, Tree, Varied, mapped
 from tetra_drake.settings.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
@@ -60,6 +61,9 @@ def _check_name(name: object) -> object:
 
 
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
+BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
+"""A length that needs no unit where the structure has one."""
+Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
@@ -172,29 +176,30 @@ class StructureFile(Section):
     """A tensegrity: nodes, struts, cables and the oscillators that actuate cables."""
 
     tag: ClassVar[str] = "Structure"
+    keys_of_files: ClassVar = {"file": "Name or file of a structure; the other keys change it."}
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
     """Properties that some metrics need and this robot does not have."""
     slack: ClassVar[bool] = True
     """Cables never push."""
 
-    nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
+    nodes: Keyed[Name, Coordinates] = Field(max_length=MOST_NODES)
     """Coordinates [x, y, z] of each node, near an equilibrium. A node that nothing else names is
     left out."""
     unit: str | None = None
     """Unit of coordinates that are bare numbers, such as cm. A robot in mm is shown in mm."""
-    struts: dict[Name, StrutGroup] = Field(default={})
-    cables: dict[Name, CableGroup] = Field(default={})
-    spheres: dict[Name, SphereGroup] = Field(default={})
-    actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
+    struts: Keyed[Name, StrutGroup] = Field(default={})
+    cables: Keyed[Name, CableGroup] = Field(default={})
+    spheres: Keyed[Name, SphereGroup] = Field(default={})
+    actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, their nodes in either order."""
-    masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
+    masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload that cables hold."""
-    loads: dict[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
+    loads: Keyed[str, Annotated[list[ForceQuantity], Field(min_length=3, max_length=3)]] = Field(
         default={}
     )
     """Constant forces [x, y, z] on nodes, in the world frame."""
-    anchors: dict[str, AnchorAxes] = Field(default={})
+    anchors: Keyed[str, AnchorAxes] = Field(default={})
     """Axes along which the world holds nodes, such as xyz. A node of a strut is held by a spring
     and a damper along each axis, from its place in the file; a node of no strut is fixed there."""
     anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
@@ -402,17 +407,11 @@ class StructureFile(Section):
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
-
-        def with_unit(place: Any) -> Any:
-            """The coordinates of a node with unit. Wrong values, such as lists, stay as they
-            are."""
-            if not isinstance(place, list):
-                return place
-            return [f"{x!r} {unit}" if type(x) in (int, float) else x for x in place]
-
         tree = tree | {"unit": "mm" if unit == "mm" else None}
-        if isinstance(tree.get("nodes"), dict):
-            tree["nodes"] = {name: with_unit(place) for name, place in tree["nodes"].items()}
+        if "nodes" in tree:
+            tree["nodes"] = mapped(
+                tree["nodes"], lambda x: f"{x!r} {unit}" if type(x) in (int, float) else x
+            )
         return tree
 
     @pydantic.model_validator(mode="before")

@@ -19,6 +19,7 @@ from tetra_drake.settings.quantities import (
     Mass,
     Position,
     Stiffness,
+    quantity,
 )
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section, Tree, Varied
@@ -110,6 +111,9 @@ class RowCables(CableConstants):
         return self.constants(stiffness=stiffness, free_length=self.free_length)
 
 
+Spacing = Annotated[float, *quantity("m", balanced=0.0)]
+
+
 class Tetrahedra(Section):
     """The tetrahedra with their initial positions (thesis section 2.1, appendix C.1)."""
 
@@ -132,7 +136,7 @@ class Tetrahedra(Section):
     density: Density = Field(gt=0)
     """Density of struts and spheres."""
     cables: RowCables
-    spacing: Annotated[Length, Varied()] = Field(ge=0)
+    spacing: Annotated[Spacing, Varied()] = Field(ge=0)
     """Distance between base triangles at t = 0. `balanced` (or 0) computes the spacing at which the
     cables balance. It is also the default in a file that changes the strut length, or the cables'
     stiffness or free length, of its base."""
@@ -228,11 +232,6 @@ class Tetrahedra(Section):
             return {}
         is_other = _deciding_numbers(self) != _deciding_numbers(base)
         return {"spacing": "balanced"} if is_other else {}
-
-    @field_validator("spacing", mode="before")
-    @classmethod
-    def _read_spacing(cls, value: object) -> object:
-        return 0.0 if value == "balanced" else value
 
     @field_validator("spacing")
     @classmethod

@@ -36,7 +36,7 @@ from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_structure import RobotKind
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.settings.quantities import UnitsByName
+from tetra_drake.settings.quantities import ByName
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Section, Tree, flattened, written
 from tetra_drake.settings.units import (
@@ -57,6 +57,9 @@ need about 3 GB."""
 _WIDTH, _ROWS = 100, 20
 """Largest number of characters in a line of a printed scenario, and of rows in a notebook."""
 
+_OF_WEIGHTS = {name: inverse(unit) for name, unit in UNITS.items()}
+"""Units of the weights in an objective."""
+
 MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
 
@@ -64,7 +67,7 @@ MOST_SAMPLES = 2_000_000
 class Scenario(Section):
     """Scenario: all settings of an experiment except the gait."""
 
-    has_base: ClassVar[bool] = True
+    keys_of_files: ClassVar = {"base": "Name or file of a scenario that has the other values."}
 
     name: str
     """Label of the scenario; equal scenarios may have different names."""
@@ -78,12 +81,10 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: EngineKind = Drake()
-    objective: Annotated[
-        dict[str, float], UnitsByName({name: inverse(unit) for name, unit in UNITS.items()})
-    ] = Field(min_length=1)
+    objective: Annotated[dict[str, float], ByName(_OF_WEIGHTS), Field(min_length=1)]
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
-    require: Annotated[dict[str, float], UnitsByName(UNITS)] = Field(default={})
+    require: Annotated[dict[str, float], ByName(UNITS)] = Field(default={})
     """Limits of metrics: a gait beyond one counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection

@@ -6,18 +6,16 @@ and mappings may have such types, too.
 
 from __future__ import annotations
 
-import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import pydantic
-from pydantic import Field, ValidationInfo
-from pydantic.fields import FieldInfo
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
-from tetra_drake.settings.refusals import described, hint, refuse
-from tetra_drake.settings.units import plainest, quantity_to_si
+from tetra_drake.settings.refusals import described
+from tetra_drake.settings.units import PATTERN, plainest, quantity_to_si
 
 
 class Quantity(float):
@@ -34,105 +32,89 @@ class Quantity(float):
         return plainest(self, self.unit)
 
 
-@dataclass(frozen=True)
-class Unit:
-    """Annotation of a type of numbers with the SI unit `name`."""
+def quantity(unit: str, **words: float) -> tuple[Any, ...]:
+    """Annotations of a type of numbers with an SI unit. In a file, each of `words` stands for a
+    number.
 
-    name: str
+    In a validation with a context (of a file), numbers without a unit are refused, except 0.
+    """
+    expected = f"expected a quantity that converts to {unit}"
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: pydantic.GetCoreSchemaHandler
-    ) -> CoreSchema:
-        def read(value: Any, info: ValidationInfo) -> Any:
-            return _si_number(value, self.name, info)
+    def read(value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, Quantity):
+            return float(value)
+        if isinstance(value, str):
+            return words[value] if value in words else quantity_to_si(value, unit)
+        if info.context and type(value) in (int, float) and value != 0:
+            raise ValueError(f"found {described(value)} without a unit, {expected}")
+        return value
 
-        def write(number: float) -> Quantity:
-            return Quantity(number, self.name)
+    def write(number: float) -> Any:
+        return Quantity(number, unit)
 
-        return _converted(handler(source), read, write)
+    schema: dict[str, Any] = {
+        "type": ["string", "number"],
+        "pattern": f"^({'|'.join((*words, PATTERN))})$",
+        "patternErrorMessage": expected,
+        "if": {"type": "number"},
+        "then": {"const": 0, "errorMessage": expected},
+        "unit": unit,
+    }
+    return BeforeValidator(read), PlainSerializer(write), Field(json_schema_extra=schema)
 
 
-Length = Annotated[float, Unit("m")]
-Angle = Annotated[float, Unit("rad")]
-Mass = Annotated[float, Unit("kg")]
-Density = Annotated[float, Unit("kg/m^3")]
-Time = Annotated[float, Unit("s")]
-Speed = Annotated[float, Unit("m/s")]
-InverseSpeed = Annotated[float, Unit("s/m")]
-Acceleration = Annotated[float, Unit("m/s^2")]
-ForceQuantity = Annotated[float, Unit("N")]
-Stiffness = Annotated[float, Unit("N/m")]
-Damping = Annotated[float, Unit("N*s/m")]
-DampingPerLength = Annotated[float, Unit("N*s/m^2")]
+Length = Annotated[float, *quantity("m")]
+Angle = Annotated[float, *quantity("rad")]
+Mass = Annotated[float, *quantity("kg")]
+Density = Annotated[float, *quantity("kg/m^3")]
+Time = Annotated[float, *quantity("s")]
+Frequency = Annotated[float, *quantity("Hz")]
+Speed = Annotated[float, *quantity("m/s")]
+InverseSpeed = Annotated[float, *quantity("s/m")]
+Acceleration = Annotated[float, *quantity("m/s^2")]
+ForceQuantity = Annotated[float, *quantity("N")]
+Stiffness = Annotated[float, *quantity("N/m")]
+Damping = Annotated[float, *quantity("N*s/m")]
+DampingPerLength = Annotated[float, *quantity("N*s/m^2")]
 
 Position = Annotated[list[Length], Field(min_length=3, max_length=3)]
 """Coordinates x, y and z."""
 
+EMPTY = {"type": ["object", "null"]}
+"""JSON Schema of a mapping that may be left empty in a file."""
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+
+Keyed = Annotated[
+    dict[Key, Value],
+    BeforeValidator(lambda given: {} if given is None else given),
+    Field(json_schema_extra=EMPTY),
+]
+"""A mapping with names of the user's choice. Nothing is an empty mapping."""
+
 
 @dataclass(frozen=True)
-class UnitsByName:
-    """Annotation of a type of mappings of numbers, or of lists of numbers, with SI units by
-    name."""
+class ByName:
+    """Annotation of a type of mappings with a number, or several, by each name."""
 
     units: Mapping[str, str]
-    """Units by name; "" for a number without a unit."""
+    """SI units by name; "" for a number without a unit."""
+    value: Callable[[Any], Any] = lambda number: number
+    """Function that makes the type of a value from the type of its numbers."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
     ) -> CoreSchema:
-        def read(given: Any, info: ValidationInfo) -> Any:
-            if not isinstance(given, dict):
-                return given
-            for name in given:
-                if name not in self.units:
-                    refuse(str(name), f"unknown name; {hint(name, self.units)}")
-            return _each(given, lambda x, name: _si_number(x, self.units[name], info, key=name))
+        def in_order(given: Any, read: pydantic.ValidatorFunctionWrapHandler) -> Any:
+            values = read({} if given is None else given)
+            return {name: values[name] for name in given or ()}
 
-        def write(numbers: dict[str, Any]) -> dict[str, Any]:
-            return _each(numbers, lambda x, name: Quantity(x, self.units[name]))
-
-        return _converted(handler(source), read, write)
-
-
-def _each(given: dict[str, Any], change: Callable[[Any, str], Any]) -> dict[str, Any]:
-    """A mapping with change(number, name) in place of each number. Values are numbers or lists."""
-    return {
-        name: [change(x, name) for x in value] if isinstance(value, list) else change(value, name)
-        for name, value in given.items()
-    }
-
-
-def _converted(
-    schema: CoreSchema, read: Callable[[Any, ValidationInfo], Any], write: Callable[[Any], Any]
-) -> CoreSchema:
-    """A schema with functions that convert values before validation and when they are dumped."""
-    serializer = core_schema.plain_serializer_function_ser_schema(write)
-    return core_schema.with_info_before_validator_function(read, schema, serialization=serializer)
-
-
-def _si_number(value: Any, unit: str, info: ValidationInfo, *, key: str = "") -> Any:
-    """The SI number of a quantity. Other values are returned as they are, for pydantic's errors.
-
-    In a validation with a context (for a file), numbers without a unit are refused, except 0.
-    """
-    if isinstance(value, Quantity):
-        return float(value)
-    if isinstance(value, str) and unit:
-        try:
-            return quantity_to_si(value, unit)
-        except ValueError as error:
-            refuse(key, str(error))
-    if info.context and unit and type(value) in (int, float) and value != 0:
-        expected = f"expected a quantity that converts to {unit}"
-        refuse(key, f"found {described(value)} without a unit, {expected}")
-    return value
-
-
-def unit_of(field: FieldInfo) -> str:
-    """Unit of the numbers of a field; "" if they have none."""
-    parts = [field.annotation, *field.metadata]
-    for part in parts:
-        if isinstance(part, Unit):
-            return part.name
-        parts += typing.get_args(part)
-    return ""
+        fields = {}
+        for name, unit in self.units.items():
+            number = Annotated[float, *quantity(unit)] if unit else float
+            value = handler.generate_schema(self.value(number))
+            fields[name] = core_schema.typed_dict_field(value, required=False)
+        strict = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
+        table = core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=strict)
+        return core_schema.no_info_wrap_validator_function(in_order, table)

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import re
 import textwrap
-from collections.abc import Iterable, Sequence
-from typing import Any, NoReturn
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from pydantic_core import PydanticCustomError
+from tetra_drake.errors import InputError
+from tetra_drake.settings.units import plainest
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+    from pydantic_core import ErrorDetails
+
+Tree = dict[str, Any]
 
 TAG = "_tag"
 """Key of a mapping in a tree that holds the tag of its kind."""
@@ -22,7 +30,110 @@ _MOST_NAMES, _LONGEST_NAME = 2000, 100
 
 def refuse(key: str, problem: str) -> NoReturn:
     """Ends a validation with a problem. `key` is relative to the validated value."""
-    raise PydanticCustomError("refused", "{key}: {problem}", {"key": key, "problem": problem})
+    raise InputError("", key, problem)
+
+
+def input_error(
+    error: ValidationError, section: type[BaseModel], tree: Any, source: object, key: str = ""
+) -> InputError:
+    """The error of a tree as a section at `key`, as an InputError that names `source`."""
+    first = max(error.errors(include_url=False), key=_telling)
+    is_unknown, name = first["type"] in _UNKNOWN, str(first["loc"][-1]) if first["loc"] else ""
+    schema = section.model_json_schema()
+    members = kinds = [schema]
+    # The place also contains tags and names of union members, which are no keys.
+    for part in first["loc"][:-1] if is_unknown else first["loc"]:
+        if isinstance(tree, list) and isinstance(part, int):
+            key, tree = joined(key, f"[{part}]"), tree[part]
+        elif isinstance(tree, dict) and part in tree:
+            key, tree = joined(key, str(part)), tree[part]
+        inner = _inner(part, members, schema)
+        if inner is not members:
+            members, kinds = inner, members if len(members) > 1 else inner
+    if is_unknown and name != TAG:
+        advice = _advice(name, members, kinds, schema)
+        return InputError(source, joined(key, name), f"unknown key; {advice}")
+    inner_key, problem = _in_words(first, tree, members)
+    if first["type"] == "missing" and "base" in schema["properties"]:
+        whole = f", as !{tree[TAG]} replaces a base's kind" if TAG in (tree or {}) else ""
+        problem += whole or ", or name a `base` that has it"
+    return InputError(source, joined(key, inner_key), problem)
+
+
+_UNKNOWN = "extra_forbidden", "invalid_key"
+"""Types of pydantic's errors of keys that a section does not have."""
+
+
+def _telling(error: ErrorDetails) -> tuple[bool, int, bool]:
+    """How much an error tells. An unknown key tells why another is missing. A value that fits no
+    member of a union has an error per member: the innermost tells most, then one that is not about
+    the type."""
+    return error["type"] in _UNKNOWN, len(error["loc"]), "_type" not in error["type"]
+
+
+def members_of(node: Tree, schema: Tree) -> list[Tree]:
+    """Members of a union in a JSON Schema, or a type that is no union. Sections are resolved."""
+    sections = {"": {}} | schema.get("$defs", {})
+    members = node.get("anyOf", [node])
+    return [sections[one.get("$ref", "").rpartition("/")[2]] | one for one in members]
+
+
+def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, Tree]]:
+    """Dotted keys in a section of a JSON Schema, with their types."""
+    for name, node in section.get("properties", {}).items():
+        item = node.get("additionalProperties")
+        inner = joined(key, f"{name}.NAME" if item else name)
+        yield inner, node
+        for member in members_of(item or node, schema):
+            if "$ref" in member:
+                yield from keys_in(member, schema, inner)
+
+
+def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
+    """The types of a part of the types `members`: of a kind, or of an item. Other parts have the
+    same types."""
+    for member in members:
+        if member.get("title") == f"!{part}":
+            return [member]
+    for member in members:
+        item = member.get("properties", {}).get(part, member.get("additionalProperties"))
+        if inner := member.get("items") if isinstance(part, int) else item:
+            return members_of(inner, schema)
+    return members
+
+
+def _advice(name: str, members: list[Tree], kinds: list[Tree], schema: Tree) -> str:
+    """Advice about a key that a section does not have."""
+    meant = [kind["title"] for kind in kinds if "title" in kind and name in kind["properties"]]
+    keys = [key for member in members for key, _ in keys_in(member, schema)]
+    meant += [f"'{key}'" for key in keys if key.endswith(f".{name}")]
+    if meant:
+        return f"did you mean {' or '.join(dict.fromkeys(meant))}?"
+    known = [key for one in members for key in one.get("properties", {}) if key != name]
+    return hint(name, known)
+
+
+def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str, str]:
+    """Key in a value, and problem, of pydantic's error."""
+    kind, context, found = error["type"], error.get("ctx", {}), f"found {described(value)}"
+    if kind == "value_error":
+        cause = context["error"]
+        return getattr(cause, "key", ""), getattr(cause, "problem", str(cause))
+    if kind == "missing":
+        return str(error["loc"][-1]), "is missing; give it"
+    if kind.startswith("union_tag"):
+        return "", f"{found}; {hint(found, [member['title'] for member in members])}"
+    expected = re.sub(".* should (be|have) ", "", error["msg"]).replace(" after validation", "")
+    expected = re.sub("(a valid dict|Extra inputs).*", "a mapping of keys", expected)
+    unit = next((member["unit"] for member in members if "unit" in member), "")
+    for limit in {"gt", "ge", "lt", "le"} & context.keys():
+        expected = f"{expected.rpartition(' ')[0]} {plainest(context[limit], unit)}"
+    return "", f"{found}, expected {expected}"
+
+
+def joined(key: str, inner: str) -> str:
+    """Joins a key and an inner key, such as "robot" and "gravity", or "pairs" and "[0]"."""
+    return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 
 def described(value: Any) -> str:
@@ -50,7 +161,4 @@ def hint(name: Any, names: Iterable[str]) -> str:
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
     """Text of the error for a name or path that is neither shipped nor a file."""
-    last = name.rpartition("/")[2][:_LONGEST_NAME]
-    if close := difflib.get_close_matches(last, shipped, n=1):
-        return f"no such {what}; did you mean '{close[0]}'?"
-    return f"no such {what} (shipped: {', '.join(shipped)})"
+    return f"no such {what}; {hint(name.rpartition('/')[2], shipped)}"

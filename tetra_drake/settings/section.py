@@ -7,44 +7,109 @@ TAG.
 
 from __future__ import annotations
 
+import ast
 import functools
+import inspect
+import itertools
 import os
 import re
+import textwrap
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, Union
 
 import pydantic
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, ErrorDetails, core_schema
+from pydantic_core import CoreSchema
 
 from tetra_drake.errors import InputError
-from tetra_drake.settings.quantities import Quantity, unit_of
-from tetra_drake.settings.refusals import TAG, described, hint, refuse
+from tetra_drake.settings.quantities import EMPTY, Quantity
+from tetra_drake.settings.refusals import TAG, Tree, input_error, joined
+from tetra_drake.settings.units import plainest
 
-Tree = dict[str, Any]
 Show = Callable[[float, str], str]
 """Function that makes a text from a number and its SI unit."""
+
+
+def _complete_schema(schema: Tree, section: type[Section]) -> None:
+    """Changes pydantic's JSON Schema of a section to what files may contain."""
+    schema |= EMPTY
+    schema.pop("required", None)  # a base may have the keys
+    texts = attribute_docstrings(section)
+    for name, field in section.model_fields.items():
+        if name in texts:
+            schema["properties"][field.alias or name]["description"] = texts[name]
+    for key, text in section.keys_of_files.items():
+        schema["properties"][key] = {"type": "string", "default": None, "description": text}
+    for node in parts_in(schema):
+        if not isinstance(node, dict):
+            continue
+        for name, correct in _CORRECT_NAMES.items():
+            if name in node:
+                node[correct] = node.pop(name)
+        if not str(node.get("title", "!")).startswith("!"):
+            del node["title"]
+        if node.get("additionalProperties") is True:  # as if it were not given
+            del node["additionalProperties"]
+        default = node.get("default")
+        if "anyOf" in node and isinstance(default, dict):
+            del node["default"]
+        if "unit" in node and isinstance(default, float):
+            node["default"] = plainest(default, node["unit"])
+
+
+def attribute_docstrings(owner: type) -> dict[str, str]:
+    """The docstrings of the attributes of a class and its bases, by name. (pydantic would read them
+    whenever the class is imported.)"""
+    texts = {}
+    for base in reversed(owner.__mro__):
+        if not base.__module__.startswith("tetra_drake"):
+            continue
+        tree = ast.parse(textwrap.dedent(inspect.getsource(base)))
+        statements = typing.cast(ast.ClassDef, tree.body[0]).body
+        for attribute, text in itertools.pairwise(statements):
+            if isinstance(attribute, ast.AnnAssign) and isinstance(text, ast.Expr):
+                texts[ast.unparse(attribute.target)] = inspect.cleandoc(
+                    ast.literal_eval(text.value)
+                )
+    return texts
+
+
+_CORRECT_NAMES = {
+    "gt": "exclusiveMinimum",
+    "ge": "minimum",
+    "lt": "exclusiveMaximum",
+    "le": "maximum",
+    "oneOf": "anyOf",
+}
+"""Names in a JSON Schema by those that pydantic writes. A mapping may be of several kinds."""
 
 
 class Section(BaseModel):
     """Section of settings. Numbers are SI; values cannot be changed in place."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        allow_inf_nan=False,
+        json_schema_extra=_complete_schema,
+    )
 
-    has_base: ClassVar[bool] = False
-    """True if a file may have a `base` that provides missing values."""
+    keys_of_files: ClassVar[dict[str, str]] = {}
+    """Keys that only files have, and what they are."""
 
     tag: ClassVar[str] = ""
     """Name of the kind in files; the name of the class if not given."""
 
     def __init__(self, **values: Any) -> None:
+        values = tree_value(values)
         try:
             super().__init__(**values)
         except ValidationError as error:
-            raise _input_error(error, type(self).__name__) from None
+            raise input_error(error, type(self), values, type(self).__name__) from None
 
     # Otherwise pydantic would also call it in the validation of a tree.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
@@ -59,43 +124,13 @@ class Section(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         cls.tag = cls.__dict__.get("tag", cls.__name__)
 
-    @pydantic.model_validator(mode="wrap")
-    @classmethod
-    def _explain(
-        cls,
-        tree: Any,
-        validate: pydantic.ModelWrapValidatorHandler[Self],
-        info: pydantic.ValidationInfo,
-    ) -> Self:
-        """Replaces pydantic's errors by one message."""
-        try:
-            return validate(tree)
-        except ValidationError as error:
-            errors = error.errors(include_url=False)
-            # A value that fits no member of a union has an error per member. The innermost is best.
-            of_field = [one for one in errors if one["loc"][:1] == errors[0]["loc"][:1]]
-            first = max(of_field, key=lambda one: _place(one, tree)[1])
-        key, problem = _in_words(first, cls, tree)
-        if first["type"] == "missing" and info.context and info.context["has_base"]:
-            whole = f", as !{cls.tag} replaces a base's kind"
-            problem += whole if TAG in (tree or {}) else ", or name a `base` that has it"
-        refuse(key, problem)
-
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _check_keys(cls, tree: Any) -> Any:
-        tree = {} if tree is None else tree
-        if not isinstance(tree, dict) or tree.get(TAG, cls.tag) != cls.tag:
-            refuse("", f"found {described(tree)}, expected a mapping of keys")
-        fields, values = keys_of(cls), {}
-        for name, value in tree.items():
-            if name != TAG and name not in fields:
-                named = [f"'{key}'" for key in dict.fromkeys(_keys_named(str(name), cls))]
-                advice = f"did you mean {' or '.join(named)}?" if named else hint(name, fields)
-                refuse(str(name), f"unknown key; {advice}")
-            if name != TAG:
-                values[name] = _with_mappings(python_value(value), fields[name].annotation)
-        return values
+    def _without_tag(cls, tree: Any) -> Any:
+        """The keys of a mapping. Nothing is a section of defaults."""
+        if not isinstance(tree, dict) or tree.get(TAG) != cls.tag:
+            return {} if tree is None else tree
+        return {name: value for name, value in tree.items() if name != TAG}
 
     def __eq__(self, other: object) -> bool:
         # The order counts: it numbers the bodies and oscillators of a structure.
@@ -111,23 +146,45 @@ class Section(BaseModel):
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
         """All lengths in m. A copy with disturbed numbers keeps them."""
-        numbers = _quantities(self.model_dump())
+        numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
         """The section of a tree at `key`. Raises InputError that names `source` and key."""
-        # A context means that quantities need units. Without one, numbers are SI.
+        tree = tree_value(tree)
         try:
-            return cls.model_validate(tree, context={"has_base": cls.has_base})
+            return cls.model_validate(tree, context=IN_FILE)
         except ValidationError as error:
-            raise _input_error(error, source, key) from None
+            raise input_error(error, cls, tree, source, key) from None
 
 
-def _input_error(error: ValidationError, source: object, key: str = "") -> InputError:
-    """The error of a section at `key` as an InputError that names `source`."""
-    refused = error.errors(include_url=False)[0]["ctx"]
-    return InputError(source, joined(key, refused["key"]), refused["problem"])
+IN_FILE = "in a file"
+"""Context of a validation where quantities need units. Without it, numbers are SI."""
+
+
+class Kinds:
+    """Annotation of a union of sections as tagged kinds. A mapping without a tag is of the first
+    kind."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: pydantic.GetCoreSchemaHandler
+    ) -> CoreSchema:
+        kinds = typing.get_args(source)
+
+        def tag_of(value: Any) -> str | None:
+            if isinstance(value, dict | None):
+                return str((value or {}).get(TAG, kinds[0].tag))
+            return value.tag if isinstance(value, Section) else None
+
+        def write(section: Section, dump: pydantic.SerializerFunctionWrapHandler) -> Any:
+            return {TAG: section.tag} | dump(section)
+
+        tagged = [Annotated[kind, Tag(kind.tag), Field(title=f"!{kind.tag}")] for kind in kinds]
+        union: Any = Union[tuple(tagged)]  # noqa: UP007
+        return handler.generate_schema(
+            Annotated[union, Discriminator(tag_of), pydantic.WrapSerializer(write)]
+        )
 
 
 def _hashable(value: Any) -> Any:
@@ -140,66 +197,6 @@ def _hashable(value: Any) -> Any:
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
     """Fields of a section by their keys in files."""
     return {field.alias or name: field for name, field in section.model_fields.items()}
-
-
-def _with_mappings(value: Any, annotation: Any) -> Any:
-    """A value with an empty mapping in place of nothing, where its type is a mapping."""
-    if typing.get_origin(annotation) is not dict or not isinstance(value, dict | None):
-        return value
-    _, of_items = typing.get_args(annotation)
-    return {name: _with_mappings(item, of_items) for name, item in (value or {}).items()}
-
-
-def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
-    """Dotted keys in a section that end with a name."""
-    for key, field in keys_of(section).items():
-        for kind in _union(field.annotation):
-            if isinstance(kind, type) and issubclass(kind, Section):
-                if name in keys_of(kind):
-                    yield f"{key}.{name}"
-                yield from (f"{key}.{inner}" for inner in _keys_named(name, kind))
-
-
-class Kinds:
-    """Annotation of a union of sections as tagged kinds. A mapping without a tag is of the first
-    kind."""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: pydantic.GetCoreSchemaHandler
-    ) -> CoreSchema:
-        kinds = {kind.tag: kind for kind in _union(source)}
-
-        def read(value: Any, info: core_schema.ValidationInfo) -> Section:
-            if type(value) in kinds.values():
-                return typing.cast(Section, value)
-            return _kind(value, kinds).model_validate(value, context=info.context)
-
-        def write(section: Section) -> Tree:
-            return {TAG: section.tag} | section.model_dump()
-
-        serializer = core_schema.plain_serializer_function_ser_schema(write)
-        return core_schema.with_info_plain_validator_function(read, serialization=serializer)
-
-
-def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
-    """The kind of a mapping. Refuses a key that only another kind has."""
-    value = {} if value is None else value
-    tags = [f"!{name}" for name in kinds]
-    if not isinstance(value, dict):
-        refuse("", f"found {described(value)}; {hint('!', tags)}")
-    name = value.get(TAG, next(iter(kinds)))
-    if f"!{name}" not in tags:
-        refuse("", f"found !{name}; {hint(f'!{name}', tags)}")
-    for key in value:
-        others = [f"!{other}" for other, kind in kinds.items() if key in keys_of(kind)]
-        if others and f"!{name}" not in others:
-            refuse(key, f"unknown key of !{name}; did you mean {' or '.join(others)}?")
-    return kinds[name]
-
-
-def _union(annotation: Any) -> tuple[Any, ...]:
-    """Members of a union type; the type itself if it is no union."""
-    return typing.get_args(annotation) or (annotation,)
 
 
 @dataclass(frozen=True)
@@ -221,68 +218,26 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
                 yield from varied(item, joined(inner, part))
 
 
-def python_value(value: Any) -> Any:
-    """Converts tuples, arrays and numbers of numpy, and paths to lists, numbers and texts."""
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    if isinstance(value, (list, tuple)):
-        return [python_value(item) for item in value]
+def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
+    """A tree's value with change(x) in place of each x that is no list and no mapping."""
     if isinstance(value, Mapping):
-        return {name: python_value(item) for name, item in value.items()}
-    return value
+        return {name: mapped(item, change) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [mapped(item, change) for item in value]
+    return change(value)
 
 
-def _place(error: ErrorDetails, tree: Any) -> tuple[str, int, Any]:
-    """Key of an error, number of the key's parts, and the tree's value there."""
-    key, depth = "", 0
-    for part in error["loc"]:  # also contains names of union members, which are no keys
-        if isinstance(tree, list) and isinstance(part, int):
-            key = joined(key, f"[{part}]")
-        elif isinstance(tree, dict) and part in tree:
-            key = joined(key, str(part))
-        else:
-            continue
-        tree, depth = tree[part], depth + 1
-    if error["type"] == "missing":
-        return joined(key, str(error["loc"][-1])), depth + 1, None
-    return key, depth, tree
+def tree_value(value: Any) -> Any:
+    """Converts sections, tuples, arrays and numbers of numpy, and paths to what trees hold."""
 
+    def convert(part: Any) -> Any:
+        if isinstance(part, Section):
+            return {TAG: part.tag} | part.model_dump()
+        if isinstance(part, os.PathLike):
+            return os.fspath(part)
+        return part.tolist() if hasattr(part, "tolist") else part
 
-def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[str, str]:
-    """Key and problem of an error in the validation of a tree as a section."""
-    key, _, value = _place(error, tree)
-    context = error.get("ctx", {})
-    if error["type"] == "refused":
-        return joined(key, context["key"]), context["problem"]
-    if error["type"] == "missing":
-        return key, "is missing; give it"
-    expected = error["msg"].removeprefix("Input should be ")
-    if error["type"] in LIMIT_WORDS:
-        name, words, _ = LIMIT_WORDS[error["type"]]
-        unit = unit_of(keys_of(section)[str(error["loc"][0])])
-        if "length" in name:
-            unit = f"items, not {len(value or ())}"
-        expected = f"{words} {context[name]:.4g} {unit}".rstrip()
-    return key, f"found {described(value)}, expected {expected}"
-
-
-LIMIT_WORDS = {
-    "greater_than": ("gt", "more than", "> {}"),
-    "greater_than_equal": ("ge", "at least", "≥ {}"),
-    "less_than": ("lt", "less than", "< {}"),
-    "less_than_equal": ("le", "at most", "≤ {}"),
-    "too_short": ("min_length", "at least", "≥ {} items"),
-    "too_long": ("max_length", "at most", "≤ {} items"),
-}
-"""Limits by pydantic's types of errors: pydantic's names of their numbers, words for them in
-errors, and their texts on the page of keys."""
-
-
-def joined(key: str, inner: str) -> str:
-    """Joins a key and an inner key, such as "robot" and "gravity", or "pairs" and "[0]"."""
-    return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
+    return mapped(value, convert)
 
 
 def parts_of(key: str) -> list[str | int]:
@@ -301,33 +256,30 @@ _ITEMS = re.compile(r"[^\[](\[\d+\])+$")
 def value_at(tree: Any, key: str) -> Any:
     """Value of a tree at a dotted key; None if there is none."""
     for part in parts_of(key):
-        if isinstance(tree, dict):
-            tree = tree.get(part)
-        elif isinstance(tree, list) and isinstance(part, int) and part < len(tree):
+        try:
             tree = tree[part]
-        else:
+        except (KeyError, IndexError, TypeError):
             return None
     return tree
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
     """A tree's value for a file. `show` makes the texts of quantities."""
-    if isinstance(value, Quantity):
-        return show(float(value), value.unit) if value.unit else float(value)
-    if isinstance(value, dict):
-        return {name: written(item, show) for name, item in value.items()}
-    if isinstance(value, list):
-        return [written(item, show) for item in value]
-    return value
+
+    def write(part: Any) -> Any:
+        if not isinstance(part, Quantity):
+            return part
+        return show(float(part), part.unit) if part.unit else float(part)
+
+    return mapped(value, write)
 
 
-def _quantities(value: Any) -> Iterator[Quantity]:
-    """All quantities in a tree's value."""
-    if isinstance(value, Quantity):
-        yield value
-    elif isinstance(value, (dict, list)):
+def parts_in(value: Any) -> Iterator[Any]:
+    """A tree's value and all values in it."""
+    yield value
+    if isinstance(value, (dict, list)):
         for item in value.values() if isinstance(value, dict) else value:
-            yield from _quantities(item)
+            yield from parts_in(item)
 
 
 def flattened(tree: Tree, key: str = "") -> dict[str, Any]:

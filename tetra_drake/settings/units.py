@@ -46,23 +46,12 @@ class Units:
     def of(self, unit: str) -> tuple[float, str]:
         """Unit in place of an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name. A
         unit with other dimensions than length, force, angle and time is returned as it is."""
-        if self.force == 1.0 and "N" in unit:
+        names = {"m": self.length_name, "N": self.force_name, "rad": "deg", "s": "s"}
+        words = re.findall("[A-Za-z]+", unit)
+        if not words or not names.keys() >= set(words) or (self.force == 1.0 and "N" in words):
             return 1.0, unit
-        read = {
-            "m": (self.length, self.length_name),
-            "N": (self.force, self.force_name),
-            "rad": (math.pi / 180.0, "deg"),
-        }
-        above, _, below = unit.partition("/")
-        size = 1.0
-        for factors, sign in ((above, 1), (below, -1)):
-            for factor in factors.split("*"):
-                name, _, power = factor.partition("^")
-                if name not in {*read, "s", "1", ""}:
-                    return 1.0, unit
-                size *= read.get(name, (1.0, ""))[0] ** (sign * int(power or 1))
-        name = re.sub(r"[A-Za-z]+", lambda word: read.get(word[0], (1.0, word[0]))[1], unit)
-        return size, name.removeprefix("1")
+        name = re.sub("[A-Za-z]+", lambda word: names[word[0]], unit).removeprefix("1")
+        return quantity_to_si(f"1 {name}", unit), name
 
     def shown(self, number: float, unit: str) -> str:
         """A number given in an SI unit, as text in these units, such as "25 lbf/in"."""
@@ -141,7 +130,8 @@ LARGEST = 1e15
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
 _FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*")
+PATTERN = rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*"
+"""Regular expression of a quantity: groups of its number, a "1 /" before its unit, and its unit."""
 
 
 @functools.lru_cache(maxsize=1000)  # a base is read again for each file
@@ -153,7 +143,7 @@ def quantity_to_si(text: str, unit: str) -> float:
     import pint
 
     example = f"expected a quantity that converts to {unit}"
-    match = _QUANTITY.fullmatch(text)
+    match = re.fullmatch(PATTERN, text)
     if match is None:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
     try:
