@@ -58,6 +58,7 @@ def test_a_copy_goes_on_as_its_original(scenario_and_error, drive):
     assert batch.readings.time[0] == pytest.approx(0.06 if drive is held else 0.1)
     assert np.abs(np.subtract(*batch.readings.p_WN)).max() > 1e-4
     batch.copy(0, 1)
+    batch.copy(1, 1)
     go_on(0.14, [1, 1])
     go_on(np.inf, [0, 0])
     original, copy = batch.readings.p_WN

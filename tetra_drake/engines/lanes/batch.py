@@ -147,6 +147,8 @@ class LaneBatch(Batch):
         return float(self._wall_times[place])
 
     def copy(self, place: int, to: int) -> None:
+        if place == to:
+            return
         self.stop(to)
         logged = set(loop.Log._fields) - {"place"}
         tables = [getattr(self._log, name) for name in logged]
