@@ -188,6 +188,14 @@ class Metrics(TalliedMetrics, WalkMetrics):
         }
         return cls(**numbers, lifted_shares=walk.lifted_shares, units=units)
 
+    def __eq__(self, other: object) -> bool:
+        """True if all numbers are equal; NaN equals NaN (dataclasses of Python 3.13 differ)."""
+        if not isinstance(other, Metrics):
+            return NotImplemented
+        pairs = [(getattr(self, name), getattr(other, name)) for name in METRICS]
+        are_equal = all(a == b or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
+        return are_equal and self.lifted_shares == other.lifted_shares
+
     @property
     def table(self) -> TextTable:
         """Table of the metrics that apply to the robot, with units, in two pairs of columns."""
