@@ -101,6 +101,8 @@ def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
     for ours, theirs in zip(found, expected, strict=True):
         assert np.array_equal(ours[others], theirs[others])
     simulation.reset(indices=[2])
+    simulation.reset(indices=[0])
+    simulation.step(simulation.rest, indices=[0])
     assert simulation.failures[2] is None and not simulation.ended[2]
 
 

@@ -108,7 +108,7 @@ class Batch:
         raise NotImplementedError
 
     def stop(self, place: int) -> float:
-        """Empties a place. Returns the wall time of its robot in s."""
+        """Empties a place, which then has no failure. Returns the wall time of its robot in s."""
         raise NotImplementedError
 
 
@@ -191,6 +191,7 @@ class SerialBatch(Batch):
 
     def stop(self, place: int) -> float:
         robot, self._robots[place] = self._robots[place], None
+        self.failures[place] = None
         return 0.0 if robot is None else robot.wall_time
 
 

@@ -261,7 +261,8 @@ class Simulation:
         for values, given in zip(self._law, cables.law, strict=True):
             values[place] = given
         self.rest[place] = robot.scenario.actuation.commands(cables)
-        self._robots[place], self.failures[place], self._steps[place] = robot, None, 0
+        self._batch.stop(place)
+        self._robots[place], self._steps[place] = robot, 0
         first = self._first_readings if robot is self.robot else first_readings(robot)
         self._batch.readings.put(place, first)
 

@@ -60,6 +60,7 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
             node["default"] = plainest(default, node["unit"])
 
 
+@functools.cache
 def attribute_docstrings(owner: type) -> dict[str, str]:
     """The docstrings of the attributes of a class and its bases, by name. (pydantic would read them
     whenever the class is imported.)"""

@@ -135,7 +135,7 @@ class LaneBatch(Batch):
         state[loop.DUE] = log.times[place, 1]
         self._places.signals[place], self._places.holds[place] = start.signals, 0
         self._prepared[place], self._ends[place] = prepared, marks[-1]
-        self.failures[place], self.readings.time[place] = None, 0.0
+        self.readings.time[place] = 0.0
         self._wall_times[place] = self._tried[place] = 0.0
         self._controlled[place] = prepared.driven.is_controlled
 
@@ -143,7 +143,7 @@ class LaneBatch(Batch):
         for thread in self._threads:
             thread.leave(place)
         self._status[place] = loop.IDLE
-        self._prepared[place] = None
+        self._prepared[place] = self.failures[place] = None
         return float(self._wall_times[place])
 
     def copy(self, place: int, to: int) -> None:

@@ -96,7 +96,7 @@ class Prepared:
     @functools.cached_property
     def kind(self) -> object:
         """What all robots in the same lanes must share. The kernel has one range of inhibiting
-        neurons for all lanes; see Lanes.load()."""
+        neurons for all lanes; see LaneThread."""
         none = np.zeros(0)
         network = self.constants.network._replace(first=none, beyond=none)
         return self.driven.is_live, shared(self.constants._replace(network=network))
