@@ -13,7 +13,7 @@ import inspect
 import itertools
 import os
 import re
-import textwrap
+import sys
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -60,7 +60,6 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
             node["default"] = plainest(default, node["unit"])
 
 
-@functools.cache
 def attribute_docstrings(owner: type) -> dict[str, str]:
     """The docstrings of the attributes of a class and its bases, by name. (pydantic would read them
     whenever the class is imported.)"""
@@ -68,14 +67,19 @@ def attribute_docstrings(owner: type) -> dict[str, str]:
     for base in reversed(owner.__mro__):
         if not base.__module__.startswith("tetra_drake"):
             continue
-        tree = ast.parse(textwrap.dedent(inspect.getsource(base)))
-        statements = typing.cast(ast.ClassDef, tree.body[0]).body
-        for attribute, text in itertools.pairwise(statements):
+        for attribute, text in itertools.pairwise(_classes_in(base.__module__)[base.__name__].body):
             if isinstance(attribute, ast.AnnAssign) and isinstance(text, ast.Expr):
                 texts[ast.unparse(attribute.target)] = inspect.cleandoc(
                     ast.literal_eval(text.value)
                 )
     return texts
+
+
+@functools.cache
+def _classes_in(module: str) -> dict[str, ast.ClassDef]:
+    """Sources of the classes of a module, by name. inspect would parse the module for each."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
 
 
 _CORRECT_NAMES = {
