@@ -345,10 +345,12 @@ class _MujocoRobot(LoneRobot):
         )
 
     def result(self) -> SimulationResult:
-        robot = self.driven.robot
+        robot, signals = self.driven.robot, self.signals
+        if not self._is_held:  # known at the times themselves
+            signals = self.driven.signals_at(self.times)
         return make_result(
             self.driven,
-            self._simulator.motion(self.times, self._kept, self.signals, self._drives_kept),
+            self._simulator.motion(self.times, self._kept, signals, self._drives_kept),
             totals=self._observer.totals(),
             work=IntegratorWork(
                 scheme=integrator_of(robot, pulled=self._simulator.pulled),

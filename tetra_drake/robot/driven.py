@@ -16,7 +16,7 @@ from tetra_drake.laws.feedback import PATHWAYS, Senses
 from tetra_drake.laws.oscillator import Network
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal
-from tetra_drake.robot.signals import interpolated, sample_count, signals_at
+from tetra_drake.robot.signals import interpolated, sample_count, signal_samples
 
 MARK_DECIMALS = 9
 """Decimals of the times (s) at which a step must end. A step between two times that differ in
@@ -57,7 +57,13 @@ class DrivenRobot:
 
     def signals_at(self, times: np.ndarray) -> np.ndarray:
         """Signals (times, m) in N at `times` (s)."""
-        return interpolated(self.samples, times, step=self.robot.scenario.cpg.listing_step)
+        step = self.robot.scenario.cpg.listing_step
+        return interpolated(self._known, times, step=step, start_up=self.start_up)
+
+    @property
+    def _known(self) -> np.ndarray:
+        """Samples (k, m) in N of the signals, a network's included."""
+        return self.samples
 
     @property
     def changes(self) -> dict[float, np.ndarray]:
@@ -131,8 +137,9 @@ class DrivenByGait(DrivenRobot):
     def sample_count(self) -> int:
         return sample_count(self.robot)
 
-    def signals_at(self, times: np.ndarray) -> np.ndarray:
-        return signals_at(self.robot, self.gait, times, steering=self.steering)
+    @functools.cached_property
+    def _known(self) -> np.ndarray:
+        return signal_samples(self.robot, self.gait, self.steering)
 
     @property
     def is_live(self) -> bool:

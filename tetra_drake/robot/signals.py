@@ -62,17 +62,19 @@ def signals_at(
     robot: Robot, gait: Gait, times: np.ndarray, *, steering: SteeringSignal | None = None
 ) -> np.ndarray:
     """Signals of the cables (times, m) in N at `times` (s); zero before the start-up time."""
-    cpg = robot.scenario.cpg
-    signals = interpolated(signal_samples(robot, gait, steering), times, step=cpg.listing_step)
-    signals[times < cpg.start_up - 1e-9] = 0.0
-    return signals
+    samples, cpg = signal_samples(robot, gait, steering), robot.scenario.cpg
+    return interpolated(samples, times, step=cpg.listing_step, start_up=cpg.start_up)
 
 
-def interpolated(samples: np.ndarray, times: np.ndarray, *, step: float) -> np.ndarray:
-    """Values (times, m) at `times` (s) of samples (k, m) that are `step` (s) apart."""
+def interpolated(
+    samples: np.ndarray, times: np.ndarray, *, step: float, start_up: float
+) -> np.ndarray:
+    """Signals (times, m) at `times` (s), from samples (k, m) that are `step` (s) apart; zero before
+    the start-up time (s)."""
     grid, values = step * np.arange(len(samples)), np.empty((len(times), samples.shape[1]))
     for column, given in enumerate(samples.T):
         values[:, column] = np.interp(times, grid, given)
+    values[times < start_up - 1e-9] = 0.0
     return values
 
 
