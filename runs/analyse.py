@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 import pandas
 
-from tetra_drake.analysis.robustness import PERCENT, by_gait, robustness
-from tetra_drake.analysis.statistics import json_rows
+from tetra_drake.study.robustness import PERCENT, by_gait, robustness
+from tetra_drake.study.statistics import json_rows
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation

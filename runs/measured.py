@@ -16,9 +16,9 @@ import numpy as np
 import pandas
 from matplotlib.figure import Figure
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
-from tetra_drake.analysis.fit import Fit, fit_values
-from tetra_drake.analysis.measurements import Rest
+from tetra_drake.study.equilibrium import study_equilibrium
+from tetra_drake.study.fit import Fit, fit_values
+from tetra_drake.study.measurements import Rest
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole

@@ -20,7 +20,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas
 
-from tetra_drake.analysis.statistics import interval, interval_of_resamples, resampled
+from tetra_drake.study.statistics import interval, interval_of_resamples, resampled
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display

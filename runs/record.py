@@ -26,7 +26,7 @@ from typing import Any
 from analyse import ANALYSIS, analyse
 from thinning import thin
 
-from tetra_drake.analysis.elites import judge_elites
+from tetra_drake.study.elites import judge_elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST

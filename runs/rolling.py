@@ -21,8 +21,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from record import FILM, PICTURE, VIEWER, take_pictures
 
-from tetra_drake.analysis.robustness import DRAWS, default_disturbances
-from tetra_drake.analysis.statistics import share_interval
+from tetra_drake.study.robustness import DRAWS, default_disturbances
+from tetra_drake.study.statistics import share_interval
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.evolution.manifest import MANIFEST

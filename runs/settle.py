@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from analyse import Analysis, load_analysis
 
-from tetra_drake.analysis.statistics import interval_of_resamples, resampled
+from tetra_drake.study.statistics import interval_of_resamples, resampled
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, ranged
 from tetra_drake.settings.units import INCH

@@ -20,7 +20,7 @@ from typing import Any
 
 import pandas
 
-from tetra_drake.analysis.elites import elites
+from tetra_drake.study.elites import elites
 from tetra_drake.evolution.entries import (
     BEST_GAIT,
     ELITES,

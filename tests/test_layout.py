@@ -18,7 +18,7 @@ ROWS = [
     ["errors", "files", "formatting", "interrupts", "machine"],
     ["kernels", "settings", "laws", "scenario", "options", "robot"],
     ["systems", "visualization", "results", "engines", "gym", "prototype"],
-    ["optimizers", "evolution", "analysis", "figures", "report", "experiment", "cli"],
+    ["optimizers", "evolution", "figures", "study", "report", "experiment", "cli"],
 ]
 ORDER = [name for row in ROWS for name in row]
 """A folder, or a module beside the folders, imports only those before it."""

@@ -15,7 +15,7 @@ from record import EXPERIMENTS
 from tables import aspect
 
 import tetra_drake as td
-from tetra_drake.analysis.measurements import load_fit_file
+from tetra_drake.study.measurements import load_fit_file
 from tetra_drake.cli import main, make_parser
 from tetra_drake.robot.robot import equilibrium_of
 from tetra_drake.scenario.structure_files import read_structure

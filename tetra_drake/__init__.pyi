@@ -1,11 +1,11 @@
 """Names of the package, with their modules: for type checkers, and for __getattr__()."""
 
-from tetra_drake.analysis.comparison import compare as compare
-from tetra_drake.analysis.equilibrium import study_equilibrium as study_equilibrium
-from tetra_drake.analysis.measurements import MotionCapture as MotionCapture
-from tetra_drake.analysis.measurements import Rest as Rest
-from tetra_drake.analysis.robustness import robustness as robustness
-from tetra_drake.analysis.sweep import sweep as sweep
+from tetra_drake.study.comparison import compare as compare
+from tetra_drake.study.equilibrium import study_equilibrium as study_equilibrium
+from tetra_drake.study.measurements import MotionCapture as MotionCapture
+from tetra_drake.study.measurements import Rest as Rest
+from tetra_drake.study.robustness import robustness as robustness
+from tetra_drake.study.sweep import sweep as sweep
 from tetra_drake.engines.preparation import prepare as prepare
 from tetra_drake.engines.simulate import simulate as simulate
 from tetra_drake.engines.simulate import simulate_many as simulate_many

@@ -413,7 +413,7 @@ def _robustness(
 
     Example: tetra-drake robustness runs/thesis --draws 50 --out robustness
     """
-    from tetra_drake.analysis.robustness import robustness
+    from tetra_drake.study.robustness import robustness
     from tetra_drake.evolution.source import load_source
     from tetra_drake.figures.robustness import robustness_text, save_judgement
 
@@ -459,7 +459,7 @@ def _compare(
 
     Example: tetra-drake compare runs/thesis runs/cma-es --reach "14.34 in"
     """
-    from tetra_drake.analysis.comparison import compare, compare_scenarios, improvement_over
+    from tetra_drake.study.comparison import compare, compare_scenarios, improvement_over
     from tetra_drake.figures.comparison import comparison_text, improvement_text, save_comparison
 
     printed = _print(width, font, title=title, pdf=pdf)
@@ -503,7 +503,7 @@ def _fit(
 
     Example: tetra-drake fit lab/fit.yaml --scenario prism --out fit
     """
-    from tetra_drake.analysis.measurements import load_fit_file
+    from tetra_drake.study.measurements import load_fit_file
     from tetra_drake.experiment import fit
     from tetra_drake.prototype.command_file import scenario_beside
     from tetra_drake.scenario.load import load_scenario
@@ -571,7 +571,7 @@ def _structure(
 
     Example: tetra-drake structure six_bar --out six_bar.html
     """
-    from tetra_drake.analysis.equilibrium import study_equilibrium
+    from tetra_drake.study.equilibrium import study_equilibrium
     from tetra_drake.engines.mjcf import loose_remark, make_mjcf
     from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
     from tetra_drake.robot.sdf import make_sdf

@@ -8,9 +8,9 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from tetra_drake.analysis.elites import judge_elites
-from tetra_drake.analysis.fit import KEPT_EVALUATIONS, Bounds, Fit, fit_values
-from tetra_drake.analysis.measurements import Measurement
+from tetra_drake.study.elites import judge_elites
+from tetra_drake.study.fit import KEPT_EVALUATIONS, Bounds, Fit, fit_values
+from tetra_drake.study.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure, check_whole
 from tetra_drake.evolution import reevaluation

@@ -27,7 +27,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed

@@ -14,7 +14,7 @@ from helpers.synthetic_run import write_map, write_run
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from tetra_drake.analysis.comparison import compare
+from tetra_drake.study.comparison import compare
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.comparison import comparison
 from tetra_drake.figures.fitness import fitness_of_trials, initial_distances, initial_fitness

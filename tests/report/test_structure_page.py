@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.report.structure_page import robot_of_file, structure_text
 from tetra_drake.report.summary import result_text
 from tetra_drake.robot.robot import Robot

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.anchored import scenario_of
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.robot.robot import Robot
 
 G, MASS, LOAD = 9.80665, 2.0, 500.0

@@ -6,7 +6,7 @@ from analyse import ANALYSIS
 from helpers.brief import BRIEF
 from helpers.meshcat_page import read_page
 
-from tetra_drake.analysis.elites import elites
+from tetra_drake.study.elites import elites
 from tetra_drake.evolution.run import load_run
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 

@@ -12,7 +12,7 @@ import record
 import tables
 from analyse import ROUNDINGS, load_analysis
 
-from tetra_drake.analysis.elites import elites
+from tetra_drake.study.elites import elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import load_run

@@ -7,7 +7,7 @@ from helpers.analytic import in_threads
 from helpers.synthetic_run import tiny_scenario, write_run
 from thinning import last_population, thin
 
-from tetra_drake.analysis.elites import elites
+from tetra_drake.study.elites import elites
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord

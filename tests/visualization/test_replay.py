@@ -13,7 +13,7 @@ from helpers.converged import shortly
 from helpers.made_up_walk import LOAD, make_row, make_walk
 from helpers.meshcat_page import commands, read_page
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.report.structure_page import save_structure_page

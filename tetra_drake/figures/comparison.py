@@ -11,7 +11,7 @@ import pandas
 from matplotlib import rcParams
 from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 
-from tetra_drake.analysis.comparison import Compared, comparison_numbers
+from tetra_drake.study.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
     AS_USUAL,
     Drawn,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
-from tetra_drake.analysis.fit import Fit
+from tetra_drake.study.fit import Fit
 from tetra_drake.figures.style import (
     Drawn,
     figure_function,

@@ -10,7 +10,7 @@ import numpy as np
 import pandas
 from matplotlib.axes import Axes
 
-from tetra_drake.analysis.elites import (
+from tetra_drake.study.elites import (
     CELLS,
     LUCKY,
     distinct_gaits,

@@ -9,7 +9,7 @@ from typing import Any
 import pandas
 from matplotlib.axes import Axes
 
-from tetra_drake.analysis.robustness import (
+from tetra_drake.study.robustness import (
     LOSS,
     Judgement,
     by_change,

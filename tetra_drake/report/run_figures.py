@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import pandas
 
-from tetra_drake.analysis.elites import elites
+from tetra_drake.study.elites import elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run
 from tetra_drake.figures.fitness import (

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pandas
 
-from tetra_drake.analysis.elites import distinct_gaits, elites, notable_gaits
+from tetra_drake.study.elites import distinct_gaits, elites, notable_gaits
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.analysis.equilibrium import EquilibriumStudy
+from tetra_drake.study.equilibrium import EquilibriumStudy
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
 from tetra_drake.laws.actuator import Force

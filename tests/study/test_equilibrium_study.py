@@ -6,7 +6,7 @@ import pytest
 from helpers.anchored import scenario_of
 from helpers.hanging import HANGING
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 from tetra_drake.robot.robot import Robot

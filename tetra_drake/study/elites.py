@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.analysis.robustness import by_gait, robustness
+from tetra_drake.study.robustness import by_gait, robustness
 from tetra_drake.evolution.entries import ELITES, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, load_run

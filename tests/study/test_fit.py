@@ -11,9 +11,9 @@ import pytest
 from helpers.anchored import HUNG, scenario_of, supported_prism
 from helpers.converged import shortly
 
-from tetra_drake.analysis import measurements
-from tetra_drake.analysis.fit import Parameter, _Problem, fit_values
-from tetra_drake.analysis.measurements import MotionCapture, Prediction, Rest
+from tetra_drake.study import measurements
+from tetra_drake.study.fit import Parameter, _Problem, fit_values
+from tetra_drake.study.measurements import MotionCapture, Prediction, Rest
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
@@ -158,7 +158,7 @@ def test_predictions_that_are_not_smooth_have_no_intervals(add_waves):
 
 
 def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
-    monkeypatch.setattr("tetra_drake.analysis.fit.MOST", 160)
+    monkeypatch.setattr("tetra_drake.study.fit.MOST", 160)
     cases = pulled_down(310.0, 0.4, np.zeros(4))[:: len(PULLS) - 1]
     add_waves(5e-3, 0.2)
     near, found = (fit_values(hung(), cases, ALONE, search=search) for search in (False, True))
@@ -178,7 +178,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
         return predict(self, scenarios)
 
     monkeypatch.setattr(Rest, "predict", counted)
-    monkeypatch.setattr("tetra_drake.analysis.fit.MOST", 16)
+    monkeypatch.setattr("tetra_drake.study.fit.MOST", 16)
     whole = fit(hung(), cases, BOUNDS, search=True)
     needed = len(predicted)
     predicted, stop = [], 2 * len(cases)

@@ -10,8 +10,8 @@ from helpers.judgements import judgement_by_hand
 from helpers.quantities import with_unit
 from helpers.synthetic_run import tiny_scenario
 
-from tetra_drake.analysis import robustness
-from tetra_drake.analysis.statistics import share_interval
+from tetra_drake.study import robustness
+from tetra_drake.study.statistics import share_interval
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.figures.robustness import robustness_text

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.analysis.statistics import (
+from tetra_drake.study.statistics import (
     interquartile_mean,
     interval,
     interval_of_resamples,

@@ -5,8 +5,8 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 from pandas import DataFrame
 
-from tetra_drake.analysis.elites import CELLS, elites, judge_elites, kept_gaits, notable_gaits
-from tetra_drake.analysis.robustness import Judgement
+from tetra_drake.study.elites import CELLS, elites, judge_elites, kept_gaits, notable_gaits
+from tetra_drake.study.robustness import Judgement
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -93,7 +93,7 @@ def test_elites_are_simulated_on_disturbed_robots_once(run_of, monkeypatch):
         tables = {"undisturbed": DataFrame(undisturbed), "draws": DataFrame(draws)}
         return Judgement(scenario, options["seed"], alone=DataFrame(), **tables)
 
-    monkeypatch.setattr("tetra_drake.analysis.elites.robustness", judge)
+    monkeypatch.setattr("tetra_drake.study.elites.robustness", judge)
     run = run_of({2.0: (0.01, 0.3), 3.0: (0.05, 0.3)})
     path = run.directory / "elites.jsonl"
     keep(run, {1: 0.25})

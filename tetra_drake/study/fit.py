@@ -15,8 +15,8 @@ import numpy as np
 import pandas
 
 from tetra_drake import __version__
-from tetra_drake.analysis.joined_keys import with_joined_changes
-from tetra_drake.analysis.measurements import FitFile, Measured, Measurement, Prediction
+from tetra_drake.study.joined_keys import with_joined_changes
+from tetra_drake.study.measurements import FitFile, Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent

@@ -8,7 +8,7 @@ import pytest
 from helpers.anchored import HUNG, scenario_of
 from helpers.converged import shortly
 
-from tetra_drake.analysis.sweep import sweep
+from tetra_drake.study.sweep import sweep
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.gait import save_gait, seeded_gait

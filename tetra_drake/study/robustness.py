@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tetra_drake.analysis.statistics import interval, json_rows, share_interval
+from tetra_drake.study.statistics import interval, json_rows, share_interval
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.machine import versions

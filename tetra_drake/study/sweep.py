@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.analysis.joined_keys import with_joined_changes
+from tetra_drake.study.joined_keys import with_joined_changes
 from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait

@@ -17,7 +17,7 @@ import numpy as np
 import pandas
 from pydantic import AfterValidator, Field
 
-from tetra_drake.analysis.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import read_bytes, read_text
