@@ -19,8 +19,6 @@ from typing import Any
 import numpy as np
 import pandas
 
-from tetra_drake.study.robustness import PERCENT, by_gait, robustness
-from tetra_drake.study.statistics import json_rows
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -39,6 +37,8 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import looks_for_turns, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
+from tetra_drake.study.robustness import PERCENT, by_gait, robustness
+from tetra_drake.study.statistics import json_rows
 
 SCHEMA = 6
 ANALYSIS = "analysis.json"

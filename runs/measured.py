@@ -16,9 +16,6 @@ import numpy as np
 import pandas
 from matplotlib.figure import Figure
 
-from tetra_drake.study.equilibrium import study_equilibrium
-from tetra_drake.study.fit import Fit, fit_values
-from tetra_drake.study.measurements import Rest
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
@@ -29,6 +26,9 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.study.equilibrium import study_equilibrium
+from tetra_drake.study.fit import Fit, fit_values
+from tetra_drake.study.measurements import Rest
 
 HERE = Path(__file__).parent / "measured"
 

@@ -20,7 +20,6 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas
 
-from tetra_drake.study.statistics import interval, interval_of_resamples, resampled
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
@@ -32,6 +31,7 @@ from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.optimizers.steady_state import has_levelled_off
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
+from tetra_drake.study.statistics import interval, interval_of_resamples, resampled
 
 HERE = Path(__file__).parent
 RECORD = HERE / "thesis" / "readings.json"

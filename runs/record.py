@@ -26,7 +26,6 @@ from typing import Any
 from analyse import ANALYSIS, analyse
 from thinning import thin
 
-from tetra_drake.study.elites import judge_elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
@@ -43,6 +42,7 @@ from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDiversity
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.study.elites import judge_elites
 
 HERE = Path(__file__).parent
 SCRATCH = Path("out/runs")

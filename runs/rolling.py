@@ -21,8 +21,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from record import FILM, PICTURE, VIEWER, take_pictures
 
-from tetra_drake.study.robustness import DRAWS, default_disturbances
-from tetra_drake.study.statistics import share_interval
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.evolution.manifest import MANIFEST
@@ -39,6 +37,8 @@ from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import shown_in
+from tetra_drake.study.robustness import DRAWS, default_disturbances
+from tetra_drake.study.statistics import share_interval
 
 ROLLING = "rolling"
 HERE = Path(__file__).parent / ROLLING

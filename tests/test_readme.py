@@ -15,10 +15,10 @@ from record import EXPERIMENTS
 from tables import aspect
 
 import tetra_drake as td
-from tetra_drake.study.measurements import load_fit_file
 from tetra_drake.cli import main, make_parser
 from tetra_drake.robot.robot import equilibrium_of
 from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.study.measurements import load_fit_file
 
 CHECKOUT = Path(__file__).parents[1]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")

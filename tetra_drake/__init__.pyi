@@ -1,11 +1,5 @@
 """Names of the package, with their modules: for type checkers, and for __getattr__()."""
 
-from tetra_drake.study.comparison import compare as compare
-from tetra_drake.study.equilibrium import study_equilibrium as study_equilibrium
-from tetra_drake.study.measurements import MotionCapture as MotionCapture
-from tetra_drake.study.measurements import Rest as Rest
-from tetra_drake.study.robustness import robustness as robustness
-from tetra_drake.study.sweep import sweep as sweep
 from tetra_drake.engines.preparation import prepare as prepare
 from tetra_drake.engines.simulate import simulate as simulate
 from tetra_drake.engines.simulate import simulate_many as simulate_many
@@ -20,5 +14,11 @@ from tetra_drake.robot.gait import ParameterSpace as ParameterSpace
 from tetra_drake.robot.gait import load_gait as load_gait
 from tetra_drake.robot.gait import seeded_gait as seeded_gait
 from tetra_drake.scenario.load import load_scenario as load_scenario
+from tetra_drake.study.comparison import compare as compare
+from tetra_drake.study.equilibrium import study_equilibrium as study_equilibrium
+from tetra_drake.study.measurements import MotionCapture as MotionCapture
+from tetra_drake.study.measurements import Rest as Rest
+from tetra_drake.study.robustness import robustness as robustness
+from tetra_drake.study.sweep import sweep as sweep
 
 __version__: str

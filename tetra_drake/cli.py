@@ -413,9 +413,8 @@ def _robustness(
 
     Example: tetra-drake robustness runs/thesis --draws 50 --out robustness
     """
-    from tetra_drake.study.robustness import robustness
     from tetra_drake.evolution.source import load_source
-    from tetra_drake.figures.robustness import robustness_text, save_judgement
+    from tetra_drake.study.robustness import robustness, robustness_text, save_judgement
 
     found = load_source(source, scenario=scenario, warn=_warn)
     if out:
@@ -459,8 +458,8 @@ def _compare(
 
     Example: tetra-drake compare runs/thesis runs/cma-es --reach "14.34 in"
     """
-    from tetra_drake.study.comparison import compare, compare_scenarios, improvement_over
     from tetra_drake.figures.comparison import comparison_text, improvement_text, save_comparison
+    from tetra_drake.study.comparison import compare, compare_scenarios, improvement_over
 
     printed = _print(width, font, title=title, pdf=pdf)
     if out:
@@ -503,10 +502,10 @@ def _fit(
 
     Example: tetra-drake fit lab/fit.yaml --scenario prism --out fit
     """
-    from tetra_drake.study.measurements import load_fit_file
     from tetra_drake.experiment import fit
     from tetra_drake.prototype.command_file import scenario_beside
     from tetra_drake.scenario.load import load_scenario
+    from tetra_drake.study.measurements import load_fit_file
 
     given = load_fit_file(source)
     measurements, parameters = given.measurements, given.parameters
@@ -571,10 +570,10 @@ def _structure(
 
     Example: tetra-drake structure six_bar --out six_bar.html
     """
-    from tetra_drake.study.equilibrium import study_equilibrium
     from tetra_drake.engines.mjcf import loose_remark, make_mjcf
     from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
     from tetra_drake.robot.sdf import make_sdf
+    from tetra_drake.study.equilibrium import study_equilibrium
 
     study = study_equilibrium(robot_of_file(source, unit=unit))
     text, robot = structure_text(study), study.robot

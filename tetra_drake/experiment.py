@@ -8,9 +8,6 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from tetra_drake.study.elites import judge_elites
-from tetra_drake.study.fit import KEPT_EVALUATIONS, Bounds, Fit, fit_values
-from tetra_drake.study.measurements import Measurement
 from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure, check_whole
 from tetra_drake.evolution import reevaluation
@@ -30,6 +27,9 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.study.elites import judge_elites
+from tetra_drake.study.fit import KEPT_EVALUATIONS, Bounds, Fit, fit_values
+from tetra_drake.study.measurements import Measurement
 
 
 def evolve(

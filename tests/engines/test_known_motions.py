@@ -27,7 +27,6 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
-from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed
@@ -40,6 +39,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
 from tetra_drake.scenario.engine_kinds import Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 G = 9.80665

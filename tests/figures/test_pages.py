@@ -14,7 +14,6 @@ from helpers.synthetic_run import write_map, write_run
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from tetra_drake.study.comparison import compare
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.comparison import comparison
 from tetra_drake.figures.fitness import fitness_of_trials, initial_distances, initial_fitness
@@ -28,8 +27,9 @@ from tetra_drake.figures.motion import (
     relative_distances,
     time_lapse,
 )
-from tetra_drake.figures.robustness import robustness
 from tetra_drake.figures.style import common_style
+from tetra_drake.study.comparison import compare
+from tetra_drake.study.robustness import robustness_figure
 
 OF_A_GAIT = (
     *(gait_diagram, relative_distances, time_lapse, path_of_the_centre, one_step),
@@ -129,7 +129,7 @@ def test_figures_of_analyses(check, tmp_path):
     runs = [write_run(tmp_path / name, [[[(1.0, 0)], [(2.0, 0)]]]) for name in ("a", "$b")]
     check(comparison, compare(runs, reach=0.01))
     check(map_of_gaits, load_run(write_map(tmp_path / "map", {0: 1.0, 1: 0.4})))
-    check(robustness, judgement_by_hand())
+    check(robustness_figure, judgement_by_hand())
 
 
 def test_one_body_has_no_distances_to_others(check):

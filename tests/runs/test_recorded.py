@@ -12,7 +12,6 @@ import record
 import tables
 from analyse import ROUNDINGS, load_analysis
 
-from tetra_drake.study.elites import elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import load_run
@@ -22,6 +21,7 @@ from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.settings.units import INCH
+from tetra_drake.study.elites import elites
 
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""

@@ -7,13 +7,13 @@ from helpers.analytic import in_threads
 from helpers.synthetic_run import tiny_scenario, write_run
 from thinning import last_population, thin
 
-from tetra_drake.study.elites import elites
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.laws.terrain import HeightField
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
+from tetra_drake.study.elites import elites
 
 AGAIN, ALONE, EDGE, BEYOND = range(20, 24)
 """Evaluations that nothing else makes matter: reevaluated; alone in its cell of the map, and one

@@ -11,9 +11,6 @@ import pytest
 from helpers.anchored import HUNG, scenario_of, supported_prism
 from helpers.converged import shortly
 
-from tetra_drake.study import measurements
-from tetra_drake.study.fit import Parameter, _Problem, fit_values
-from tetra_drake.study.measurements import MotionCapture, Prediction, Rest
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
@@ -24,6 +21,9 @@ from tetra_drake.robot.command import Command, robot_without_network
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.study import measurements
+from tetra_drake.study.fit import Parameter, _Problem, fit_values
+from tetra_drake.study.measurements import MotionCapture, Prediction, Rest
 
 STIFFNESS, FREE_LENGTH = "robot.cables.line.stiffness", "robot.cables.line.free_length"
 DAMPING, MASSES = "robot.cables.line.damping", "robot.masses.a, robot.masses.b"

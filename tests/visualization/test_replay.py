@@ -13,7 +13,6 @@ from helpers.converged import shortly
 from helpers.made_up_walk import LOAD, make_row, make_walk
 from helpers.meshcat_page import commands, read_page
 
-from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.terrain import Incline
 from tetra_drake.report.structure_page import save_structure_page
@@ -23,6 +22,7 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.units import INCH, POUND_FORCE
+from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.visualization.browser import do, wait_until_loaded
 from tetra_drake.visualization.replay import (
     RESOLUTION,

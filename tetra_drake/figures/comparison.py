@@ -11,7 +11,6 @@ import pandas
 from matplotlib import rcParams
 from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 
-from tetra_drake.study.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
     AS_USUAL,
     Drawn,
@@ -26,6 +25,7 @@ from tetra_drake.figures.style import (
     set_title,
 )
 from tetra_drake.formatting import TextTable, fixed, ranged, rounded
+from tetra_drake.study.comparison import Compared, comparison_numbers
 
 _FIRST = 10  # simulations; the axes of costs begin here
 _STEPS: Any = {"drawstyle": "steps-post", "marker": "o", "markevery": [-1]}

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
-from tetra_drake.study.fit import Fit
 from tetra_drake.figures.style import (
     Drawn,
     figure_function,
@@ -20,6 +19,7 @@ from tetra_drake.figures.style import (
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.scenario.load import SCENARIO, save_scenario
+from tetra_drake.study.fit import Fit
 
 PAGE = "README.md"
 

@@ -10,6 +10,11 @@ import numpy as np
 import pandas
 from matplotlib.axes import Axes
 
+from tetra_drake.evolution.run import Run, gait_label
+from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
+from tetra_drake.formatting import listed
+from tetra_drake.scenario.metrics import UNITS
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.study.elites import (
     CELLS,
     LUCKY,
@@ -18,11 +23,6 @@ from tetra_drake.study.elites import (
     kept_gaits,
     notable_gaits,
 )
-from tetra_drake.evolution.run import Run, gait_label
-from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
-from tetra_drake.formatting import listed
-from tetra_drake.scenario.metrics import UNITS
-from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}
 _NUMBER: Any = {"ha": "center", "va": "center", "size": "small", "weight": "bold", "zorder": 4}

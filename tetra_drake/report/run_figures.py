@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import pandas
 
-from tetra_drake.study.elites import elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run
 from tetra_drake.figures.fitness import (
@@ -35,6 +34,7 @@ from tetra_drake.figures.motion import (
 )
 from tetra_drake.figures.style import AS_USUAL, Print, save_figure
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.study.elites import elites
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import pandas
 
-from tetra_drake.study.elites import distinct_gaits, elites, notable_gaits
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST
@@ -33,6 +32,7 @@ from tetra_drake.results.result import headline
 from tetra_drake.robot.gait import save_gait
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
+from tetra_drake.study.elites import distinct_gaits, elites, notable_gaits
 
 REPORT, FIGURES = "report.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites/elites.csv"

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.study.equilibrium import EquilibriumStudy
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
 from tetra_drake.laws.actuator import Force
@@ -25,6 +24,7 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.settings.refusals import no_such
+from tetra_drake.study.equilibrium import EquilibriumStudy
 from tetra_drake.visualization.replay import save_replay
 
 if TYPE_CHECKING:

@@ -16,6 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from tetra_drake.errors import InputError, check_type
+from tetra_drake.evolution.manifest import FITNESS, read_manifest
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.statistics import (
     interquartile_mean,
     interval,
@@ -23,10 +27,6 @@ from tetra_drake.study.statistics import (
     json_rows,
     resampled,
 )
-from tetra_drake.errors import InputError, check_type
-from tetra_drake.evolution.manifest import FITNESS, read_manifest
-from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import pandas

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.study.robustness import by_gait, robustness
 from tetra_drake.evolution.entries import ELITES, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
+from tetra_drake.study.robustness import by_gait, robustness
 
 if TYPE_CHECKING:
     import pandas

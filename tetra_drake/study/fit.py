@@ -15,8 +15,6 @@ import numpy as np
 import pandas
 
 from tetra_drake import __version__
-from tetra_drake.study.joined_keys import with_joined_changes
-from tetra_drake.study.measurements import FitFile, Measured, Measurement, Prediction
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent
@@ -26,6 +24,8 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.quantities import Quantity
 from tetra_drake.settings.section import value_at
 from tetra_drake.settings.units import given_quantity
+from tetra_drake.study.joined_keys import with_joined_changes
+from tetra_drake.study.measurements import FitFile, Measured, Measurement, Prediction
 
 STEP = 1e-3
 """Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and

@@ -17,7 +17,6 @@ import numpy as np
 import pandas
 from pydantic import AfterValidator, Field
 
-from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import read_bytes, read_text
@@ -35,6 +34,7 @@ from tetra_drake.settings.quantities import ForceQuantity, Frequency, Keyed, Len
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Kinds, Section, keys_of
 from tetra_drake.settings.units import given_quantity
+from tetra_drake.study.equilibrium import study_equilibrium
 
 SAMPLE_PERIOD = 5e-3
 """Time (s) between samples of simulated motion. Cubic curves join the samples."""

@@ -1,18 +1,37 @@
 """Robustness of gaits: how far they walk if robot and surroundings differ from the model.
 
-Gaits are simulated on draws of disturbances that evolution never uses.
+Gaits are simulated in draws of disturbances that evolution never uses.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from tetra_drake.study.statistics import interval, json_rows, share_interval
+import pandas
+from matplotlib.axes import Axes
+
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
+from tetra_drake.figures.style import (
+    OKABE_ITO,
+    REFERENCE,
+    SHADE,
+    Drawn,
+    figure_function,
+    folded,
+    most_lines,
+    name_panel,
+    page_of,
+    page_width,
+    save_findings,
+    set_title,
+    write_beside,
+)
+from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
 from tetra_drake.machine import versions
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, GivenGait, given_gait
@@ -22,13 +41,11 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import varied, written
-
-if TYPE_CHECKING:
-    import pandas
+from tetra_drake.study.statistics import interval, json_rows, share_interval
 
 NOTHING, ALL = "nothing", "all"
 START, TERRAIN = "displaced start", "terrain seed"
-"""Names of the changes that are not keys of the scenario's spreads."""
+"""Names of the changes that are not scenario keys."""
 
 PERCENT, DRAWS = 5.0, 200
 ALONE = 8
@@ -42,7 +59,18 @@ The gait must also meet the scenario's requirements in the draw."""
 _Planned = tuple[dict[str, Any], Draw]
 """Labels of a draw in the tables of Judgement, and the draw."""
 
-QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
+_DOTS: Any = {"color": OKABE_ITO["sky_blue"], "markersize": 2.0, "alpha": 0.4, "zorder": 0}
+_LINE = {"color": OKABE_ITO["blue"], "linewidth": 1.2}
+_BOX: Any = {
+    "orientation": "horizontal",
+    "widths": 0.6,
+    "whis": (5, 95),
+    "showfliers": False,
+    "manage_ticks": False,
+    **dict.fromkeys(("boxprops", "medianprops", "whiskerprops", "capprops"), _LINE),
+}
+_ROW = 0.22  # height of a row, in inches
+_NAMES = 0.3  # largest width of the names, as a share of the page's width
 
 
 @dataclass(frozen=True)
@@ -128,8 +156,18 @@ def robustness(
     fresh = fresh_draws(scenario, seed, draws)
     plan: list[_Planned] = [({"what": NOTHING}, Draw({}))]
     plan += [({"what": ALL, "draw": i, **draw.factors}, draw) for i, draw in enumerate(fresh)]
+
     if alone:
-        plan += _alone(disturbances, fresh)
+        for key, size in disturbances.spreads.items():
+            for spread in (-size, size):
+                plan.append(({"what": key, "spread": spread}, Draw({key: 1.0 + spread})))
+        for i, draw in enumerate(fresh[:ALONE]):
+            if draw.moves is not None:
+                plan.append(({"what": START, "draw": i}, Draw({}, moves=draw.moves)))
+            if draw.terrain_seed is not None:
+                seeded = Draw({}, terrain_seed=draw.terrain_seed)
+                plan.append(({"what": TERRAIN, "draw": i}, seeded))
+
     rows = _simulated(scenario, plan, walkers, workers)
     changed = [row for row in rows if row["what"] not in (NOTHING, ALL)]
     return Judgement(
@@ -139,18 +177,6 @@ def robustness(
         draws=_table([row for row in rows if row["what"] == ALL], "draw", *disturbances.spreads),
         alone=_table(changed, "what", "spread", "draw"),
     )
-
-
-def _alone(disturbances: Disturbances, fresh: Sequence[Draw]) -> Iterator[_Planned]:
-    """Draws with a single change each: the keys up and down, then starts and terrain seeds."""
-    for key, size in disturbances.spreads.items():
-        for spread in (-size, size):
-            yield {"what": key, "spread": spread}, Draw({key: 1.0 + spread})
-    for i, draw in enumerate(fresh[:ALONE]):
-        if draw.moves is not None:
-            yield {"what": START, "draw": i}, Draw({}, moves=draw.moves)
-        if draw.terrain_seed is not None:
-            yield {"what": TERRAIN, "draw": i}, Draw({}, terrain_seed=draw.terrain_seed)
 
 
 def _simulated(
@@ -172,15 +198,12 @@ def _simulated(
         except InputError as error:
             refusal = str(error)
         for key, gait in gaits.items():
-            row = {"gait": key, **labels, "failure": refusal, "missed": ""}
-            rows.append(row)
+            rows.append({"gait": key, **labels, "failure": refusal, "missed": ""})
             if refusal is None:
-                walking.append((row, changed, gait))
-    results = simulate_many(
-        scenario=[changed for _, changed, _ in walking],
-        gaits=[gait for _, _, gait in walking],
-        workers=workers,
-    )
+                walking.append((rows[-1], changed, gait))
+
+    scenarios, walkers = [each[1] for each in walking], [each[2] for each in walking]
+    results = simulate_many(scenarios, walkers, workers=workers)
     for (row, _, _), result in zip(walking, results, strict=True):
         if isinstance(result, SimulationResult):
             row["missed"] = ", ".join(unmet_requirements(result.metrics, scenario.require))
@@ -191,8 +214,6 @@ def _simulated(
 
 
 def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
-    import pandas
-
     numbers = ["fitness", *METRICS]
     table = pandas.DataFrame(rows, columns=["gait", *labels, "failure", "missed", *numbers])
     return table.astype(dict.fromkeys(numbers, float))
@@ -202,20 +223,18 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
     """Summary of a judgement with a row per gait. Columns:
 
     - undisturbed: distance (m) without disturbances
-    - QUANTILES and mean of the distance (m) over the draws that did not fail
+    - 5 %, 25 %, 50 %, 75 %, 95 % (quantiles) and mean of the distance (m) over the draws that did
+      not fail
     - kept: share of all draws that the gait keeps
     - mean_low, mean_high, kept_low, kept_high: 95 % confidence intervals
     - failed, missed: numbers of draws that failed, and that miss a requirement
     """
-    import pandas
-
     rows = {}
     for gait, draws in judgement.compared(judgement.draws).groupby("gait", sort=False):
         distance, kept = draws["distance"], draws["kept"]
         row = {"undisturbed": draws["undisturbed"].iloc[0]}
-        row |= {name: distance.quantile(share) for name, share in QUANTILES.items()}
-        row["mean"] = distance.mean()
-        row["mean_low"], row["mean_high"] = interval(distance)
+        row |= {f"{share} %": distance.quantile(share / 100.0) for share in (5, 25, 50, 75, 95)}
+        row["mean"], (row["mean_low"], row["mean_high"]) = distance.mean(), interval(distance)
         row["kept"] = kept.mean()
         row["kept_low"], row["kept_high"] = share_interval(int(kept.sum()), len(kept))
         row["failed"] = int(draws["failure"].notna().sum())
@@ -229,37 +248,79 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
 
     - median: absolute change of the distance (m) by this change alone, median over the simulations
     - worst: most negative change of the distance; failed: number of failures
-    - correlation: mean over gaits of the rank correlation with the distance, see
-      rank_correlations(); correlation_size: median of its absolute value. Both are NaN for start
-      and terrain.
+    - correlation: Spearman's rank correlation between the factor of a key and the distance over the
+      draws of a gait that did not fail; mean over the gaits. NaN for start and terrain, and if all
+      distances of a gait are equal
+    - correlation_size: median over the gaits of the absolute value of the correlation
     """
     alone = judgement.compared(judgement.alone)
     alone = alone.assign(size=alone["change"].abs(), failed=alone["failure"].notna())
     table = alone.groupby("what", sort=False).agg(
         median=("size", "median"), worst=("change", "min"), failed=("failed", "sum")
     )
-    ranks = rank_correlations(judgement)
+    settings = judgement.scenario.disturbances
+    keys = list(settings.spreads) if settings else []
+    walked = judgement.draws.dropna(subset="distance").groupby("gait", sort=False)
+    ranks = pandas.DataFrame(
+        [draws[["distance", *keys]].corr("spearman").loc["distance", keys] for _, draws in walked],
+        columns=keys,
+    )
     table["correlation"], table["correlation_size"] = ranks.mean(), ranks.abs().median()
     return table.sort_values("median", ascending=False, na_position="first", kind="stable")
 
 
-def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
-    """Spearman's correlation between factor and distance, with a row per gait and a column per
-    factor. Failed draws are left out. NaN if all distances are equal."""
-    import pandas
-
-    settings = judgement.scenario.disturbances
-    keys = list(settings.spreads) if settings else []
-    rows = {
-        gait: draws[["distance", *keys]].corr(method="spearman").loc["distance", keys]
-        for gait, draws in judgement.draws.dropna(subset="distance").groupby("gait", sort=False)
-    }
-    return pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
+def chance(draws: int) -> float:
+    """Limit below which 95 % of the rank correlations of unrelated numbers lie, in absolute
+    value."""
+    return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
 
 
-def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
-    """Content of summary.json, in SI: the tables of gaits and changes, and their origin."""
-    return {
+def robustness_text(judgement: Judgement) -> str:
+    """Tables of a judgement: distances of gaits on disturbed robots, and the most harmful
+    changes."""
+    units, count = judgement.scenario.units, judgement.draws["draw"].nunique()
+    shown, counts, misses = ["undisturbed", "5 %", "50 %", "95 %"], ["failed"], ""
+    if judgement.scenario.require:
+        counts, misses = ["failed", "missed"], " and misses no requirement"
+    gaits, changes = [], []
+    for gait, row in by_gait(judgement).iterrows():
+        lengths = row / units.length
+        mean = ranged(lengths["mean"], lengths["mean_low"], lengths["mean_high"])
+        robust = percents(row["kept"], row["kept_low"], row["kept_high"])
+        cells = [str(gait), *map(rounded, lengths[shown]), mean, robust]
+        gaits.append([*cells, *(f"{row[count]:.0f}" for count in counts)])
+    digits = units.decimals + 1
+    for what, row in by_change(judgement).iterrows():
+        lengths = row[["median", "worst"]] / units.length
+        cells = [str(what), fixed(lengths["median"], digits), signed(lengths["worst"], digits)]
+        has_none = math.isnan(row["correlation"])
+        both = signed(row["correlation"]), fixed(row["correlation_size"])
+        changes.append([*cells, f"{row['failed']:.0f}", *(["", ""] if has_none else both)])
+    headings = ["disturbance", "median change", "worst", "failed", "correlation", "|correlation|"]
+    texts = [
+        f"Distances in {units.length_word} in {count} draws of disturbances: undisturbed, "
+        "percentiles, mean.\n"
+        f"Robust: share of draws in which a gait loses at most {100.0 * LOSS:g} %{misses}.\n"
+        "In brackets: 95 % confidence intervals.",
+        TextTable(["gait", *shown, "mean", "robust", *counts], gaits).text(),
+        f"What hurts most: change of the distance in {units.length_word} by one disturbance "
+        "alone.\n"
+        "Correlation: Spearman's, of factor and distance over the draws of a gait; mean, and\n"
+        f"median of its absolute value. Chance alone gives up to {chance(count):.2f}.",
+        TextTable(headings, changes).text(),
+    ]
+    return "\n\n".join(texts)
+
+
+def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
+    """Writes draws.csv and alone.csv (all simulations, SI), summary.json and the figure to a
+    folder. The summary has the tables of gaits and of changes, in SI, and their origin.
+
+    Returns the names of the files. Raises InputError if a file cannot be written.
+    """
+    given = {"draws": judgement.draws, "alone": judgement.alone}
+    tables = {name: judgement.compared(table) for name, table in given.items()}
+    summary = {
         "versions": versions(),
         "scenario": judgement.scenario.name,
         "disturbances": written(judgement.scenario.model_dump()["disturbances"]),
@@ -268,9 +329,69 @@ def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
         "gaits": json_rows(by_gait(judgement)),
         "changes": json_rows(by_change(judgement)),
     }
+    figure = robustness_figure(judgement)
+    return save_findings(figure, folder, "robustness", tables=tables, summary=summary)
 
 
-def chance(draws: int) -> float:
-    """Limit below which 95 % of the rank correlations of unrelated numbers lie, in absolute
-    value."""
-    return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
+@figure_function
+def robustness_figure(judgement: Judgement) -> Drawn:
+    """Robustness of gaits on disturbed robots.
+
+    Above: the distance in each draw divided by the undisturbed distance. Boxes are quartiles,
+    whiskers 5 to 95 %. A gait keeps the draws to the right of the dashed line. Their share is at
+    the right; the gait with the largest share is on top.
+
+    Below left: one change alone. Bars are the median change of distance, lines the greatest loss.
+    Below right: all changes together. Bars are the rank correlation of each change with the
+    distance, without sign. A bar that ends in the grey may be chance."""
+    unit = judgement.scenario.units
+    gaits = by_gait(judgement).sort_values("kept", kind="stable")
+    changes, count = by_change(judgement).iloc[::-1], judgement.draws["draw"].nunique()
+    width = _NAMES * page_width()
+    names = [folded(str(name), width) for name in gaits.index]
+    what = [folded(str(name), width) for name in changes.index]
+    rows = [max(most_lines(texts) * len(texts) + 1, 4) for texts in (names, what)]
+    page = page_of(height_in=_ROW * sum(rows) + 1.8)
+    places: Any = [["distances", "distances"], ["alone", "together"]]
+    panels = page.subplot_mosaic(places, height_ratios=rows)
+    above, alone, together = panels["distances"], panels["alone"], panels["together"]
+    _draw_distances(above, judgement, gaits)
+    above.set_yticks(range(len(names)), names)
+    places, worst = range(len(what)), changes["worst"].clip(upper=0.0).abs() / unit.length
+    alone.hlines(places, 0.0, worst, color="black", linewidth=1.0)
+    alone.barh(places, changes["median"] / unit.length, height=0.6, color=OKABE_ITO["orange"])
+    together.axvspan(0.0, chance(count), color=SHADE, linewidth=0.0, zorder=0)
+    together.barh(places, changes["correlation_size"], height=0.6, color=OKABE_ITO["sky_blue"])
+    for axes, name, label in (
+        (alone, "one change alone", f"change of distance ({unit.length_name})"),
+        (together, "all changes together", "size of rank correlation"),
+    ):
+        name_panel(axes, name)
+        axes.set_xlabel(folded(label, width))
+        axes.set(xmargin=0.05, ylim=(-0.7, len(what) - 0.3))
+        axes.set_xlim(left=0.0)
+        axes.grid(visible=False, axis="y")
+        axes.set_yticks(places, what)
+    together.tick_params(labelleft=False)
+    set_title(page, f"Robustness under {count} draws of disturbances")
+    return page
+
+
+def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -> None:
+    draws = judgement.compared(judgement.draws).dropna(subset=["distance", "undisturbed"])
+    for row, (gait, kept) in enumerate(gaits["kept"].items()):
+        simulated = draws[draws["gait"] == gait]
+        shares = simulated["distance"] / simulated["undisturbed"]
+        # Multiples of the golden ratio spread any number of dots evenly.
+        heights = row + 0.6 * (simulated["draw"] * 0.618034 % 1.0 - 0.5)
+        axes.plot(shares, heights, "o", **_DOTS)
+        axes.boxplot(shares, positions=[row], **_BOX)
+        write_beside(axes, row, f"{fixed(100.0 * kept, 0)} %")
+    axes.axvline(1.0 - LOSS, **REFERENCE)
+    axes.axvline(1.0, color="black", linewidth=0.8)
+    margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
+    axes.set(xlabel="distance / undisturbed distance", xmargin=0.02)
+    axes.set_ylim(-margin, len(gaits) - 1 + margin)
+    name_panel(axes, "distance in each draw")
+    axes.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
+    axes.grid(visible=False, axis="y")

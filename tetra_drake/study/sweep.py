@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.study.joined_keys import with_joined_changes
 from tetra_drake.engines.simulate import Outcome, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
@@ -18,6 +17,7 @@ from tetra_drake.scenario.common_sections import repeated, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.settings.section import Section, value_at
+from tetra_drake.study.joined_keys import with_joined_changes
 
 if TYPE_CHECKING:
     import xarray
