@@ -458,8 +458,14 @@ def _compare(
 
     Example: tetra-drake compare runs/thesis runs/cma-es --reach "14.34 in"
     """
-    from tetra_drake.figures.comparison import comparison_text, improvement_text, save_comparison
-    from tetra_drake.study.comparison import compare, compare_scenarios, improvement_over
+    from tetra_drake.study.comparison import (
+        compare,
+        compare_scenarios,
+        comparison_text,
+        improvement_over,
+        improvement_text,
+        save_comparison,
+    )
 
     printed = _print(width, font, title=title, pdf=pdf)
     if out:
@@ -571,9 +577,13 @@ def _structure(
     Example: tetra-drake structure six_bar --out six_bar.html
     """
     from tetra_drake.engines.mjcf import loose_remark, make_mjcf
-    from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
     from tetra_drake.robot.sdf import make_sdf
-    from tetra_drake.study.equilibrium import study_equilibrium
+    from tetra_drake.study.equilibrium import (
+        robot_of_file,
+        save_structure_page,
+        structure_text,
+        study_equilibrium,
+    )
 
     study = study_equilibrium(robot_of_file(source, unit=unit))
     text, robot = structure_text(study), study.robot

@@ -28,7 +28,8 @@ from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.elites import judge_elites
-from tetra_drake.study.fit import KEPT_EVALUATIONS, Bounds, Fit, fit_values
+from tetra_drake.study.fit import Fit, fit_values, save_fit
+from tetra_drake.study.fit_problem import KEPT_EVALUATIONS, Bounds
 from tetra_drake.study.measurements import Measurement
 
 
@@ -199,8 +200,6 @@ def fit(
         source=source,
     )
     if folder is not None:
-        from tetra_drake.figures.fit import save_fit
-
         save_fit(found, folder)
     return found
 

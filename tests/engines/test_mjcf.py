@@ -10,10 +10,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.engines.mjcf import make_mjcf
-from tetra_drake.report.structure_page import robot_of_file
 from tetra_drake.robot.sdf import make_sdf
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.study.equilibrium import EquilibriumStudy, study_equilibrium
+from tetra_drake.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
 from tetra_drake.systems import AddCables
 from tetra_drake.systems.diagram import cables_of
 

@@ -15,11 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from tetra_drake.evolution.run import load_run
-from tetra_drake.figures.comparison import comparison
 from tetra_drake.figures.fitness import fitness_of_trials, initial_distances, initial_fitness
 from tetra_drake.figures.forces import ground_forces, signals_and_tensions
 from tetra_drake.figures.gait_diagram import gait_diagram
-from tetra_drake.figures.gait_map import map_of_gaits
 from tetra_drake.figures.motion import (
     before_and_after,
     one_step,
@@ -28,7 +26,8 @@ from tetra_drake.figures.motion import (
     time_lapse,
 )
 from tetra_drake.figures.style import common_style
-from tetra_drake.study.comparison import compare
+from tetra_drake.study.comparison import compare, comparison
+from tetra_drake.study.elites import map_of_gaits
 from tetra_drake.study.robustness import robustness_figure
 
 OF_A_GAIT = (

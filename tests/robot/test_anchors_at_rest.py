@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
 
-from tetra_drake.report.structure_page import structure_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.study.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import structure_text, study_equilibrium
 
 G = 9.80665
 K = 200.0  # N/m, of the cable of HUNG

@@ -14,7 +14,6 @@ from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.capsules import find_touch
 from tetra_drake.laws.forces import Forces, compute_state_forces
 from tetra_drake.laws.terrain import Flat
-from tetra_drake.report.structure_page import robot_of_file
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.equilibrium import (
     Unactuated,
@@ -26,6 +25,7 @@ from tetra_drake.robot.robot import Robot, make_model
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.study.equilibrium import robot_of_file
 
 G = 9.80665
 TOUCHING = {"strut_contact": "!HuntCrossley {stiffness: 1 MN/m, dissipation: 1 s/m}"}

@@ -8,12 +8,12 @@ import pytest
 from helpers.structures import joined_nodes
 
 from tetra_drake.errors import InputError
-from tetra_drake.report.structure_page import robot_of_file
 from tetra_drake.robot.statics import find_statics
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.study.equilibrium import robot_of_file
 
 # Height 2, radius 1, the upper triangle twisted by 30 deg about the vertical, which is y.
 PRISM = """

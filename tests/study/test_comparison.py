@@ -8,10 +8,15 @@ import pytest
 from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 
 from tetra_drake.cli import main
-from tetra_drake.figures.comparison import comparison, comparison_text
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.settings.units import INCH
-from tetra_drake.study.comparison import compare, compare_scenarios, improvement_over
+from tetra_drake.study.comparison import (
+    compare,
+    compare_scenarios,
+    comparison,
+    comparison_text,
+    improvement_over,
+)
 
 
 def trial(*fitnesses):

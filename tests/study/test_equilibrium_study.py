@@ -7,12 +7,16 @@ from helpers.anchored import scenario_of
 from helpers.hanging import HANGING
 
 from tetra_drake.laws.terrain import Flat
-from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.settings.units import shown_in
-from tetra_drake.study.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import (
+    robot_of_file,
+    save_structure_page,
+    structure_text,
+    study_equilibrium,
+)
 
 
 def on_ground(nodes, bars, **groups):

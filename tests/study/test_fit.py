@@ -22,7 +22,8 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study import measurements
-from tetra_drake.study.fit import Parameter, _Problem, fit_values
+from tetra_drake.study.fit import fit_values
+from tetra_drake.study.fit_problem import FitProblem, Parameter
 from tetra_drake.study.measurements import MotionCapture, Prediction, Rest
 
 STIFFNESS, FREE_LENGTH = "robot.cables.line.stiffness", "robot.cables.line.free_length"
@@ -83,7 +84,7 @@ def test_derivatives_are_central_and_one_sided_where_a_neighbour_fails(limit, sl
     numbers = pandas.DataFrame({"measured": [0.0], "uncertainty": [1.0]})
     square = measurements.Measured("", numbers, predict)
     stiffness = Parameter(STIFFNESS, "N/m", 200.0, 100.0, 400.0)
-    problem = _Problem(hung(), [stiffness], [square], "", None, silent)
+    problem = FitProblem(hung(), [stiffness], [square], "", None, silent)
     assert problem.jacobian(np.ones(1)) == pytest.approx(slope, rel=1e-9)
 
 

@@ -15,14 +15,13 @@ from helpers.meshcat_page import commands, read_page
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.terrain import Incline
-from tetra_drake.report.structure_page import save_structure_page
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.settings.units import INCH, POUND_FORCE
-from tetra_drake.study.equilibrium import study_equilibrium
+from tetra_drake.study.equilibrium import save_structure_page, study_equilibrium
 from tetra_drake.visualization.browser import do, wait_until_loaded
 from tetra_drake.visualization.replay import (
     RESOLUTION,

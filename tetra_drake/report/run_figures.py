@@ -24,7 +24,6 @@ from tetra_drake.figures.fitness import (
 )
 from tetra_drake.figures.forces import ground_forces, signals_and_tensions
 from tetra_drake.figures.gait_diagram import gait_diagram
-from tetra_drake.figures.gait_map import map_of_gaits
 from tetra_drake.figures.motion import (
     before_and_after,
     one_step,
@@ -34,7 +33,7 @@ from tetra_drake.figures.motion import (
 )
 from tetra_drake.figures.style import AS_USUAL, Print, save_figure
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.study.elites import elites
+from tetra_drake.study.elites import elites, map_of_gaits
 
 
 @dataclass(frozen=True)

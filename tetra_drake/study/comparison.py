@@ -11,14 +11,31 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas
+from matplotlib import rcParams
+from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.evolution.manifest import FITNESS, read_manifest
 from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.figures.style import (
+    AS_USUAL,
+    Drawn,
+    Look,
+    Print,
+    figure_function,
+    legend_below,
+    line_style,
+    page_of,
+    page_width,
+    save_findings,
+    set_title,
+)
+from tetra_drake.formatting import TextTable, fixed, ranged, rounded
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.statistics import (
     interquartile_mean,
@@ -28,12 +45,8 @@ from tetra_drake.study.statistics import (
     resampled,
 )
 
-if TYPE_CHECKING:
-    import pandas
-
-QUARTILES = (0.25, 0.5, 0.75)
-
-_TRIAL_COLUMNS = ["run", "trial", "ended", "cost", "at_common", "fitness", "distance", "reached"]
+_FIRST = 10  # simulations; the axes of costs begin here
+_BESIDE = 5.5  # least width (in) of two panels side by side, with letters of the usual size
 
 
 @dataclass(frozen=True)
@@ -56,7 +69,7 @@ class Compared:
     - reached: cost at which the fittest gait so far walks `reach`; infinite if none does
     """
     curves: pandas.DataFrame
-    """Best fitness over cost: run, cost, low, median, high (QUARTILES over trials).
+    """Best fitness over cost: run, cost, low, median, high (quartiles over trials).
 
     A row is a cost at which a trial improves. A finished trial keeps its last value. The curve ends
     with the first unfinished trial, or with the longest trial if all are finished.
@@ -103,8 +116,6 @@ def compare(
     Raises:
         InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
     """
-    import pandas
-
     _check_lists(directories, labels)
     check_type("compare", "reach", reach or 0.0, int, float)
     loaded = [load_run(directory) for directory in directories]
@@ -117,19 +128,23 @@ def compare(
     runs = dict(zip(names, loaded, strict=True))
     notes = _differences(runs)
     searches = {label: _progress(run) for label, run in runs.items()}
-    common = min(_end(progress) for progress in searches.values())
+    ends = {label: _end(progress) for label, progress in searches.items()}
+    common = min(ends.values())
+
     trials, curves, summaries = [], [], {}
     for label, progress in searches.items():
         rows = _trials(progress, common, reach)
         trials.append(rows.assign(run=label))
-        curves.append(_curve(progress).assign(run=label))
+        curves.append(_curve(progress, ends[label]).assign(run=label))
         summaries[label] = {"draws": runs[label].scenario.draw_count, **_summary(rows)}
         summaries[label]["wall_time"] = runs[label].evaluations["wall_time_s"].mean()
         if going_on := summaries[label]["going_on"]:
             notes.append(f"{label}: {going_on} of {len(rows)} trials go on")
         if failed := int(np.isneginf(rows["fitness"]).sum()):
             notes.append(f"{label}: {failed} of {len(rows)} trials have no fitness")
-    table = pandas.concat(trials, ignore_index=True)[_TRIAL_COLUMNS]
+
+    columns = ["run", "trial", "ended", "cost", "at_common", "fitness", "distance", "reached"]
+    table = pandas.concat(trials, ignore_index=True)[columns]
     return Compared(
         scenario=next(iter(runs.values())).scenario,
         common=common,
@@ -187,8 +202,6 @@ def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
         scenarios: a table of trials for each scenario, with at least the columns `run` and
             `fitness`, such as Compared.trials.
     """
-    import pandas
-
     generator = np.random.default_rng(0)
     probabilities, resamples = defaultdict(list), defaultdict(list)
     for trials in scenarios:
@@ -251,11 +264,10 @@ def _trials(progress: pandas.DataFrame, common: int, reach: float | None) -> pan
     return table.reset_index()
 
 
-def _curve(progress: pandas.DataFrame) -> pandas.DataFrame:
+def _curve(progress: pandas.DataFrame, end: int) -> pandas.DataFrame:
     """Quartiles of the best fitness over the trials, at each cost at which a trial improves, and at
     the end."""
-    best = progress.pivot(index="cost", columns="trial", values="fitness").ffill()
-    best = best.loc[: _end(progress)]
+    best = progress.pivot(index="cost", columns="trial", values="fitness").ffill().loc[:end]
     rises = (best != best.shift()).any(axis=1)
     rises.iloc[-1] = True
     best = best[rises]
@@ -264,15 +276,15 @@ def _curve(progress: pandas.DataFrame) -> pandas.DataFrame:
 
 
 def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
-    """QUARTILES along the first axis, with linear interpolation. Unlike numpy's they are not NaN
+    """Quartiles along the first axis, with linear interpolation. Unlike numpy's they are not NaN
     if values are infinite."""
     ordered = np.sort(values, axis=0)
     quartiles = []
-    for share in QUARTILES:
-        position = share * (len(values) - 1)
-        quartile, weight = ordered[math.floor(position)], position % 1.0
+    for share in (0.25, 0.5, 0.75):
+        weight, place = math.modf(share * (len(values) - 1))
+        quartile = ordered[int(place)]
         if weight > 0.0:
-            quartile = (1.0 - weight) * quartile + weight * ordered[math.ceil(position)]
+            quartile = (1.0 - weight) * quartile + weight * ordered[int(place) + 1]
         quartiles.append(quartile)
     return quartiles
 
@@ -295,10 +307,12 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
 def _differences(runs: Mapping[str, Run]) -> list[str]:
     """Notes on scenarios that differ from the first run's outside the search. Raises InputError if
     objectives differ."""
-    (first, base), *others = runs.items()
-    notes = []
-    for label, run in others:
-        if _objective(run) != _objective(base):
+    notes, objectives = [], []
+    (first, base), *_ = runs.items()
+    for label, run in runs.items():
+        name = run.manifest.method.objective
+        objectives.append((name, run.scenario.objective if name == FITNESS else {}))
+        if objectives[-1] != objectives[0]:
             problem = f"differs from {first}; fitnesses of different objectives cannot be compared"
             raise InputError(run.directory, "objective", problem)
         # Sections that say how a run searches, not for which gaits, may differ.
@@ -312,17 +326,121 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
     return notes
 
 
-def _objective(run: Run) -> tuple[str, Mapping[str, float]]:
-    name, terms = run.manifest.method.objective, run.scenario.objective
-    return name, terms if name == FITNESS else {}
+def comparison_text(compared: Compared) -> str:
+    """Tables of the fitnesses and distances of compared runs."""
+    units, reach = compared.scenario.units, compared.reach
+    distance = f"Distance in {units.length_word} of the best gait of each trial, also as "
+    distance += "interquartile mean."
+    fitness_headings = ["run", "trials", "simulations", f"after {compared.common}", "at the end"]
+    distance_headings = ["run", "distance", "s per evaluation"]
+    if reach is not None:
+        shown = units.shown(reach, "m")
+        distance += f"\nSimulations until a trial's best gait walks {shown}: "
+        distance += "median (quartiles) over trials."
+        distance_headings += [f"simulations to {shown}", "trials that reach it"]
+    fitnesses, distances = [], []
+    for label, row in compared.runs.iterrows():
+        common = ranged(row["at_common_mean"], row["at_common_low"], row["at_common_high"])
+        end = ranged(row["fitness_mean"], row["fitness_low"], row["fitness_high"])
+        fitnesses.append([str(label), f"{row['trials']:.0f}", f"{row['cost']:.0f}", common, end])
+        lengths = row[["distance_mean", "distance_low", "distance_high"]] / units.length
+        cells = [str(label), ranged(*lengths), rounded(row["wall_time"], 2)]
+        if reach is not None:
+            costs = row[["reached", "reached_low", "reached_high"]]
+            median, low, high = (f"{x:.0f}" if math.isfinite(x) else "never" for x in costs)
+            of = f"{row['share'] * row['trials']:.0f} of {row['trials']:.0f}"
+            cells += [f"{median} ({low} to {high})", of]
+        distances.append(cells)
+    texts = [
+        f"Best fitness of each trial after {compared.common} simulations, where the first run "
+        "ends, and at its end:\ninterquartile mean over trials (95 % confidence interval). A run "
+        "ends with its longest trial,\nor with the first unfinished one. Simulations: median over "
+        "trials.",
+        TextTable(fitness_headings, fitnesses).text(),
+        *([] if compared.improvement.empty else [improvement_text(compared.improvement)]),
+        distance,
+        TextTable(distance_headings, distances).text(),
+    ]
+    return "\n\n".join(texts + [f"note: {note}" for note in compared.notes])
 
 
-def comparison_numbers(compared: Compared) -> dict[str, Any]:
-    """Content of summary.json. Lengths are in m. Infinite and unknown numbers are null."""
-    return {
+def improvement_text(improvement: pandas.DataFrame) -> str:
+    """Table of the probabilities of improvement, with their intervals. See Compared.improvement."""
+    cells = {}
+    for pair, row in improvement.iterrows():
+        probability, low, high = (fixed(row[name]) for name in ("probability", "low", "high"))
+        cells[pair] = "-" if math.isnan(row["low"]) else f"{probability} ({low} to {high})"
+    labels = list(dict.fromkeys(run for run, _ in cells))
+    rows = [[run, *(cells.get((run, other), "") for other in labels)] for run in labels]
+    return (
+        "Probability that a trial of the row's run ends fitter than a trial of the column's run\n"
+        "(95 % confidence interval); - where a run has a single trial.\n"
+        + TextTable(["run", *labels], rows).text()
+    )
+
+
+def save_comparison(compared: Compared, folder: Path, printed: Print = AS_USUAL) -> list[str]:
+    """Writes trials.csv, curves.csv, summary.json and the figure to a folder. Lengths are in m;
+    infinite and unknown numbers of the summary are null.
+
+    Returns the names of the files. Raises InputError if a file cannot be written.
+    """
+    tables = {"trials": compared.trials, "curves": compared.curves}
+    summary = {
         "common": compared.common,
         "reach": compared.reach,
         "notes": compared.notes,
         "improvement": json_rows(compared.improvement),
         "runs": json_rows(compared.runs),
     }
+    figure, kinds = comparison(compared, **vars(printed.look)), printed.kinds
+    return save_findings(figure, folder, "comparison", tables=tables, summary=summary, kinds=kinds)
+
+
+@figure_function
+def comparison(compared: Compared) -> Drawn:
+    """Comparison of runs: the best fitness so far, as median and interquartile band over the trials
+    of each run.
+
+    If a distance to reach was given, a second panel shows the share of trials that have reached it.
+    Finished trials keep their last values. A dot marks the end of a run."""
+    panel_count, unit = 1 if compared.reach is None else 2, compared.scenario.units
+    counts = compared.runs["trials"].items()
+    labels = [f"{label} ({count} {'trial' if count == 1 else 'trials'})" for label, count in counts]
+    is_narrow = page_width() < _BESIDE * rcParams["font.size"] / Look.font_size
+    rows, columns = (panel_count, 1) if is_narrow else (1, panel_count)
+    page = page_of(height_in=1.2 + 2.2 * rows + 0.1 * len(labels))
+    panels = page.subplots(rows, columns, squeeze=False).ravel()
+    ends = compared.curves.groupby("run", sort=False)["cost"].max()
+    first = min(_FIRST, ends.min())
+    for series, label in enumerate(compared.runs.index):
+        style: Any = line_style(series)
+        style |= {"drawstyle": "steps-post", "marker": "o", "markevery": [-1]}
+        curve = compared.curves.query("run == @label").replace(-math.inf, math.nan)
+        curve["cost"] = curve["cost"].clip(lower=first)
+        curve = curve.drop_duplicates("cost", keep="last")
+        panels[0].plot(curve["cost"], curve["median"], **style)
+        band: Any = {"step": "post", "color": style["color"], "alpha": 0.15, "linewidth": 0.0}
+        panels[0].fill_between(curve["cost"], curve["low"], curve["high"], **band)
+        if compared.reach is not None:
+            reached = compared.trials.query("run == @label")["reached"].sort_values()
+            there = reached[reached <= ends[label]]
+            shares = 100.0 * np.arange(len(there) + 1) / len(reached)
+            panels[1].plot([0.0, *there, ends[label]], [*shares, shares[-1]], **style)
+    decades = math.log10(ends.max() / first)
+    ticks = (1.0, 2.0, 5.0) if decades < 2.0 else (1.0, 3.0) if decades < 3.0 else (1.0,)
+    for panel in panels:
+        panel.set(xlabel="simulations", xscale="log", xlim=(first, 1.1 * ends.max()))
+        # A locator that counts ticks by the width leaves a narrow panel without any.
+        panel.xaxis.set_major_locator(
+            FixedLocator(np.outer(10.0 ** np.arange(9), ticks).ravel().tolist())
+        )
+        panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    panels[0].set_ylabel("best fitness so far")
+    if compared.reach is not None:
+        distance = f"{compared.reach / unit.length:.4g} {unit.length_name}"
+        panels[1].set(ylabel=f"{distance} reached (% of trials)", ylim=(-3.0, 103.0))
+    legend_below(page, {label: line_style(series) for series, label in enumerate(labels)})
+    set_title(page, "How well runs search: median and quartiles over trials")
+    return page

@@ -8,22 +8,24 @@ elites.jsonl    results of elites on disturbed robots, one line per gait
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, cast
 
 import numpy as np
+import pandas
 
 from tetra_drake.evolution.entries import ELITES, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
-from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.evolution.run import Run, gait_label, load_run
+from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
 from tetra_drake.files import json_number
+from tetra_drake.formatting import listed
 from tetra_drake.optimizers.quality_diversity import FLOOR
+from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.study.robustness import by_gait, robustness
-
-if TYPE_CHECKING:
-    import pandas
 
 LUCKY = 0.5
 """Least share of draws that an elite must keep; an elite below it is left out as lucky. For `kept`
@@ -34,6 +36,10 @@ _KEY = ["trial", "index"]
 _JUDGED = ["kept", "mean_distance"]
 _EPSILON = 1e-6  # pyribs adds this number against rounding
 
+_LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}
+_NUMBER: Any = {"ha": "center", "va": "center", "size": "small", "weight": "bold", "zorder": 4}
+_DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
+
 
 def elites(run: Run) -> pandas.DataFrame:
     """Elites of a run over all trials, the fittest first; empty if the optimiser makes no map.
@@ -42,8 +48,6 @@ def elites(run: Run) -> pandas.DataFrame:
     from 0), kept (share of draws that the gait keeps, see robustness.LOSS), mean_distance (m, on
     disturbed robots). The last two are NaN if the gait was not simulated on disturbed robots.
     """
-    import pandas
-
     table, kind = run.with_parameters, run.scenario.optimizer
     judged = pandas.DataFrame(run.file(ELITES).read(), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
@@ -113,3 +117,51 @@ def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], 
     for name, gait in named.items():
         names.setdefault((gait["trial"], gait["index"]), []).append(name)
     return [(alike, named[alike[0]]) for alike in names.values()]
+
+
+@figure_function
+def map_of_gaits(run: Run) -> Drawn:
+    """Map of gaits: the fittest gait in each cell. White cells have no gait.
+
+    If gaits were simulated on disturbed robots, the second panel shows the share of draws with
+    nearly the undisturbed distance. A cross marks gaits for which this share is below one half.
+    Numbers mark the fittest gait and the gaits nearest to the corners."""
+    kind, units = cast(QualityDiversity, run.scenario.optimizer), run.scenario.units
+    edges, labels = [], []
+    for (measure, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True):
+        size, unit = units.of(UNITS[measure])
+        edges.append(np.linspace(low, high, cells + 1) / size)
+        labels.append(measure.replace("_", " ") + (f" ({unit})" if unit else ""))
+    middles = [(edge[:-1] + edge[1:]) / 2.0 for edge in edges]
+
+    gaits = elites(run)
+    kept, named = kept_gaits(gaits), distinct_gaits(notable_gaits(run))
+    title = f"fitness ({len(kept)} of {math.prod(kind.cells)} cells)"
+    contents: dict[str, Any] = {title: (kept.set_index(CELLS)["fitness"], {"cmap": "viridis"})}
+    if gaits["kept"].notna().any():
+        shares = 100.0 * gaits.set_index(CELLS)["kept"]
+        contents["draws kept (%)"] = shares, {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
+
+    page = page_of(height_in=3.9 + 0.17 * len(named))
+    row = page.subplots(1, len(contents), squeeze=False, sharey=True)[0]
+    for panel, (title, (values, look)) in zip(row, contents.items(), strict=True):
+        across, up = map(range, kind.cells)
+        grid = values.unstack().reindex(index=across, columns=up).to_numpy()
+        page.colorbar(panel.pcolormesh(*edges, grid.T, rasterized=True, **look), ax=panel)
+        panel.grid(visible=False)
+        panel.set_xlabel(labels[0])
+        name_panel(panel, title)
+        for number, (_, gait) in enumerate(named, start=1):
+            at = [middle[gait[cell]] for middle, cell in zip(middles, CELLS, strict=True)]
+            panel.text(*at, str(number), bbox=_DISC, **_NUMBER)
+    row[0].set_ylabel(labels[1])
+    if len(row) > 1:
+        lucky = gaits[gaits["kept"] < LUCKY]
+        crosses = [middle[lucky[cell]] for middle, cell in zip(middles, CELLS, strict=True)]
+        row[0].plot(*crosses, **_LUCKY)
+
+    notes = [f"{listed(names)}: {gait_label(gait)}" for names, gait in named]
+    notes = [f"{number}  {note}" for number, note in enumerate(notes, start=1)]
+    page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize="small", wrap=True)
+    set_title(page, "Map of gaits")
+    return page

@@ -1,34 +1,54 @@
-"""Study of a robot in equilibrium on flat ground without actuation: statics, tensions, node
-positions, natural frequencies."""
+"""Robot in equilibrium on flat ground without actuation: statics, tensions, node positions,
+natural frequencies."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import math
+import os
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+import pandas
+from scipy import linalg
 
+from tetra_drake.errors import InputError
+from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
+from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
-from tetra_drake.laws.contact import NORMAL
+from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.laws.rigid_motions import rigid_motions
+from tetra_drake.laws.terrain import Flat
+from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
-from tetra_drake.robot.robot import Robot, equilibrium_of
+from tetra_drake.robot.ground import START_DEPTH
+from tetra_drake.robot.robot import BEARS, Robot, equilibrium_of, overlaps, undisturbed_structure
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.load import GivenScenario, given_scenario
-
-if TYPE_CHECKING:
-    import pandas
+from tetra_drake.scenario.engine_kinds import Mujoco
+from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenario
+from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
+from tetra_drake.scenario.structure_files import names_scenario, read_structure
+from tetra_drake.settings.refusals import no_such
+from tetra_drake.visualization.replay import save_replay
 
 LEAST_FREQUENCY = 0.05
 """Least natural frequency in Hz. A slower mode is a motion that no force resists, such as the spin
 of a bar about its axis."""
 _LEAST_SQUARE = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
+
+_FREQUENCIES = 5
+"""Number of natural frequencies that are printed."""
+_NOISE = 1e-9
+"""Forces of anchors up to this share of the greatest are rounding errors."""
+
+_SURROUNDINGS = "prism"
+"""Shipped scenario with the ground and friction for structure files."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +70,6 @@ class EquilibriumStudy:
     def modes(self) -> np.ndarray:
         """Mode shapes (frequencies, nodes, 3): displacements of the nodes, 1 for the farthest
         one."""
-        from scipy import linalg
-
         structure, unactuated = self.robot.structure, Unactuated(self.robot.model)
         squares, motions = linalg.eigh(*_vibration(self.robot, unactuated))
         motions = motions[:, squares > _LEAST_SQUARE]
@@ -80,9 +98,6 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     Raises:
         InputError: if the robot has no equilibrium.
     """
-    import pandas
-    from scipy import linalg
-
     robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
     structure, equilibrium = robot.structure, robot.equilibrium
     unactuated, p_WN = Unactuated(robot.model), node_positions(structure, equilibrium.state)
@@ -127,3 +142,127 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
     return stiffness, mass_matrix(unactuated)
+
+
+def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
+    """The robot of a structure or of a scenario on flat ground, with forces as actuators, for
+    MuJoCo. A structure gets Coulomb friction.
+
+    A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
+    for it. A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in
+    some of NTRT's; in equilibrium they touch. Raises InputError that names file and key.
+    """
+    shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
+    if name_or_file not in shipped and not os.path.exists(name_or_file):
+        problem = no_such("structure or scenario", name_or_file, shipped)
+        raise InputError(name_or_file, "", problem)
+    is_scenario = names_scenario(name_or_file)
+    if is_scenario:
+        given = load_scenario(name_or_file)
+        ground = Flat() if given.terrain.is_ground else given.terrain
+        given = given.with_sections(terrain=ground, actuation=Force())
+    else:
+        structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
+        given = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
+    friction = given.friction.without_bristles()
+    scenario = given.with_sections(friction=friction, engine=Mujoco())
+    try:
+        robot = Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
+        if is_scenario:
+            return robot
+        p_WN = node_positions(robot.structure, robot.structure.initial_state)
+        # With this stiffness, a single node bears the weight.
+        least = robot.weight / (BEARS * float(np.ptp(p_WN, axis=0).max()))
+        if least <= given.ground.stiffness:
+            return robot
+        damping = given.ground.damping * least / given.ground.stiffness
+        firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
+        return Robot.of(firm, undisturbed_structure(firm, may_overlap=True))
+    except InputError as error:
+        key = error.key if is_scenario else error.key.removeprefix("robot.")
+        raise InputError(name_or_file, key, error.problem) from error
+
+
+def structure_text(study: EquilibriumStudy) -> str:
+    """Description of a robot and its equilibrium, with tables in g and the robot's units."""
+    robot, statics, structure = study.robot, study.statics, study.robot.structure
+    units = robot.scenario.units
+    length, force = units.length_name, units.force_name
+    lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
+    on_ground = ground = ""
+    if structure.contacts.size:
+        stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")
+        on_ground, ground = " on the ground", f", on a ground of {stiffness} per node"
+    bodies, height = [], functools.partial(fixed, digits=units.decimals + 1)
+    for body, mass in zip(structure.bodies, structure.mass, strict=True):
+        nodes = study.nodes[study.nodes["body"] == body]
+        load = rounded(nodes["load"].sum() / units.force)
+        heights = _range(nodes["z"] / units.length, height)
+        bodies.append([body, rounded(1e3 * mass, 4), heights, load])
+    headings = ["body", "mass (g)", f"heights of nodes ({length})", f"load on the ground ({force})"]
+    number = f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}"
+    lines = [
+        f"{robot.scenario.name}: {number}, {len(structure.node_names)} nodes, "
+        f"{len(structure.cables)} cables, "
+        f"{structure.signals} oscillators, {rounded(1e3 * structure.mass.sum(), 4)} g",
+        f"Without weight: self-stress states {len(statics.self_stresses)}, "
+        f"infinitesimal mechanisms {statics.mechanisms}.",
+        f"Lowest natural frequencies{on_ground}, undamped: {lowest or 'none'} Hz.",
+        f"At rest, without actuation{ground}:",
+        TextTable(headings, bodies).text(),
+    ]
+    if len(structure.cables):
+        rows = []
+        for group, cables in study.cables.groupby("group", sort=False):
+            lengths = (_range(cables[name] / units.length) for name in ("free_length", "length"))
+            tension = _range(cables["tension"] / units.force)
+            rows.append([str(group), str(len(cables)), *lengths, tension])
+        names = [f"free length ({length})", f"length ({length})", f"tension ({force})"]
+        lines.append(TextTable(["cables", "number", *names], rows).text())
+    if structure.held.any():
+        forces = study.nodes.loc[structure.held.any(axis=1), "anchor_x":"anchor_z"]
+        forces = forces.where(forces.abs() > _NOISE * forces.abs().to_numpy().max(), 0.0)
+        rows = [[str(node), *map(rounded, row / units.force)] for node, row in forces.iterrows()]
+        names = [f"force along {axis} ({force})" for axis in "xyz"]
+        lines.append(TextTable(["anchor", *names], rows).text())
+    return "\n\n".join(lines + _faults(study))
+
+
+def _faults(study: EquilibriumStudy) -> list[str]:
+    """Lines with the depth of a robot that sinks in, the nodes that are below the ground at rest,
+    and the struts that overlap."""
+    robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
+    allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
+    lines = [sentence(robot.sinking_remark())] if robot.sinking_remark() else []
+    low = study.nodes["z"][study.nodes["z"] < -allowed]
+    if structure.contacts.size and len(low):
+        depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]
+        lines.append(f"Below the ground, which does not touch them: {listed(depths)}.")
+    through = overlaps(robot.scenario, structure, robot.equilibrium.state)
+    if through:
+        pairs = [f"{a} | {b} ({units.shown(depth, 'm')})" for (a, b), (depth, _) in through.items()]
+        lines.append(f"Struts that pass through each other: {listed(pairs)}.")
+    return lines
+
+
+def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> str:
+    low, high = write(values.min()), write(values.max())
+    return low if low == high else f"{low} to {high}"
+
+
+def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
+    """Writes a page that shows the robot in equilibrium. Raises InputError if the page cannot be
+    written."""
+    robot = study.robot
+    loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
+    modes = np.zeros((2, len(loads), MODE_COLUMNS))
+    modes[:, :, CONTACT] = loads > 0.0
+    motion = Motion(
+        times=np.array([0.0, 1.0]),
+        states=np.tile(robot.equilibrium.state, (2, 1)),
+        signals=np.zeros((2, robot.structure.signals)),
+        modes=modes,
+        drives=np.tile(robot.starting_drives(), (2, 1)),
+    )
+    title = f"{robot.scenario.name} at rest"
+    save_replay(path, robot=robot, trajectory=make_dataset(robot, motion), title=title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Collection, Iterable, Mapping
@@ -9,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.engines.simulate import Outcome, simulate_many
+from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.changes import given_changes
-from tetra_drake.scenario.common_sections import repeated, separate
+from tetra_drake.scenario.common_sections import by_separate_key, repeated, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section, value_at
-from tetra_drake.study.joined_keys import with_joined_changes
 
 if TYPE_CHECKING:
     import xarray
@@ -80,6 +81,7 @@ def sweep(
         walkers * len(scenarios),
         workers=workers,
     )
+
     labels = {}
     for key, values in changes.items():
         along = [each[key] for each in grid]
@@ -94,11 +96,17 @@ def sweep(
             labels[dimension] = [str(value) for value in values], {}
     labels["gait"] = [gait.name for gait in walkers], {}
     shape = [len(values) for values, _ in labels.values()]
-    rows = [_numbers(outcome) for outcome in outcomes]
+    rows = [
+        {}
+        if isinstance(outcome, SimulationFailure)
+        else {"fitness": outcome.fitness, **vars(outcome.metrics)}
+        for outcome in outcomes
+    ]
     variables = {}
     for name, unit in {"fitness": "", **UNITS}.items():
-        found = np.reshape([row[name] for row in rows], shape)
+        found = np.reshape([row.get(name, math.nan) for row in rows], shape)
         variables[name] = list(labels), found, {"units": unit or "1"}
+
     coordinates = {name: (name, *given) for name, given in labels.items()}
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
 
@@ -114,8 +122,23 @@ def _values(key: str, given: Any) -> Collection[Any]:
     return values
 
 
-def _numbers(outcome: Outcome) -> dict[str, float]:
-    """Fitness and metrics of a simulation; NaN if the simulation failed."""
-    if isinstance(outcome, SimulationFailure):
-        return dict.fromkeys(("fitness", *METRICS), math.nan)
-    return {"fitness": outcome.fitness, **vars(outcome.metrics)}
+def with_joined_changes(scenario: Scenario, by_joined: Mapping[str, Any]) -> Scenario:
+    """The scenario with changes by keys that are joined by commas and get the same value; see
+    Scenario.with_changes().
+
+    Raises InputError, naming the key. It advises to join a changed key and another one of its
+    section if that helps, because a limit depends on both.
+    """
+    changes = by_separate_key(by_joined)
+    try:
+        return scenario.with_changes(changes)
+    except InputError as error:
+        problem, refused = error.problem, error.key
+        for key, value in changes.items():
+            alike = key.rpartition(".")[0] == refused.rpartition(".")[0]
+            if refused not in changes and alike:
+                with contextlib.suppress(InputError):
+                    scenario.with_changes({**changes, refused: value})
+                    problem += f"; the joined keys '{key}, {refused}' get the same value"
+                    break
+        raise InputError(error.source, refused, problem) from error

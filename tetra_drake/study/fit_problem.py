@@ -1,0 +1,232 @@
+"""Least-squares problem of a fit: parameters, weighted residuals, and their derivatives."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import read_bytes, write_whole
+from tetra_drake.formatting import Say
+from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.quantities import Quantity
+from tetra_drake.settings.section import value_at
+from tetra_drake.settings.units import given_quantity
+from tetra_drake.study.measurements import Measured
+from tetra_drake.study.sweep import with_joined_changes
+
+STEP = 1e-3
+"""Step of finite differences, as a share of a parameter's start. With less, the contact's kinks and
+the tolerance of the simulation show; with more, the curvature."""
+HUGE = 1e200
+"""Sum of squares where a simulation fails."""
+SEAL = 32
+"""Size of the digest in the file of an evaluation, in bytes."""
+KEPT_EVALUATIONS = "evaluations"
+"""Folder of the evaluations of a fit. A file has a digest of its name and of its numbers, and the
+numbers: for each measurement the predicted ones and the offset of the clock."""
+
+Bounds = Sequence[str | float]
+
+
+class Parameter(NamedTuple):
+    """A number of a scenario that is fitted, in SI."""
+
+    key: str
+    """The key, or several joined by commas."""
+    unit: str
+    start: float
+    least: float
+    most: float
+
+    @property
+    def scale(self) -> float:
+        """Unit of the relative parameter: the start, or the width of the bounds if the start is 0
+        or they are narrower."""
+        width = self.most - self.least
+        return min(abs(self.start) or width, width)
+
+    def value(self, number: float) -> str | float:
+        """The number as a value for the scenario."""
+        return f"{number!r} {self.unit}" if self.unit else number
+
+
+def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -> Parameter:
+    """The parameter of a key. Raises InputError, naming `source`, if key or bounds cannot be
+    used."""
+    place = f"parameters.{key}"
+    values = scenario.model_dump()
+    starts = [value_at(values, each) for each in separate(key)]
+    for start in starts:
+        if isinstance(start, bool) or not isinstance(start, float):
+            what = "no value" if start is None else f"{start!r:.40}"
+            raise InputError(source, place, f"found {what}, expected the key of a number to fit")
+    start = starts[0]
+    if any(other != start for other in starts):
+        found = " and ".join(f"{each:g}" for each in starts)
+        raise InputError(source, place, f"found {found}, expected joined keys of the same value")
+    unit = start.unit if isinstance(start, Quantity) else ""
+    least, most = (
+        given_quantity(bound, unit, source, place) if isinstance(bound, str) else float(bound)
+        for bound in bounds
+    )
+    if not least < most:
+        raise InputError(source, place, f"found bounds {least:g} to {most:g}, expected least first")
+    if not least <= start <= most:
+        problem = f"found bounds {least:g} to {most:g} {unit}".rstrip()
+        raise InputError(source, place, f"{problem}, expected them around the start, {start:g}")
+    parameter = Parameter(key, unit, float(start), least, most)
+    try:
+        for bound in (least, most):  # a scenario may have limits of its own
+            with_joined_changes(scenario, {key: parameter.value(bound)})
+    except InputError as error:
+        named = "" if error.key in separate(key) else f"{error.key}: "
+        raise InputError(source, place, f"{named}{error.problem}") from error
+    return parameter
+
+
+@dataclass(eq=False)
+class FitProblem:
+    """Weighted residuals and their derivatives by relative parameters. All scenarios of an
+    iteration are simulated side by side.
+
+    A point is an array (n,) of relative parameters.
+    """
+
+    scenario: Scenario
+    parameters: Sequence[Parameter]
+    measured: Sequence[Measured]
+    digest: str
+    """Digest of all that predictions depend on, except the fitted values."""
+    folder: Path | None
+    """Folder that keeps the evaluations; None to keep none."""
+    say: Say
+
+    def __post_init__(self) -> None:
+        self.scale = np.array([parameter.scale for parameter in self.parameters])
+        limits = np.array([[parameter.least, parameter.most] for parameter in self.parameters])
+        self.bounds = limits.T / self.scale
+        tables = [each.numbers.assign(measurement=each.name) for each in self.measured]
+        self.numbers = pandas.concat(tables, ignore_index=True)
+        self.values = self.numbers["measured"].to_numpy(dtype=float)
+        self.uncertainty = self.numbers["uncertainty"].to_numpy(dtype=float)
+        # An evaluation has the predicted numbers of each measurement, then the clock's offset.
+        self._clocks = np.cumsum([len(table) + 1 for table in tables]) - 1
+        self._known: dict[str, np.ndarray] = {}
+
+    @property
+    def evaluations(self) -> int:
+        """Number of scenarios that were predicted so far."""
+        return len(self._known)
+
+    def scenario_at(self, x: np.ndarray) -> Scenario:
+        """The scenario at a point."""
+        pairs = zip(self.parameters, (x * self.scale).tolist(), strict=True)
+        changes = {parameter.key: parameter.value(number) for parameter, number in pairs}
+        return with_joined_changes(self.scenario, changes)
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        """Weighted residuals (numbers,); the neighbours of the point are simulated with it."""
+        before = self.evaluations
+        self._evaluate([x, *self._neighbours(x, STEP)])
+        residuals = self.residuals_at(x)
+        if self.evaluations > before:
+            self.tell(residuals)
+        return residuals
+
+    def residuals_at(self, x: np.ndarray) -> np.ndarray:
+        """Weighted residuals (numbers,) at a point that was evaluated."""
+        predicted = np.delete(self._known[self._name(x)], self._clocks)
+        residuals: np.ndarray = (predicted - self.values) / self.uncertainty
+        return residuals
+
+    def clock_offsets(self, x: np.ndarray) -> dict[str, float]:
+        """Time (s) by which the clock of each measurement is ahead, at an evaluated point."""
+        offsets = self._known[self._name(x)][self._clocks].tolist()
+        return dict(zip([each.name for each in self.measured], offsets, strict=True))
+
+    def sums_of_squares(self, points: np.ndarray) -> np.ndarray:
+        """Sums (k,) of the squares of the weighted residuals at points (k, n), which are simulated
+        side by side; a huge number where that fails."""
+        self._evaluate(list(points))
+        residuals = np.array([self.residuals_at(point) for point in points])
+        return np.nan_to_num((residuals**2).sum(axis=1), nan=HUGE)
+
+    def jacobian(self, x: np.ndarray, step: float = STEP) -> np.ndarray:
+        """Derivatives (numbers, n) of the residuals by central differences; one-sided where a
+        neighbour cannot be simulated. Raises InputError where none can."""
+        points = self._neighbours(x, step)
+        self._evaluate([x, *points])
+        columns = []
+        for place, parameter in enumerate(self.parameters):
+            near = [points[2 * place], x, points[2 * place + 1]]
+            sides = [(point[place], self.residuals_at(point)) for point in near]
+            sides = [side for side in sides if np.isfinite(side[1]).all()]
+            (low, left), (high, right) = sides[0], sides[-1]
+            if low == high:
+                problem = "neighbouring values cannot be simulated, expected other bounds"
+                raise InputError(f"scenario {self.scenario.name}", parameter.key, problem)
+            columns.append((right - left) / (high - low))
+        return np.column_stack(columns)
+
+    def misfit(self, residuals: np.ndarray) -> float:
+        """Sum of squares per degree of freedom."""
+        return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
+
+    def tell(self, residuals: np.ndarray) -> None:
+        """Tells the user of an iteration that ended with these residuals."""
+        self.say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
+
+    def _neighbours(self, x: np.ndarray, step: float) -> list[np.ndarray]:
+        """Two neighbours of a point for each parameter, within the bounds."""
+        moves = step * np.kron(np.eye(x.size), [[-1.0], [1.0]])
+        return list(np.clip(x + moves, *self.bounds))
+
+    def _evaluate(self, points: Sequence[np.ndarray]) -> None:
+        """Predicts all measurements at points that are not known."""
+        unknown = {}
+        for point in points:
+            name = self._name(point)
+            if name not in self._known and not self._restore(name):
+                unknown[name] = point
+        if not unknown:
+            return
+        scenarios = [self.scenario_at(point) for point in unknown.values()]
+        by_measurement = [each.predict(scenarios) for each in self.measured]
+        for name, predictions in zip(unknown, zip(*by_measurement, strict=True), strict=True):
+            numbers = np.concatenate([[*each.values, each.clock_offset] for each in predictions])
+            self._known[name] = numbers
+            if file := self._file(name):
+                write_whole(file, _seal(name, numbers.tobytes()) + numbers.tobytes())
+
+    def _name(self, x: np.ndarray) -> str:
+        """Name of an evaluation: a digest of the data, keys and values."""
+        keys = [parameter.key for parameter in self.parameters]
+        text = f"{self.digest} {keys} {(x * self.scale).tolist()}"
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+    def _file(self, name: str) -> Path | None:
+        return self.folder and self.folder / KEPT_EVALUATIONS / f"{name}.bin"
+
+    def _restore(self, name: str) -> bool:
+        """Takes an evaluation from the folder. Returns False if it is not there, or damaged."""
+        file, content = self._file(name), b""
+        with contextlib.suppress(InputError):  # it is simulated again
+            content = read_bytes(file, "evaluation") if file else b""
+        is_whole = content[:SEAL] == _seal(name, content[SEAL:])
+        if is_whole:
+            self._known[name] = np.frombuffer(content[SEAL:])
+        return is_whole
+
+
+def _seal(name: str, content: bytes) -> bytes:
+    """Digest (SEAL bytes) of the name and the content of an evaluation."""
+    return hashlib.sha256(name.encode() + content).digest()
