@@ -48,7 +48,7 @@ READERS = {
 @pytest.fixture(scope="module", autouse=True)
 def quick_drawing():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tetra_drake.report.run_figures.save_figure", quick_figures.save_figure)
+        patch.setattr("tetra_drake.report.run_page.save_figure", quick_figures.save_figure)
         yield
 
 

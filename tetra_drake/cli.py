@@ -313,7 +313,7 @@ def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: 
 
     Example: tetra-drake replay runs/champion --out champion.html
     """
-    from tetra_drake.report.replay_page import write_replay
+    from tetra_drake.report.result_folder import write_replay
 
     title = write_replay(source, out, scenario=scenario, warn=_warn)
     print(f"{title}\nto watch the robot, open in a browser: {out}")
@@ -346,7 +346,7 @@ def _video(
 
     Example: tetra-drake video runs/champion --out talk.mp4 --view side
     """
-    from tetra_drake.report.replay_page import load_or_simulate
+    from tetra_drake.report.result_folder import load_or_simulate
     from tetra_drake.visualization.video import check_video, make_video
 
     check_video(out, fps=fps)

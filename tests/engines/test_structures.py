@@ -30,8 +30,8 @@ from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.feedback import Gains, sense
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
-from tetra_drake.report import run_figures
-from tetra_drake.results.result import save_result
+from tetra_drake.report import run_page
+from tetra_drake.report.result_folder import save_result
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot, make_structure
 from tetra_drake.robot.structure import node_positions
@@ -250,11 +250,11 @@ def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):
 
 def test_pictures_of_a_lifted_robot_leave_out_the_ground(tmp_path, monkeypatch):
     drawn = Mock()
-    monkeypatch.setattr(run_figures, "save_figure", drawn)
+    monkeypatch.setattr(run_page, "save_figure", drawn)
     scenario = floating_prism(duration=0.2)
     result = simulate(scenario, seeded_gait(scenario, 3), record=True)
     assert result.trajectory.sizes["contact"] == 0
     assert result.metrics.lifted == 1.0
-    run_figures.draw(run_figures.pictures_of_gait(result), tmp_path)
+    run_page.draw_pictures(run_page.pictures_of_gait(result), tmp_path)
     names = [call.args[2] for call in drawn.call_args_list]
     assert "ground_forces" not in names and len(names) > 3

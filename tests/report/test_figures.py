@@ -53,7 +53,7 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
 
 
 def test_what_cannot_be_drawn_is_refused_before_simulations(run, tmp_path, monkeypatch, refused):
-    monkeypatch.setattr("tetra_drake.report.run_figures.simulate", None)
+    monkeypatch.setattr("tetra_drake.report.run_page.simulate", None)
     (tmp_path / "file").touch()
     write_run(tmp_path / "no trial", [[]])
     damaged = write_run(tmp_path / "damaged", [[[(1.0, 0)]]]) / "manifest.json"

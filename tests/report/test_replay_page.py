@@ -11,9 +11,15 @@ import xarray
 from helpers.synthetic_run import write_run
 
 from tetra_drake.errors import InputError
-from tetra_drake.report.replay_page import load_or_simulate, write_replay
-from tetra_drake.report.result_folder import check_result_folder, load_result, save_result_folder
-from tetra_drake.results.result import headline, save_result
+from tetra_drake.report.result_folder import (
+    check_result_folder,
+    load_or_simulate,
+    load_result,
+    save_result,
+    save_result_folder,
+    write_replay,
+)
+from tetra_drake.results.result import headline
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH

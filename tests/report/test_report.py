@@ -14,8 +14,7 @@ from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
 from tetra_drake.formatting import rounded
-from tetra_drake.report.run_figures import simulate_shown_gaits
-from tetra_drake.report.run_page import render_report, write_report
+from tetra_drake.report.run_page import render_report, simulate_shown_gaits, write_report
 from tetra_drake.settings.units import INCH
 
 from .conftest import COSTS, TRIALS
@@ -90,7 +89,7 @@ def study(run):
 def render(study, **changes):
     """The page without figures, of a study with changes of its run."""
     run = dataclasses.replace(study.run, **changes)
-    return Page(render_report(dataclasses.replace(study, run=run), [], folder=Path()))
+    return Page(render_report(dataclasses.replace(study, run=run), {}, folder=Path()))
 
 
 def test_figures_are_files_and_in_the_page(run, page):

@@ -9,7 +9,7 @@ from helpers import prism
 from helpers.made_up_walk import make_walk
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.results.trajectory import DIMENSIONS, sample_times
+from tetra_drake.results.trajectory import VARIABLES, sample_times
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
@@ -24,7 +24,8 @@ def trajectory(request: pytest.FixtureRequest, data: Path) -> xarray.Dataset:
 
 
 def test_every_variable_has_a_unit_and_named_dimensions(trajectory: xarray.Dataset) -> None:
-    assert {name: values.dims for name, values in trajectory.items()} == DIMENSIONS
+    dimensions = {name: along for name, (along, _, _) in VARIABLES.items()}
+    assert {name: values.dims for name, values in trajectory.items()} == dimensions
     assert all(v.attrs["units"] for v in trajectory.data_vars.values())
     assert trajectory.time.attrs["units"] == "s"
     np.testing.assert_array_equal(trajectory.time, sample_times(2.0, 0.01))

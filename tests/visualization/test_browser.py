@@ -168,7 +168,7 @@ def test_a_page_without_its_viewer_says_how_to_get_it(browser, trajectory, tmp_p
 
 
 def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, monkeypatch):
-    monkeypatch.setattr("tetra_drake.report.run_figures.save_figure", quick_figures.save_figure)
+    monkeypatch.setattr("tetra_drake.report.run_page.save_figure", quick_figures.save_figure)
     run = write_run(tmp_path / "run", [[[(1.0, 0), (2.0, 1)]]])
     _, replay, report = write_report(run)
     with opened(browser, report.as_uri()) as page:

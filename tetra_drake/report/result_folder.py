@@ -8,36 +8,83 @@ result.json       metrics, gait, and path of the centre
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+import pydantic
 from pydantic import Field
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.files import check_folder, given_path, read_json
-from tetra_drake.results.result import (
-    IntegratorWork,
-    PathColumns,
-    SimulationResult,
-    save_result,
+from tetra_drake.evolution.source import load_source
+from tetra_drake.files import (
+    check_file,
+    check_folder,
+    given_path,
+    json_number,
+    read_json,
+    write_whole,
 )
-from tetra_drake.results.trajectory import DIMENSIONS, labels, save_dataset, with_indexes
+from tetra_drake.formatting import Say, silent
+from tetra_drake.machine import versions
+from tetra_drake.results.result import IntegratorWork, SimulationResult
+from tetra_drake.results.trajectory import VARIABLES, labels, save_dataset, with_indexes
 from tetra_drake.robot.command import robot_without_network
 from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.measures import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
-from tetra_drake.scenario.metrics import METRICS, Metrics, wrong_metric
+from tetra_drake.scenario.metrics import METRICS, UNITS, Metrics, wrong_metric
+from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
+from tetra_drake.settings.units import INCH
 
 if TYPE_CHECKING:
     import xarray
 
 TRAJECTORY, REPLAY, RESULT = "trajectory.nc", "replay.html", "result.json"
+SCHEMA = 1
+
+
+class PathColumns(Section):
+    """The path of the centre in result.json, in the order of CentrePath."""
+
+    time_s: list[float]
+    x_m: list[float]
+    y_m: list[float]
+    z_m: list[float]
+    heading_rad: list[float | None]
+    """Headings; None where the heading is undefined."""
+
+    @pydantic.model_validator(mode="after")
+    def _check_lengths(self) -> Self:
+        count = len(self.time_s)
+        for name, column in self:
+            if len(column) != count or count < 2:
+                expected = f"{max(count, 2)}, as many as time_s"
+                refuse(name, f"found {len(column)} numbers, expected {expected}")
+        return self
+
+
+class ResultFile(Section):
+    """The keys of result.json that load_result() reads."""
+
+    name: str
+    metrics: dict[str, Any]
+    fitness: float | None
+    duration_s: float = Field(gt=0)
+    wall_time_s: float = Field(gt=0)
+    engine: str
+    integrator: IntegratorWork
+    gait: Any
+    """See GaitFile; None if a command was played."""
+    path: PathColumns
 
 
 def check_result_folder(folder: Path) -> None:
@@ -60,6 +107,36 @@ def save_result_folder(folder: Path, result: SimulationResult) -> None:
     save_result(folder / RESULT, result)
 
 
+def save_result(path: str | Path, result: SimulationResult) -> None:
+    """Writes result.json: metrics in SI, lengths also in inches, times in s, and the path of the
+    centre as columns. `gait` is null for a command."""
+    scenario, gait, metrics = result.scenario, result.gait, result.metrics
+    lengths = {name: getattr(metrics, name) for name, unit in UNITS.items() if unit == "m"}
+    lengths["path_radius"] = metrics.path_radius
+    columns = [result.path.times, *result.path.centre.T, result.path.heading]
+    path_columns = dict(zip(PathColumns.model_fields, columns, strict=True))
+    content = {
+        "schema": SCHEMA,
+        "name": result.name,
+        "scenario": scenario.name,
+        "metrics": metrics.to_json(),
+        **{f"{name}_in": json_number(length / INCH) for name, length in lengths.items()},
+        "fitness": result.fitness,
+        "duration_s": result.duration,
+        "wall_time_s": result.wall_time,
+        "real_time_factor": result.duration / result.wall_time,
+        "engine": result.engine,
+        "integrator": result.integrator.model_dump(),
+        "versions": versions(scenario.engine.packages),
+        "gait": gait and gait.to_json(scenario),
+        "path": {
+            name: [json_number(number) for number in column.tolist()]
+            for name, column in path_columns.items()
+        },
+    }
+    write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
 def load_result(folder: str | Path) -> SimulationResult:
     """Reads a result folder of `simulate`: the result with scenario, gait and trajectory.
 
@@ -80,18 +157,18 @@ def load_result(folder: str | Path) -> SimulationResult:
     scenario, path = load_scenario(folder / SCENARIO), folder / RESULT
     content = read_json(path, "result")
     if isinstance(content, dict):
-        content = {name: content[name] for name in _ResultFile.model_fields if name in content}
-    file = _ResultFile.from_tree(content, path)
+        content = {name: content[name] for name in ResultFile.model_fields if name in content}
+    file = ResultFile.from_tree(content, path)
     metrics = dict.fromkeys([*METRICS, "lifted_shares"], "") | file.metrics
-    if name := wrong_metric(metrics):
-        raise InputError(path, f"metrics.{name}", "is missing, or of a wrong type")
+    if wrong := wrong_metric(metrics):
+        raise InputError(path, f"metrics.{wrong}", "is missing, or of a wrong type")
     numbers = {name: math.nan if metrics[name] is None else metrics[name] for name in METRICS}
     shares = tuple(metrics["lifted_shares"])
     if file.gait is None:  # a command was played
         gait, robot = None, robot_without_network(scenario)
     else:
         gait, robot = load_gait(path, scenario, key="gait"), Robot.of(scenario)
-    trajectory = _load_trajectory(folder / TRAJECTORY, robot.structure)
+    times, *centre, heading = (np.array(column, dtype=float) for _, column in file.path)
     return SimulationResult(
         scenario=scenario,
         robot=robot,
@@ -103,24 +180,9 @@ def load_result(folder: str | Path) -> SimulationResult:
         wall_time=file.wall_time_s,
         integrator=file.integrator,
         engine=file.engine,
-        path=file.path.to_path(),
-        recorded=trajectory,
+        path=CentrePath(times, np.column_stack(centre), heading),
+        recorded=_load_trajectory(folder / TRAJECTORY, robot.structure),
     )
-
-
-class _ResultFile(Section):
-    """The keys of result.json that load_result() reads."""
-
-    name: str
-    metrics: dict[str, Any]
-    fitness: float | None
-    duration_s: float = Field(gt=0)
-    wall_time_s: float = Field(gt=0)
-    engine: str
-    integrator: IntegratorWork
-    gait: Any
-    """See GaitFile; None if a command was played."""
-    path: PathColumns
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
@@ -134,9 +196,10 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
     for name, (_, expected) in labels(structure).items():
         if name not in trajectory.coords or trajectory[name].values.tolist() != expected:
             raise InputError(path, name, f"differs from the robot in {SCENARIO}")
-    for name, dimensions in {"time": ("time",), **DIMENSIONS}.items():
-        if name not in trajectory or trajectory[name].dims != dimensions:
-            raise InputError(path, name, f"is missing, or not over {', '.join(dimensions)}")
+    dimensions = {name: along for name, (along, _, _) in VARIABLES.items()}
+    for name, along in {"time": ("time",), **dimensions}.items():
+        if name not in trajectory or trajectory[name].dims != along:
+            raise InputError(path, name, f"is missing, or not over {', '.join(along)}")
         values = trajectory[name].values
         if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
             raise InputError(path, name, "has values that are not finite numbers")
@@ -144,3 +207,44 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
     if len(times) < 2 or not (np.diff(times) > 0.0).all():
         raise InputError(path, "time", "has fewer than two samples, or does not ascend")
     return with_indexes(trajectory)
+
+
+def load_or_simulate(
+    source: Path, *, scenario: str | None = None, warn: Say = silent
+) -> SimulationResult:
+    """The result of a result folder; or simulates a gait file, or the fittest gait of a run.
+
+    `scenario` is for gait files only: folders have their own. For `warn`, see load_source().
+
+    Raises InputError if the source cannot be used, or if a folder is given a scenario. Raises
+    SimulationFailure if the simulation fails.
+    """
+    if os.path.isdir(source) and scenario is not None:
+        raise InputError("replay", "scenario", f"is for gait files; {source} has its own scenario")
+    is_run = os.path.exists(source / MANIFEST)
+    if os.path.exists(source / RESULT) and not is_run:
+        return load_result(source)
+    if not os.path.isfile(source) and not is_run:
+        raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
+    loaded = load_source(source, scenario=scenario, warn=warn)
+    return simulate(loaded.scenario, loaded.best, record=True)
+
+
+def write_replay(
+    source: Path, out: Path, *, scenario: str | None = None, warn: Say = silent
+) -> str:
+    """Writes the replay page of a result folder, a gait file or a run. Returns the page's title.
+
+    Args:
+        source: the result folder, gait file or folder of a run.
+        out: the page to write.
+        scenario: the scenario for a gait file.
+        warn: see load_source().
+
+    Raises:
+        InputError: if the page cannot be written; nothing is simulated then.
+    """
+    check_file(out)
+    result = load_or_simulate(source, scenario=scenario, warn=warn)
+    result.save_replay(out)
+    return result.title

@@ -1,38 +1,51 @@
-"""Report of a run: an HTML page with numbers and figures, and the files it links to."""
+"""Report of a run: an HTML page with numbers and figures, and the files it links to.
+
+A figure has the name of the function that draws it. The function's docstring is the caption.
+"""
 
 from __future__ import annotations
 
+import base64
+import inspect
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.run import gait_label, load_run
-from tetra_drake.figures.style import AS_USUAL, Print
+from tetra_drake.evolution.run import Run, gait_label, load_run
+from tetra_drake.figures.fitness import (
+    fitness_of_trials,
+    initial_distances,
+    initial_extremes,
+    initial_fitness,
+)
+from tetra_drake.figures.forces import ground_forces, signals_and_tensions
+from tetra_drake.figures.gait_diagram import gait_diagram
+from tetra_drake.figures.motion import (
+    before_and_after,
+    one_step,
+    path_of_the_centre,
+    relative_distances,
+    time_lapse,
+)
+from tetra_drake.figures.style import AS_USUAL, Print, save_figure
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import listed, render, rounded
 from tetra_drake.machine import versions
 from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
-from tetra_drake.report.run_figures import (
-    Picture,
-    ShownGaits,
-    draw,
-    pictures_of_gait,
-    pictures_of_run,
-    simulate_again,
-    simulate_shown_gaits,
-)
-from tetra_drake.results.result import headline
+from tetra_drake.results.result import SimulationResult, headline
 from tetra_drake.robot.gait import save_gait
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
-from tetra_drake.study.elites import distinct_gaits, elites, notable_gaits
+from tetra_drake.study.elites import distinct_gaits, elites, map_of_gaits, notable_gaits
 
 REPORT, FIGURES = "report.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites/elites.csv"
@@ -40,6 +53,74 @@ ELITES, ELITES_CSV = "elites", "elites/elites.csv"
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
 # Settings that are not shown among those that differ from the thesis's; some are elsewhere.
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
+
+
+@dataclass(frozen=True)
+class RecordedGait:
+    """A gait of a run: its record, and a new simulation.
+
+    The numbers may differ if other versions recorded the gait. They differ for a run with
+    disturbances, because the new simulation has none.
+    """
+
+    recorded: pandas.Series
+    """Row of the run's evaluations."""
+    result: SimulationResult
+    """Result of the new simulation, with trajectory."""
+
+    @property
+    def change(self) -> float:
+        """Difference (m) between the distances in the new simulation and in the record."""
+        return abs(self.result.metrics.distance - self.recorded["distance"])
+
+
+@dataclass(frozen=True)
+class ShownGaits:
+    """A run and the two gaits that its report shows."""
+
+    run: Run
+    best: RecordedGait
+    """Fittest gait of the run."""
+    initial: RecordedGait
+    """Fittest initial gait of the same trial; see Run.initial_best()."""
+
+
+class Picture(NamedTuple):
+    """A figure of a report: the function that draws it, and the function's arguments."""
+
+    draw: Callable[..., Any]
+    data: Sequence[Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the figure and of its files."""
+        return self.draw.__name__
+
+    @property
+    def caption(self) -> str:
+        """Caption of the figure, in one line."""
+        return " ".join((inspect.getdoc(self.draw) or "").split())
+
+    def image(self, folder: Path) -> str:
+        """URL with the figure's content. Embedded directly, ids of two SVGs would clash."""
+        content = base64.b64encode((folder / f"{self.name}.svg").read_bytes()).decode()
+        return f"data:image/svg+xml;base64,{content}"
+
+
+Pictures = Mapping[str, Sequence[Picture]]
+"""The figures in each part of a report: gait, evolution, forces."""
+
+
+class GaitColumn(NamedTuple):
+    """A gait in a table of the report."""
+
+    names: Sequence[str]
+    recorded: pandas.Series
+    """Row of the run's evaluations."""
+    file: str | None
+    """Gait file, relative to the folder of the run; None for a gait without a file."""
+    page: str | None = None
+    """Replay page; None if the table has no link to it."""
 
 
 def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USUAL) -> list[Path]:
@@ -63,9 +144,9 @@ def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USU
     if is_run and out is None:
         return write_report(source, printed)
     if is_run:
-        draw(pictures_of_run(simulate_shown_gaits(load_run(source))), folder, printed)
+        draw_pictures(pictures_of_run(simulate_shown_gaits(load_run(source))), folder, printed)
     else:
-        draw(pictures_of_gait(load_result(source)), folder, printed)
+        draw_pictures(pictures_of_gait(load_result(source)), folder, printed)
     return [folder]
 
 
@@ -79,67 +160,113 @@ def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     shown = simulate_shown_gaits(load_run(directory))
     pictures = pictures_of_run(shown)
-    draw(pictures, figures, printed)
+    draw_pictures(pictures, figures, printed)
     run, notable = shown.run, _notable(shown)
     if notable:
         write_whole(directory / ELITES_CSV, elites(run).to_csv(index=False))
     for _, row, file, page in notable:
         save_gait(run.gait(row["trial"], row["index"]), directory / str(file), run.scenario)
         if page != REPLAY:
-            simulate_again(run, row).result.save_replay(directory / str(page))
+            _simulate_again(run, row).result.save_replay(directory / str(page))
     shown.best.result.save_replay(replay)
     write_whole(report, render_report(shown, pictures, folder=figures))
     return [figures, replay, report]
 
 
-class _Shown(NamedTuple):
-    """A gait in a table of the report."""
+def simulate_shown_gaits(run: Run) -> ShownGaits:
+    """Simulates the fittest gait of a run and the fittest initial gait of the same trial.
 
-    names: Sequence[str]
-    recorded: pandas.Series
-    """Row of the run's evaluations."""
-    file: str | None
-    """Gait file, relative to the folder of the run; None for a gait without a file."""
-    page: str | None = None
-    """Replay page; None if the table has no link to it."""
+    Raises InputError if no gait of the run has a fitness. Raises SimulationFailure if a simulation
+    fails; this can happen with versions other than the run's.
+    """
+    fittest = run.fittest()
+    first = run.initial_best(fittest["trial"])
+    best = _simulate_again(run, fittest)
+    initial = best if first["index"] == fittest["index"] else _simulate_again(run, first)
+    return ShownGaits(run, best=best, initial=initial)
 
 
-def _notable(shown: ShownGaits) -> list[_Shown]:
+def _simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
+    gait = run.gait(recorded["trial"], recorded["index"])
+    return RecordedGait(recorded, simulate(run.scenario, gait, record=True))
+
+
+def pictures_of_gait(result: SimulationResult) -> Pictures:
+    """The figures of one simulation."""
+    structure = result.robot.structure
+    forces = [path_of_the_centre, relative_distances, one_step]
+    if structure.signals:
+        forces.append(signals_and_tensions)
+    if len(structure.contacts):
+        forces.append(ground_forces)
+    parts = {"gait": [gait_diagram, time_lapse], "forces": forces}
+    return {part: [Picture(draw, [result]) for draw in draws] for part, draws in parts.items()}
+
+
+def pictures_of_run(shown: ShownGaits) -> Pictures:
+    """The figures of a run and of its best gait."""
+    run, trial = shown.run, shown.best.recorded["trial"]
+    best, initial, trials = shown.best.result, shown.initial.result, initial_extremes(run).index
+    evolution = [Picture(fitness_of_trials, [run])]
+    if len(trials):
+        evolution.append(Picture(initial_distances, [run]))
+    if trial in trials:
+        evolution.append(Picture(initial_fitness, [run, trial]))
+    if len(elites(run)):
+        evolution.append(Picture(map_of_gaits, [run]))
+    evolution.append(Picture(before_and_after, [initial, best]))
+    return {"evolution": evolution, **pictures_of_gait(best)}
+
+
+def draw_pictures(pictures: Pictures, folder: Path, printed: Print = AS_USUAL) -> None:
+    """Draws figures and writes them to a folder. Raises InputError if a file cannot be written."""
+    for part in pictures.values():
+        for picture in part:
+            figure = picture.draw(*picture.data, **vars(printed.look))
+            save_figure(figure, folder, picture.name, kinds=printed.kinds)
+
+
+def _notable(shown: ShownGaits) -> list[GaitColumn]:
     """The notable gaits of the map. The run's best gait has its replay page already."""
     found, best = [], gait_label(shown.best.recorded)
     for names, row in distinct_gaits(notable_gaits(shown.run)):
         name = names[0].replace(", ", "_").replace(" ", "_")
         page = REPLAY if gait_label(row) == best else f"{ELITES}/{name}.html"
-        found.append(_Shown(names, row, f"{ELITES}/{name}.json", page))
+        found.append(GaitColumn(names, row, f"{ELITES}/{name}.json", page))
     return found
 
 
-def render_report(shown: ShownGaits, pictures: Sequence[Picture], *, folder: Path) -> str:
+def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str:
     """The report as HTML, with figures that are files in `folder`."""
     run, best, scenario = shown.run, shown.best, shown.run.scenario
     trial = best.recorded["trial"]
     gait = run.gait(trial, best.recorded["index"])
     gains = [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
     turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
-    named = distinct_gaits({"initially": shown.initial.recorded, "best": best.recorded})
+    times = [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
     best_gait = str(trial_folder(Path(), trial) / BEST_GAIT)
+    gaits = [
+        GaitColumn(names, row, best_gait if "best" in names else None)
+        for names, row in distinct_gaits(
+            {"initially": shown.initial.recorded, "best": best.recorded}
+        )
+    ]
+    differences = [
+        (key, value)
+        for key, value in scenario.differences(load_scenario("thesis"))
+        if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
+    ]
     return render(
         "report/report.html.jinja",
         shown=shown,
         title=f"{scenario.name}: {headline(scenario, best.recorded)}",
         pictures=pictures,
         folder=folder,
-        gaits=[_Shown(names, row, best_gait if "best" in names else None) for names, row in named],
+        gaits=gaits,
         map=_notable(shown),
-        parameters=listed(
-            [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s", *turn, *gains]
-        ),
+        parameters=listed([*times, *turn, *gains]),
         weights=dict(zip(gait.weight_names, gait.weights, strict=True)),
-        differences=[
-            (key, value)
-            for key, value in scenario.differences(load_scenario("thesis"))
-            if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
-        ],
+        differences=differences,
         files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES, "elites": ELITES_CSV},
         summary=summary,
         metrics=metrics,

@@ -9,17 +9,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pydantic
 
 from tetra_drake import __version__
 from tetra_drake.errors import InputError
-from tetra_drake.files import json_number, write_whole
 from tetra_drake.formatting import fixed, heading_html
 from tetra_drake.laws.tally import Tally
-from tetra_drake.machine import versions
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
@@ -37,14 +34,10 @@ from tetra_drake.scenario.metrics import (
     headline_metric,
 )
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
-from tetra_drake.settings.units import INCH
 
 if TYPE_CHECKING:
     import xarray
-
-SCHEMA = 1
 
 
 class IntegratorWork(Section):
@@ -57,38 +50,6 @@ class IntegratorWork(Section):
     derivative_evaluations: int
     jacobian_evaluations: int = 0
     """Number of the derivative evaluations that were made for Jacobians."""
-
-
-class PathColumns(Section):
-    """The path of the centre in result.json."""
-
-    time_s: list[float]
-    x_m: list[float]
-    y_m: list[float]
-    z_m: list[float]
-    heading_rad: list[float | None]
-    """Headings; None where the heading is undefined."""
-
-    @classmethod
-    def of(cls, path: CentrePath) -> PathColumns:
-        """The columns of a path."""
-        heading = [json_number(angle) for angle in path.heading.tolist()]
-        x, y, z = path.centre.T.tolist()
-        return cls(time_s=path.times.tolist(), x_m=x, y_m=y, z_m=z, heading_rad=heading)
-
-    def to_path(self) -> CentrePath:
-        """The path as arrays."""
-        times, x, y, z, heading = (np.array(column, dtype=float) for _, column in self)
-        return CentrePath(times, np.column_stack([x, y, z]), heading)
-
-    @pydantic.model_validator(mode="after")
-    def _check_lengths(self) -> Self:
-        count = len(self.time_s)
-        for name, column in self:
-            if len(column) != count or count < 2:
-                expected = f"{max(count, 2)}, as many as time_s"
-                refuse(name, f"found {len(column)} numbers, expected {expected}")
-        return self
 
 
 @dataclass(frozen=True)
@@ -288,29 +249,3 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
     if name == "heading_change":
         return f"turns {fixed(abs(math.degrees(metrics[name])), 0)} degrees {seconds}"
     return f"{name.replace('_', ' ')} {units.shown(metrics[name], UNITS[name])}, {walk}"
-
-
-def save_result(path: str | Path, result: SimulationResult) -> None:
-    """Writes result.json: metrics in SI, lengths also in inches, times in s, and the path of the
-    centre as columns. `gait` is null for a command."""
-    scenario, gait = result.scenario, result.gait
-    metrics, radius = vars(result.metrics), result.metrics.path_radius
-    lengths = [name for name, unit in UNITS.items() if unit == "m"]
-    content = {
-        "schema": SCHEMA,
-        "name": result.name,
-        "scenario": scenario.name,
-        "metrics": result.metrics.to_json(),
-        **{f"{name}_in": json_number(metrics[name] / INCH) for name in lengths},
-        "path_radius_in": json_number(radius / INCH),
-        "fitness": result.fitness,
-        "duration_s": result.duration,
-        "wall_time_s": result.wall_time,
-        "real_time_factor": result.duration / result.wall_time,
-        "engine": result.engine,
-        "integrator": result.integrator.model_dump(),
-        "versions": versions(scenario.engine.packages),
-        "gait": gait and gait.to_json(scenario),
-        "path": PathColumns.of(result.path).model_dump(),
-    }
-    write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")

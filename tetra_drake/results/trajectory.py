@@ -23,21 +23,21 @@ if TYPE_CHECKING:
     import xarray
 
 
-DIMENSIONS = {
-    "p_WN": ("time", "node", "axis"),
-    "v_WN": ("time", "node", "axis"),
-    "p_WB": ("time", "body", "axis"),
-    "q_WB": ("time", "body", "quaternion"),
-    "tension": ("time", "cable"),
-    "length": ("time", "cable"),
-    "free_length": ("time", "cable"),
-    "signal": ("time", "oscillator"),
-    "normal_force": ("time", "contact"),
-    "friction_force": ("time", "contact", "horizontal"),
-    "in_contact": ("time", "contact"),
-    "friction_mode": ("time", "contact", "horizontal"),
+VARIABLES = {
+    "p_WN": (("time", "node", "axis"), "m", "node position"),
+    "v_WN": (("time", "node", "axis"), "m/s", "node velocity"),
+    "p_WB": (("time", "body", "axis"), "m", "position of the body's origin"),
+    "q_WB": (("time", "body", "quaternion"), "1", "orientation of the body"),
+    "tension": (("time", "cable"), "N", "cable tension"),
+    "length": (("time", "cable"), "m", "cable length"),
+    "free_length": (("time", "cable"), "m", "free length of the cable"),
+    "signal": (("time", "oscillator"), "N", "actuation signal"),
+    "normal_force": (("time", "contact"), "N", "force along the normal of the ground"),
+    "friction_force": (("time", "contact", "horizontal"), "N", "friction force"),
+    "in_contact": (("time", "contact"), "1", "1 on the ground"),
+    "friction_mode": (("time", "contact", "horizontal"), "1", "mode of friction"),
 }
-"""Dimensions of each variable of a trajectory."""
+"""Dimensions, unit and meaning of each variable of a trajectory."""
 
 _FLAGS = {
     "in_contact": {0: "off_ground", 1: "on_ground"},
@@ -107,22 +107,22 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     if has_drive(actuator):  # winches change the free lengths
         free_lengths[:, driven] = wound(actuator, motion.drives, free_lengths[:, driven])
     modes = np.sign(motion.modes[:, :, :STICK_POINT])
-    variables = {
-        "p_WN": (nodes[..., P_WN : P_WN + 3], "m", "node position"),
-        "v_WN": (nodes[..., V_WN : V_WN + 3], "m/s", "node velocity"),
-        "p_WB": (poses[..., 4:], "m", "position of the body's origin"),
-        "q_WB": (poses[..., :4], "1", "orientation of the body"),
-        "tension": (cable_forces[..., cable.TENSION], "N", "cable tension"),
-        "length": (cable_forces[..., cable.LENGTH], "m", "cable length"),
-        "free_length": (free_lengths, "m", "free length of the cable"),
-        "signal": (motion.signals, "N", "actuation signal"),
-        "normal_force": (ground_forces[..., 2], "N", "force along the normal of the ground"),
-        "friction_force": (ground_forces[..., :2], "N", "friction force"),
-        "in_contact": (modes[..., 0], "1", "1 on the ground"),
-        "friction_mode": (modes[..., 1:], "1", robot.scenario.friction.modes),
+    values = {
+        "p_WN": nodes[..., P_WN : P_WN + 3],
+        "v_WN": nodes[..., V_WN : V_WN + 3],
+        "p_WB": poses[..., 4:],
+        "q_WB": poses[..., :4],
+        "tension": cable_forces[..., cable.TENSION],
+        "length": cable_forces[..., cable.LENGTH],
+        "free_length": free_lengths,
+        "signal": motion.signals,
+        "normal_force": ground_forces[..., 2],
+        "friction_force": ground_forces[..., :2],
+        "in_contact": modes[..., 0],
+        "friction_mode": modes[..., 1:],
     }
     data: dict[str, Any] = {}
-    for name, (values, unit, meaning) in variables.items():
+    for name, (dimensions, unit, meaning) in VARIABLES.items():
         kind: Any = np.float32 if name == "v_WN" else np.float64
         attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
         if flags := _FLAGS.get(name):
@@ -130,7 +130,8 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
             attributes["flag_values"] = np.array(list(flags), dtype=kind)
             attributes["flag_meanings"] = " ".join(flags.values())
         # The values are a copy, because a view would keep a whole table in memory.
-        data[name] = DIMENSIONS[name], np.array(values, dtype=kind), attributes
+        data[name] = dimensions, np.array(values[name], dtype=kind), attributes
+    data["friction_mode"][2]["long_name"] = robot.scenario.friction.modes
     clock = {"units": "s", "long_name": "time since the start"}
     data["time"] = "time", motion.times, clock, {"_FillValue": None}
     named = tuple((name, along, *values) for name, (along, values) in labels(structure).items())

@@ -223,26 +223,28 @@ class Rest(Section):
 
     def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
         """Predictions of the numbers: positions, tensions, frequencies."""
-        return [self._prediction(scenario) for scenario in scenarios]
-
-    def _prediction(self, scenario: Scenario) -> Prediction:
         modes = len(self.frequencies)
-        try:
-            robot = Robot.of(scenario.with_changes(self.changes))
-            rest = robot.equilibrium
-        except InputError:  # there may be no equilibrium with such values
-            return Prediction(np.full(len(self.positions) + len(self.tensions) + modes, np.nan))
-        structure, unactuated = robot.structure, Unactuated(robot.model)
-        places = [_coordinates(structure.node_names).index(label) for label in self.positions]
-        cables = [structure.cable_names.index(label) for label in self.tensions]
-        p_WN = node_positions(structure, rest.state).ravel()[places]
-        force_at_rest(unactuated, rest.state)
-        forces = unactuated.forces.cable_forces[cables, TENSION]
-        frequencies = np.full(modes, np.nan)
-        if modes:
-            found = study_equilibrium(robot).frequencies[:modes]
-            frequencies[: len(found)] = found
-        return Prediction(np.concatenate([p_WN, forces, frequencies]))
+        nothing = np.full(len(self.positions) + len(self.tensions) + modes, np.nan)
+        predictions = []
+        for scenario in scenarios:
+            try:
+                robot = Robot.of(scenario.with_changes(self.changes))
+                rest = robot.equilibrium
+            except InputError:  # there may be no equilibrium with such values
+                predictions.append(Prediction(nothing))
+                continue
+            structure, unactuated = robot.structure, Unactuated(robot.model)
+            places = [_coordinates(structure.node_names).index(label) for label in self.positions]
+            cables = [structure.cable_names.index(label) for label in self.tensions]
+            p_WN = node_positions(structure, rest.state).ravel()[places]
+            force_at_rest(unactuated, rest.state)
+            forces = unactuated.forces.cable_forces[cables, TENSION]
+            frequencies = np.full(modes, np.nan)
+            if modes:
+                found = study_equilibrium(robot).frequencies[:modes]
+                frequencies[: len(found)] = found
+            predictions.append(Prediction(np.concatenate([p_WN, forces, frequencies])))
+        return predictions
 
 
 _Pair = Annotated[list[str | float], Field(min_length=2, max_length=2)]
