@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,9 +72,18 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
     stands = ~measures.off_ground(trajectory)
     are_feet = np.isin(structure.contacts, structure.markers)
     stands = stands[:, stands.any("time").values | are_feet]
-    feet, width = _rows_of_feet(stands), _NAMES * page_width()
-    names_of_feet = {folded(name, width): row for name, row in _named_rows(stands, feet).items()}
-    height = max(feet.values(), default=0.0) * _rows_of_names(names_of_feet)
+    # The first body (the rear) is at the bottom; a left foot is above the right foot.
+    of_body, _ = pandas.factorize(stands.contact_body.values)
+    order = sorted(range(len(of_body)), key=lambda foot: (of_body[foot], -foot))
+    stands = stands[:, order]
+    heights = 0.5 + np.arange(len(order)) + _BETWEEN_BODIES * of_body[order]
+    names_of_feet = [foot_name(foot) for foot in stands.contact.values]
+    named = pandas.Series(heights, names_of_feet)
+    if len(order) > _NAMED:  # of many feet, the bodies are named
+        named = named.groupby(stands.contact_body.values, sort=False).mean()
+    width = _NAMES * page_width()
+    named.index = [folded(name, width) for name in named.index]
+    height = max(heights, default=0.0) * _rows_of_names(named.index)
     rows = [np.clip(height, *_ROWS), _SPEED_ROWS]
     if structure.signals:
         names = [folded(name, width) for name in own_words(structure.oscillators)]
@@ -83,7 +92,7 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
     panels = page.subplots(len(rows), sharex=True, height_ratios=rows)
     if structure.signals:
         _draw_signals(panels[0], trajectory, names, result.scenario.units)
-    _draw_stance(panels[-2], stands, feet, names_of_feet)
+    _draw_stance(panels[-2], stands, heights, named)
     _draw_speed(panels[-1], trajectory, result)
     if cycle is not None:
         start, stop = trajectory.time.values[[0, -1]]
@@ -94,24 +103,6 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
                 panel.axvline(mark, **_CYCLE)
     set_title(page, title)
     return page
-
-
-def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:
-    """Height of each foot in the diagram, in rows. The first body (the rear) is at the bottom; a
-    left foot is above the right foot."""
-    bodies, _ = pandas.factorize(stands.contact_body.values)
-    order = sorted(range(len(bodies)), key=lambda foot: (bodies[foot], -foot))
-    heights = 0.5 + np.arange(len(order)) + _BETWEEN_BODIES * bodies[order]
-    return dict(zip(stands.contact.values[order].tolist(), heights.tolist(), strict=True))
-
-
-def _named_rows(stands: xarray.DataArray, rows: Mapping[str, float]) -> dict[str, float]:
-    """Names beside the rows of feet, with their heights: of the feet; of their bodies, if there are
-    many feet."""
-    if len(rows) <= _NAMED:
-        return {foot_name(foot): row for foot, row in rows.items()}
-    bodies = stands.contact_body.sel(contact=list(rows)).values
-    return pandas.Series(list(rows.values())).groupby(bodies, sort=False).mean().to_dict()
 
 
 def _rows_of_names(names: Iterable[str]) -> float:
@@ -148,28 +139,27 @@ def _draw_signals(
 
 
 def _draw_stance(
-    panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float], names: Mapping[str, float]
+    panel: Axes, stands: xarray.DataArray, heights: np.ndarray, named: pandas.Series
 ) -> None:
-    """Draws stance bars beside `names`; see _named_rows(). If feet are named, they have their duty
-    factors, too."""
-    each = len(rows) <= _NAMED
-    times = stands.time.values
-    for foot, row in rows.items():
+    """Draws stance bars of the feet at their heights, and names at the heights of `named`. If feet
+    are named, they have their duty factors, too."""
+    name, times = "stance", stands.time.values
+    for foot, height in zip(stands.contact.values, heights, strict=True):
         stance = stands.sel(contact=foot)
         spans = [(start, end - start) for start, end in measures.intervals(times, stance.values)]
         colour = _STANCE.get(foot.rpartition("_")[2], _OTHER_FOOT)
-        panel.broken_barh(spans, (row - _BAR / 2, _BAR), facecolors=colour)
-        if each:
-            write_beside(panel, row, f"{fixed(100.0 * measures.share_of_time(stance), 0)} %")
-    _write_names(panel, list(names), names.values())
-    name = "stance"
-    if each:
+        panel.broken_barh(spans, (height - _BAR / 2, _BAR), facecolors=colour)
+        if len(heights) <= _NAMED:
+            duty = fixed(100.0 * measures.share_of_time(stance), 0)
+            write_beside(panel, height, f"{duty} %")
+    _write_names(panel, list(named.index), named)
+    if len(heights) <= _NAMED:
         panel.set_title("duty factor", loc="right", fontsize=rcParams["ytick.labelsize"])
-    elif any(foot.endswith("_left") for foot in rows):
+    elif any(foot.endswith("_left") for foot in stands.contact.values):
         name = "stance, left foot above right one"
     name_panel(panel, name)
     panel.tick_params(axis="y", length=0)
-    panel.set_ylim(-_EDGE, max(rows.values(), default=0.5) + 0.5 + _EDGE)
+    panel.set_ylim(-_EDGE, max(heights, default=0.5) + 0.5 + _EDGE)
     panel.grid(visible=False, axis="y")
 
 

@@ -205,7 +205,7 @@ def page_of(*, height_in: float) -> Page:
     figure = GIVEN.get()
     if figure is None:
         height = height_in * rcParams["font.size"] / Look.font_size
-        return ShownFigure(figsize=(rcParams["figure.figsize"][0], height), layout="constrained")
+        return ShownFigure(figsize=(page_width(), height), layout="constrained")
     if figure.get_layout_engine() is None:
         figure.figure.set_layout_engine("constrained")
     return figure

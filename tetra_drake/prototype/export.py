@@ -6,15 +6,19 @@ import math
 import tempfile
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import pandas
+import xarray
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, given_path, write_whole
 from tetra_drake.formatting import fixed
+from tetra_drake.laws import actuator
+from tetra_drake.laws.cable import CableLaw
 from tetra_drake.prototype.command_file import command_text, load_command, table_text
-from tetra_drake.prototype.loads import Loads, actuator_loads
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait
@@ -26,6 +30,23 @@ README = "README.md"
 
 LEAST_RATE = 1000.0
 """Least sampling rate (Hz) for finding peaks. The rate of the files may be lower."""
+
+_TOLERANCE = 1e-9
+"""Distance (m or N) from a limit that still counts as at the limit. Without it, the tension of a
+motor would never be at its limit."""
+
+
+class Loads(NamedTuple):
+    """Loads on the actuators of the driven cables in a simulation."""
+
+    commands: np.ndarray
+    """Setpoints (times, driven cables); samples of a Command."""
+    limited: np.ndarray
+    """1 where a limit binds, otherwise 0 (times, driven cables); NaN without limits."""
+    table: pandas.DataFrame
+    """A row per driven cable, with units in the names of the columns: peaks, and means over the
+    steady stretch. Limits that do not exist are NaN. Forces and lengths are as in
+    laws.actuator.Exertion."""
 
 
 def export(
@@ -89,6 +110,51 @@ def export(
         write_whole(folder / README, template.read_text("utf-8").format(**about))
         folder.rename(out)
     return verdict
+
+
+def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
+    """Loads on the actuators in a trajectory of a robot."""
+    kind, constants = robot.scenario.actuation, robot.model.actuator
+    cables, limits = robot.structure.cables[robot.driven], actuator.Limits(*constants.limits)
+    walk = trajectory.isel(cable=robot.driven)
+    law, length, tension = CableLaw.of(cables), walk.length.values, walk.tension.values
+    signal = trajectory.signal.values[:, cables["signal"]]
+    a, b = cables["node_a"], cables["node_b"]
+    p_WN, v_WN = trajectory.p_WN.values, trajectory.v_WN.values
+    rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
+    driven = actuator.DrivenCables(law, signal, length, rate, tension, walk.free_length.values)
+
+    load, left, drives = tension, length, kind.drives(driven)
+    limited = np.full_like(length, math.nan)
+    if actuator.has_drive(constants):
+        pull = np.vectorize(
+            lambda drive, length, rate, signal, *law: actuator.actuator_force(
+                constants, drive, length, rate, signal, CableLaw(*law)
+            )
+        )
+        _, _, drive_rate, limited, beside = pull(drives + _TOLERANCE, length, rate, signal, *law)
+        load, left = tension - beside, actuator.wound(constants, drives, length)
+        rate = actuator.wound(constants, drive_rate, rate)
+
+    settling_time, start_up = robot.scenario.simulation.settling_time, robot.scenario.cpg.start_up
+    power, steady = -load * rate, trajectory.time.values >= max(settling_time, start_up)
+    # Means of tables are NaN without samples: a simulation may end before its steady stretch.
+    work, time = (pandas.DataFrame(x[steady]) for x in (np.maximum(power, 0.0), limited))
+    columns = {
+        "peak_force_N": load.max(axis=0),
+        "limit_of_force_N": limits.max_force,
+        "peak_speed_mm_per_s": 1e3 * np.abs(rate).max(axis=0),
+        "limit_of_speed_mm_per_s": 1e3 * limits.max_speed,
+        "travel_mm": 1e3 * np.ptp(left, axis=0),
+        "least_length_mm": 1e3 * left.min(axis=0),
+        "limit_of_length_mm": 1e3 * limits.least_length,
+        "peak_power_W": power.max(axis=0),
+        "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # at half limits
+        "mean_power_W": work.mean().to_numpy(),
+        "time_at_a_limit_percent": 100.0 * time.mean().to_numpy(),
+    }
+    table = pandas.DataFrame(columns, index=walk.cable.to_index())
+    return Loads(kind.commands(driven), limited, table)
 
 
 def load_verdict(loads: Loads, result: SimulationResult) -> str:

@@ -91,21 +91,6 @@ class Picture(NamedTuple):
     draw: Callable[..., Any]
     data: Sequence[Any]
 
-    @property
-    def name(self) -> str:
-        """Name of the figure and of its files."""
-        return self.draw.__name__
-
-    @property
-    def caption(self) -> str:
-        """Caption of the figure, in one line."""
-        return " ".join((inspect.getdoc(self.draw) or "").split())
-
-    def image(self, folder: Path) -> str:
-        """URL with the figure's content. Embedded directly, ids of two SVGs would clash."""
-        content = base64.b64encode((folder / f"{self.name}.svg").read_bytes()).decode()
-        return f"data:image/svg+xml;base64,{content}"
-
 
 Pictures = Mapping[str, Sequence[Picture]]
 """The figures in each part of a report: gait, evolution, forces."""
@@ -223,7 +208,7 @@ def draw_pictures(pictures: Pictures, folder: Path, printed: Print = AS_USUAL) -
     for part in pictures.values():
         for picture in part:
             figure = picture.draw(*picture.data, **vars(printed.look))
-            save_figure(figure, folder, picture.name, kinds=printed.kinds)
+            save_figure(figure, folder, picture.draw.__name__, kinds=printed.kinds)
 
 
 def _notable(shown: ShownGaits) -> list[GaitColumn]:
@@ -234,6 +219,15 @@ def _notable(shown: ShownGaits) -> list[GaitColumn]:
         page = REPLAY if gait_label(row) == best else f"{ELITES}/{name}.html"
         found.append(GaitColumn(names, row, f"{ELITES}/{name}.json", page))
     return found
+
+
+def _embedded(picture: Picture, folder: Path) -> dict[str, str]:
+    """Name, caption and content of a figure with a file in `folder`."""
+    name, caption = picture.draw.__name__, inspect.getdoc(picture.draw) or ""
+    content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
+    # As an image: the ids of two SVGs in one page would clash.
+    image = f"data:image/svg+xml;base64,{content}"
+    return {"name": name, "caption": " ".join(caption.split()), "image": image}
 
 
 def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str:
@@ -260,8 +254,10 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         "report/report.html.jinja",
         shown=shown,
         title=f"{scenario.name}: {headline(scenario, best.recorded)}",
-        pictures=pictures,
-        folder=folder,
+        pictures={
+            part: [_embedded(picture, folder) for picture in drawn]
+            for part, drawn in pictures.items()
+        },
         gaits=gaits,
         map=_notable(shown),
         parameters=listed([*times, *turn, *gains]),

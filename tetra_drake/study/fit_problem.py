@@ -121,6 +121,7 @@ class FitProblem:
         # An evaluation has the predicted numbers of each measurement, then the clock's offset.
         self._clocks = np.cumsum([len(table) + 1 for table in tables]) - 1
         self._known: dict[str, np.ndarray] = {}
+        self._kept = self.folder and self.folder / KEPT_EVALUATIONS
 
     @property
     def evaluations(self) -> int:
@@ -191,12 +192,17 @@ class FitProblem:
         return list(np.clip(x + moves, *self.bounds))
 
     def _evaluate(self, points: Sequence[np.ndarray]) -> None:
-        """Predicts all measurements at points that are not known."""
-        unknown = {}
-        for point in points:
-            name = self._name(point)
-            if name not in self._known and not self._restore(name):
-                unknown[name] = point
+        """Predicts all measurements at points that are not known, or takes the predictions from the
+        folder."""
+        unknown = {self._name(point): point for point in points}
+        unknown = {name: each for name, each in unknown.items() if name not in self._known}
+        files = {name: self._kept / f"{name}.bin" for name in unknown} if self._kept else {}
+        for name, file in files.items():
+            with contextlib.suppress(InputError):  # a missing or damaged evaluation is made again
+                content = read_bytes(file, "evaluation")
+                if content[:SEAL] == _seal(name, content[SEAL:]):
+                    self._known[name] = np.frombuffer(content[SEAL:])
+                    del unknown[name]
         if not unknown:
             return
         scenarios = [self.scenario_at(point) for point in unknown.values()]
@@ -204,27 +210,14 @@ class FitProblem:
         for name, predictions in zip(unknown, zip(*by_measurement, strict=True), strict=True):
             numbers = np.concatenate([[*each.values, each.clock_offset] for each in predictions])
             self._known[name] = numbers
-            if file := self._file(name):
-                write_whole(file, _seal(name, numbers.tobytes()) + numbers.tobytes())
+            if name in files:
+                write_whole(files[name], _seal(name, numbers.tobytes()) + numbers.tobytes())
 
     def _name(self, x: np.ndarray) -> str:
         """Name of an evaluation: a digest of the data, keys and values."""
         keys = [parameter.key for parameter in self.parameters]
         text = f"{self.digest} {keys} {(x * self.scale).tolist()}"
         return hashlib.sha256(text.encode()).hexdigest()[:24]
-
-    def _file(self, name: str) -> Path | None:
-        return self.folder and self.folder / KEPT_EVALUATIONS / f"{name}.bin"
-
-    def _restore(self, name: str) -> bool:
-        """Takes an evaluation from the folder. Returns False if it is not there, or damaged."""
-        file, content = self._file(name), b""
-        with contextlib.suppress(InputError):  # it is simulated again
-            content = read_bytes(file, "evaluation") if file else b""
-        is_whole = content[:SEAL] == _seal(name, content[SEAL:])
-        if is_whole:
-            self._known[name] = np.frombuffer(content[SEAL:])
-        return is_whole
 
 
 def _seal(name: str, content: bytes) -> bytes:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas
-from matplotlib.axes import Axes
 
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
@@ -355,8 +354,26 @@ def robustness_figure(judgement: Judgement) -> Drawn:
     places: Any = [["distances", "distances"], ["alone", "together"]]
     panels = page.subplot_mosaic(places, height_ratios=rows)
     above, alone, together = panels["distances"], panels["alone"], panels["together"]
-    _draw_distances(above, judgement, gaits)
+
+    draws = judgement.compared(judgement.draws).dropna(subset=["distance", "undisturbed"])
+    for row, (gait, kept) in enumerate(gaits["kept"].items()):
+        simulated = draws[draws["gait"] == gait]
+        shares = simulated["distance"] / simulated["undisturbed"]
+        # Multiples of the golden ratio spread any number of dots evenly.
+        heights = row + 0.6 * (simulated["draw"] * 0.618034 % 1.0 - 0.5)
+        above.plot(shares, heights, "o", **_DOTS)
+        above.boxplot(shares, positions=[row], **_BOX)
+        write_beside(above, row, f"{fixed(100.0 * kept, 0)} %")
+    above.axvline(1.0 - LOSS, **REFERENCE)
+    above.axvline(1.0, color="black", linewidth=0.8)
+    margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
+    above.set(xlabel="distance / undisturbed distance", xmargin=0.02)
+    above.set_ylim(-margin, len(gaits) - 1 + margin)
+    name_panel(above, "distance in each draw")
+    above.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
+    above.grid(visible=False, axis="y")
     above.set_yticks(range(len(names)), names)
+
     places, worst = range(len(what)), changes["worst"].clip(upper=0.0).abs() / unit.length
     alone.hlines(places, 0.0, worst, color="black", linewidth=1.0)
     alone.barh(places, changes["median"] / unit.length, height=0.6, color=OKABE_ITO["orange"])
@@ -375,23 +392,3 @@ def robustness_figure(judgement: Judgement) -> Drawn:
     together.tick_params(labelleft=False)
     set_title(page, f"Robustness under {count} draws of disturbances")
     return page
-
-
-def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -> None:
-    draws = judgement.compared(judgement.draws).dropna(subset=["distance", "undisturbed"])
-    for row, (gait, kept) in enumerate(gaits["kept"].items()):
-        simulated = draws[draws["gait"] == gait]
-        shares = simulated["distance"] / simulated["undisturbed"]
-        # Multiples of the golden ratio spread any number of dots evenly.
-        heights = row + 0.6 * (simulated["draw"] * 0.618034 % 1.0 - 0.5)
-        axes.plot(shares, heights, "o", **_DOTS)
-        axes.boxplot(shares, positions=[row], **_BOX)
-        write_beside(axes, row, f"{fixed(100.0 * kept, 0)} %")
-    axes.axvline(1.0 - LOSS, **REFERENCE)
-    axes.axvline(1.0, color="black", linewidth=0.8)
-    margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
-    axes.set(xlabel="distance / undisturbed distance", xmargin=0.02)
-    axes.set_ylim(-margin, len(gaits) - 1 + margin)
-    name_panel(axes, "distance in each draw")
-    axes.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
-    axes.grid(visible=False, axis="y")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
+import pandas
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from tetra_drake.errors import InputError
@@ -24,7 +25,6 @@ from tetra_drake.robot.measures import distance_walked, path_of_centre
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metrics import looks_for_turns
-from tetra_drake.settings.units import Units
 from tetra_drake.visualization.scene import (
     COLOURS,
     add_robot,
@@ -113,8 +113,7 @@ def replay_page(
     set_surroundings(meshcat, robot, p_WN, seen=p_WN[0])
     page, script = meshcat.StaticHtml(), ""
     if address:
-        parts = re.split(r"<script[^>]*>(.+?)</script>", page, maxsplit=1, flags=re.S)
-        before, script, after = parts
+        before, script, after = _SCRIPT.split(page, maxsplit=1)
         reader = render("visualization/viewer.html.jinja", address=address)
         # Before the body, so that nothing of the body is shown if the file is missing.
         page = (before + after).replace("</head>", f"{reader}</head>", 1)
@@ -158,21 +157,24 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     usual_force = float(np.percentile(sizes, _USUAL)) if sizes.size else 0.0
     units = robot.scenario.units
     arrow = LONG_ARROW * float(np.ptp(frames["p_WN"].values[0, :, 2])) / units.square
-    force_of_square = round_force(usual_force / max(arrow, 1.0), units)
+    # The next 1, 2 or 5 times a power of ten, in the unit of force.
+    shown = max(usual_force / max(arrow, 1.0) / units.force, 1e-6)
+    power = 10.0 ** math.floor(math.log10(shown))
+    nice = next(n for n in (1.0, 2.0, 5.0, 10.0) if n * power >= shown)
+    force_of_square = nice * power * units.force
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
-    ends = structure.cables[["node_a", "node_b"]].tolist()
-    paths = [path.split("/")[1:] for path in cable_paths(structure)]
-    cables = zip(paths, ends, strict=True)
+    cables = {
+        "path": [path.split("/")[1:] for path in cable_paths(structure)],
+        "nodes": structure.cables[["node_a", "node_b"]].tolist(),
+    }
     return {
         "times": frames["time"].values.round(5).tolist(),
         "resolution": RESOLUTION,
         "rests": bool((poses == poses[0]).all()),
         "bodies": bodies,
         "named": len(bodies) <= MOST_NAMES and not any(" " in name for name in bodies),
-        "nodes": [
-            dict(zip(nodes, node, strict=True)) for node in zip(*nodes.values(), strict=True)
-        ],
-        "cables": [{"path": path, "nodes": joined} for path, joined in cables],
+        "nodes": pandas.DataFrame(nodes).to_dict("records"),
+        "cables": pandas.DataFrame(cables).to_dict("records"),
         "contacts": contacts.tolist(),
         "colours": COLOURS,
         "anchored": bool(structure.held.any()),
@@ -205,13 +207,6 @@ def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
     axes = ground_axes(p_WN.reshape(-1, 3), robot.ground).reshape(*p_WN.shape, 3)
     turned: np.ndarray = np.einsum("fci,fcij->fcj", forces, axes)
     return turned
-
-
-def round_force(force: float, units: Units) -> float:
-    """Rounds a force (N) up to 1, 2 or 5 times a power of ten in its unit; the result is in N."""
-    shown = max(force / units.force, 1e-6)
-    power = 10.0 ** math.floor(math.log10(shown))
-    return next(n for n in (1.0, 2.0, 5.0, 10.0) if n * power >= shown) * power * units.force
 
 
 def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
