@@ -33,24 +33,16 @@ from tetra_drake.robot import measures
 from tetra_drake.robot.measures import Span
 from tetra_drake.settings.units import Units
 
-_CYCLES = 3
-_LAST_SHARE = 0.25  # share of the time that is shown if no signal oscillates
 _ROW = 0.165  # height of a row, in inches; a signal or a foot takes one
 _ROWS = (4, 20)  # least and greatest height of the panels of signals and of stance, in rows
-_SPEED_ROWS = 5  # height of the panel of speed, in rows
 _NAMED = 14  # largest number of feet, or of lines with names of signals, beside their rows
 _NAMES = 0.3  # largest width of the names, as a share of the page's width
 
-_BETWEEN_BODIES = 0.5  # gap between the feet of two bodies, in heights of a row
 _BAR = 0.78  # height of a stance bar, in heights of a row
 _EDGE = 0.2  # free height above and below all bars
-_SWING = 0.48  # largest height of a signal, in distances between signals
 
 _LINE: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.0, "linestyle": "-"}
-_SPEED: Any = {"color": "black", "linewidth": 1.1, "linestyle": "-"}
-_CYCLE: Any = {"color": "0.6", "linewidth": 0.7, "linestyle": (0, (1, 2))}
 _STANCE = {"left": OKABE_ITO["blue"], "right": OKABE_ITO["sky_blue"]}
-_OTHER_FOOT = "0.35"
 
 
 @figure_function
@@ -63,10 +55,10 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
     the second half of the simulation, the last quarter is shown."""
     structure, cycle = result.robot.structure, measures.last_step(result.trajectory)
     first, end = (float(result.trajectory.time[i]) for i in (0, -1))
-    length, title = _LAST_SHARE * (end - first), "Gait diagram"
+    length, title = 0.25 * (end - first), "Gait diagram"
     if cycle is not None:
         period, end = cycle[1] - cycle[0], cycle[1]
-        length, title = _CYCLES * period, f"Gait diagram, cycle of {fixed(period)} s"
+        length, title = 3 * period, f"Gait diagram, cycle of {fixed(period)} s"
     trajectory = shown_part(result.trajectory, time or (max(first, end - length), end))
     # Feet are the bottom nodes of tetrahedra, and all other nodes that touch the ground.
     stands = ~measures.off_ground(trajectory)
@@ -76,7 +68,7 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
     of_body, _ = pandas.factorize(stands.contact_body.values)
     order = sorted(range(len(of_body)), key=lambda foot: (of_body[foot], -foot))
     stands = stands[:, order]
-    heights = 0.5 + np.arange(len(order)) + _BETWEEN_BODIES * of_body[order]
+    heights = 0.5 + np.arange(len(order)) + 0.5 * of_body[order]  # in rows; gaps between bodies
     names_of_feet = [foot_name(foot) for foot in stands.contact.values]
     named = pandas.Series(heights, names_of_feet)
     if len(order) > _NAMED:  # of many feet, the bodies are named
@@ -84,7 +76,7 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
     width = _NAMES * page_width()
     named.index = [folded(name, width) for name in named.index]
     height = max(heights, default=0.0) * _rows_of_names(named.index)
-    rows = [np.clip(height, *_ROWS), _SPEED_ROWS]
+    rows = [np.clip(height, *_ROWS), 5]  # stance, speed
     if structure.signals:
         names = [folded(name, width) for name in own_words(structure.oscillators)]
         rows.insert(0, np.clip(structure.signals * _rows_of_names(names), *_ROWS))
@@ -100,7 +92,7 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
         for panel in panels:
             panel.grid(visible=False, axis="x")
             for mark in marks[marks >= start]:
-                panel.axvline(mark, **_CYCLE)
+                panel.axvline(mark, color="0.6", linewidth=0.7, linestyle=(0, (1, 2)))
     set_title(page, title)
     return page
 
@@ -128,7 +120,7 @@ def _draw_signals(
     """Draws signals one above the other. The last signal, of the front body, is on top."""
     signals, oscillators = trajectory.signal / unit.force, trajectory.oscillator.values
     largest = float(np.abs(signals.values).max())
-    scale = _SWING / largest if largest else 0.0
+    scale = 0.48 / largest if largest else 0.0  # signals do not touch each other
     for row, name in enumerate(oscillators):
         panel.axhline(row, color="0.8", linewidth=0.5)
         panel.plot(signals.time, row + scale * signals.sel(oscillator=name), **_LINE)
@@ -147,7 +139,7 @@ def _draw_stance(
     for foot, height in zip(stands.contact.values, heights, strict=True):
         stance = stands.sel(contact=foot)
         spans = [(start, end - start) for start, end in measures.intervals(times, stance.values)]
-        colour = _STANCE.get(foot.rpartition("_")[2], _OTHER_FOOT)
+        colour = _STANCE.get(foot.rpartition("_")[2], "0.35")
         panel.broken_barh(spans, (height - _BAR / 2, _BAR), facecolors=colour)
         if len(heights) <= _NAMED:
             duty = fixed(100.0 * measures.share_of_time(stance), 0)
@@ -175,7 +167,7 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, result: SimulationResul
     mean = float(np.trapezoid(speed, times) / np.ptp(times))
     panel.axhline(0.0, color="0.8", linewidth=0.5)
     panel.axhline(mean, **REFERENCE)
-    panel.plot(times, speed, **_SPEED)
+    panel.plot(times, speed, color="black", linewidth=1.1, linestyle="-")
     write_beside(panel, mean, f"mean\n{fixed(mean, unit.decimals + 1)}")
     panel.set(xlabel="time (s)", xlim=times[[0, -1]])
     name_panel(panel, f"{name} ({unit.length_name}/s)")

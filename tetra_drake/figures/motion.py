@@ -43,22 +43,17 @@ _MARGIN = 0.6 * INCH  # m; free space around a robot of usual size
 _PROFILE = 0.05 * INCH  # m; distance between points of its ground's profile
 _PANEL_NAME, _GAP = 0.27, 0.13  # inches; height of a panel's name, and gap between panels
 _PATHS = 6  # largest number of panels of paths side by side
-_STRAIGHT = 0.05  # a path is straight if it is narrower than this share of its length
 _CLEARANCE = 0.02  # a body is off the ground above this share of the robot's height
 
 _ON_GROUND, _LIFTED = "0.2", OKABE_ITO["vermillion"]
 _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
 _WAY: Any = _PATH | {"color": "0.6"}  # beside bodies in the colours of lines
 _GROUND: Any = {"color": "0.6", "linewidth": 0.8, "linestyle": "-"}
-_SECONDS: Any = {"color": "0.4", "marker": "o", "linestyle": "", "markersize": 1.8}
 _START: Any = {"color": "black", "marker": "o", "linestyle": "", "markerfacecolor": "white"}
 _END: Any = {"color": "black", "marker": "s", "linestyle": ""}
-_HEADING: Any = {"color": OKABE_ITO["vermillion"], "zorder": 2.5, "width": 0.004, "scale": 18.0}
-_HEADING_MARK: Any = {"color": OKABE_ITO["vermillion"], "marker": ">", "linestyle": "-"}
 _BEFORE: Any = {"color": "0.5", "linewidth": 1.3, "linestyle": "-"}
 _AFTER: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.6, "linestyle": "-"}
-_NAMED: Any = {"ha": "center", "va": "center", "fontsize": "small"}
-_NAMED["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+_HEADING: Any = {"color": OKABE_ITO["vermillion"], "zorder": 2.5, "width": 0.004, "scale": 18.0}
 
 
 @figure_function
@@ -126,7 +121,7 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
         _draw_struts(panel, nodes[sample], structure, [look["color"] for look in looks])
         seconds = _nearest(trajectory, np.arange(math.ceil(first), now + 1e-9))
         panel.plot(*centre[: sample + 1].T, **_WAY)
-        panel.plot(*centre[seconds].T, **_SECONDS)
+        panel.plot(*centre[seconds].T, color="0.4", marker="o", linestyle="", markersize=1.8)
         way = signed(float(trajectory.walked[sample]), unit.decimals + 1)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
@@ -149,7 +144,7 @@ def path_of_the_centre(
     path = measures.path_of_centre(trajectory, structure)
     points = path.centre / unit.length
     wide, high, _ = np.ptp(points, axis=0)
-    is_straight = high < _STRAIGHT * wide
+    is_straight = high < 0.05 * wide
     ratio = high / max(wide, _margin(result))
     to_scale = min(rcParams["figure.figsize"][0] * ratio, 5.0) + 1.4
     page = page_of(height_in=2.6 if is_straight else to_scale)
@@ -165,7 +160,7 @@ def path_of_the_centre(
         return page
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
     if structure.points_ahead:
-        looks["heading"] = _HEADING_MARK
+        looks["heading"] = {"color": OKABE_ITO["vermillion"], "marker": ">", "linestyle": "-"}
         samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
         heading, arrows = path.heading[samples], points[samples]
         panel.quiver(arrows[:, X], arrows[:, Y], np.cos(heading), np.sin(heading), **_HEADING)
@@ -194,36 +189,33 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
     samples = _nearest(step, np.linspace(start, end, instants))
     nodes = step.p_WN.values / unit.length
     lifted, least = _off_ground(step, result)
+
+    # The side view stands below the view from above, in the same panel.
     wide, across = (_range(nodes[..., axis], result) for axis in (X, Y))
-    x = np.arange(*wide, _PROFILE * structure.scale / unit.length)
-    middle = nodes[samples, :, Y].mean(axis=1, keepdims=True)
-    profiles = _heights_below(np.stack(np.broadcast_arrays(x, middle), axis=-1), result)
-    low, high = _range(np.append(nodes[..., Z], profiles), result)
-    below = across[0] - high  # the side view stands below the view from above
-    views = nodes[..., [X, Y]], nodes[..., [X, Z]] + [0.0, below]
-    tall = low + below, across[1]
+    x, y = np.arange(*wide, _PROFILE * structure.scale / unit.length), nodes[..., Y].mean()
+    profile = _heights_below(np.column_stack([x, np.full_like(x, y)]), result)
+    low, high = _range(np.append(nodes[..., Z], profile), result)
+    views = nodes[..., [X, Y]], nodes[..., [X, Z]] + [0.0, across[0] - high]
+    tall = across[0] - (high - low), across[1]
     columns, height = _fit(instants, wide, tall, height_in=5.5)
     paths = followed_nodes(nodes, structure)[:, ::2]  # every second node is a left one
     of_paths = 1.1 * math.ceil(paths.shape[1] / _PATHS) + 0.4
     parts = [min(height + 0.4, 5.0 * of_paths), of_paths]
     page = page_of(height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
+
     panels = panels_in_columns(upper, instants, columns, x_label=f"x ({unit.length_name})")
-    for sample, profile, panel in zip(samples, profiles, panels, strict=True):
+    for sample, panel in zip(samples, panels, strict=True):
         name_panel(panel, f"{float(step.time[sample]) - start:.2f} s")
-        panel.plot(x, profile + below, **_GROUND)
-        colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
+        panel.plot(x, profile + across[0] - high, **_GROUND)
         for view in views:
             path = followed_nodes(view[: sample + 1], structure)
             panel.plot(path[..., 0], path[..., 1], **_PATH)
+            colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
             _draw_struts(panel, view[sample], structure, colours)
         _to_scale(panel, wide, tall)
     for panel in panels[::columns]:
-        panel.set_yticks([np.mean(across), np.mean([low, high]) + below], ["above", "side"])
-    if structure.markers.size:
-        for body in (0, len(structure.bodies) - 1):
-            middle = views[0][samples[0], structure.carriers == body].mean(axis=0)
-            panels[0].text(middle[0], middle[1], structure.bodies[body], **_NAMED)
+        panel.set_yticks([sum(across) / 2, tall[0] + (high - low) / 2], ["above", "side"])
     _draw_paths(lower, paths, lifted, result)
     looks = {
         f"over {least:.1g} {unit.length_name} off the ground": {"color": _LIFTED},
