@@ -25,10 +25,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 
 
-def test_the_title_is_by_the_scenarios_objective(folder, tiny, gait, result):
-    assert load_or_simulate(folder).title == f"{gait.name}: {headline(tiny, vars(result.metrics))}"
-
-
 def test_of_a_run_the_fittest_gait_is_simulated(run, tiny):
     stored = load_or_simulate(run)
     assert stored.gait.name == "tiny, seed 7, trial 1, evaluation 4"
@@ -121,7 +117,7 @@ def test_a_folder_gives_the_result_back(folder, result):
     (folder / "gait.json").write_text(texts["gait"])
     assert load_scenario(folder / "scenario.yaml") == result.scenario
     assert load_gait(folder / "gait.json", result.scenario) == result.gait
-    assert texts["title"] == result.title
+    assert texts["title"] == f"{result.name}: {headline(result.scenario, vars(result.metrics))}"
 
 
 def test_lengths_are_written_in_inches_too(tmp_path, result):

@@ -37,22 +37,19 @@ def hung():
     return scenario_of(HUNG)
 
 
-def pulled_down(stiffness: float, free_length: float, noise: np.ndarray) -> list[Rest]:
+def pulled_down(stiffness: float = 210.0, free_length: float = 0.39) -> list[Rest]:
     """Heights of the bar's upper node under loads: the cable's stretch is the force over its
     stiffness."""
-    weight = Robot.of(hung()).weight
-    return [
-        Rest(
-            changes={"robot.loads.a": ["0 N", "0 N", f"{-pull!r} N"]},
-            positions={"a z": float(1.0 - free_length - (weight + pull) / stiffness + error)},
-            position_uncertainty=NOISE,
-        )
-        for pull, error in zip(PULLS, noise.tolist(), strict=True)
-    ]
+    cases, weight = [], Robot.of(hung()).weight
+    for pull in PULLS:
+        changes = {"robot.loads.a": ["0 N", "0 N", f"{-pull!r} N"]}
+        height = {"a z": 1.0 - free_length - (weight + pull) / stiffness}
+        cases.append(Rest(changes=changes, positions=height, position_uncertainty=NOISE))
+    return cases
 
 
 def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_straight_line():
-    found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), BOUNDS)
+    found = fit_values(hung(), pulled_down(), BOUNDS)
     assert found.parameters["value"].to_list() == pytest.approx([210.0, 0.39], rel=1e-5)
     assert found.warnings == []
     # z = 1 - l0 - c f, with the compliance c = 1 / k: linear regression of z on f.
@@ -68,7 +65,7 @@ def test_exact_measurements_give_the_hidden_constants_and_the_intervals_of_a_str
 
 
 def test_two_values_that_are_known_but_hardly_apart_are_named_together():
-    found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4))[:2], BOUNDS)
+    found = fit_values(hung(), pulled_down()[:2], BOUNDS)
     assert found.correlations.loc[STIFFNESS, FREE_LENGTH] > 0.95
     assert found.parameters["determined"].all()
     (warning,) = found.warnings
@@ -89,7 +86,7 @@ def test_derivatives_are_central_and_one_sided_where_a_neighbour_fails(limit, sl
 
 
 def test_a_parameter_without_influence_is_told_and_stays():
-    cases, damping = pulled_down(210.0, 0.39, np.zeros(4)), {DAMPING: (0.0, 5.0)}
+    cases, damping = pulled_down(), {DAMPING: (0.0, 5.0)}
     found = fit_values(hung(), cases, BOUNDS | damping)
     assert found.parameters["determined"].to_list() == [True, True, False]
     assert math.isnan(found.parameters["low"][DAMPING])
@@ -101,7 +98,7 @@ def test_a_parameter_without_influence_is_told_and_stays():
 
 def test_two_values_that_act_alike_are_not_determined():
     # One load: a longer cable and a softer one lower the node alike.
-    (case, *_) = pulled_down(210.0, 0.39, np.zeros(4))
+    (case, *_) = pulled_down()
     heights = {"a z": case.positions["a z"], "b z": case.positions["a z"] - 0.2}
     twice = case.model_copy(update={"positions": heights})
     found = fit_values(hung(), [twice], BOUNDS)
@@ -151,7 +148,7 @@ def add_waves(monkeypatch):
 
 def test_predictions_that_are_not_smooth_have_no_intervals(add_waves):
     add_waves(2e-4, 1e3)
-    found = fit_values(hung(), pulled_down(210.0, 0.39, np.zeros(4)), BOUNDS)
+    found = fit_values(hung(), pulled_down(), BOUNDS)
     assert found.parameters["determined"].all() and found.parameters["low"].isna().all()
     (warning,) = [each for each in found.warnings if STIFFNESS in each and "smooth" in each]
     # The values explain the data nevertheless.
@@ -160,7 +157,7 @@ def test_predictions_that_are_not_smooth_have_no_intervals(add_waves):
 
 def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
     monkeypatch.setattr("tetra_drake.study.fit.MOST", 160)
-    cases = pulled_down(310.0, 0.4, np.zeros(4))[:: len(PULLS) - 1]
+    cases = pulled_down(310.0, 0.4)[:: len(PULLS) - 1]
     add_waves(5e-3, 0.2)
     near, found = (fit_values(hung(), cases, ALONE, search=search) for search in (False, True))
     assert near.misfit > 10.0
@@ -169,7 +166,7 @@ def test_a_search_finds_the_deepest_of_many_minima(add_waves, monkeypatch):
 
 
 def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
-    cases, predict = pulled_down(210.0, 0.39, np.zeros(4)), Rest.predict
+    cases, predict = pulled_down(), Rest.predict
     cases, predicted, stop = cases[:: len(PULLS) - 1], [], math.inf
 
     def counted(self, scenarios):
@@ -307,7 +304,7 @@ WRONG_ENDS = [(210.0, 400.0), ("1 m", "400 N/m"), (-1.0, 400.0)]
     ],
 )
 def test_parameters_that_cannot_be_fitted_are_refused(parameters, named, tmp_path, refused):
-    (case, *_) = pulled_down(210.0, 0.39, np.zeros(4))
+    (case, *_) = pulled_down()
     key = named if named == "parameters" else f"parameters.{named}"
     with refused("fit.yaml", key):
         fit(hung(), [case], parameters, out=tmp_path / "fit", source="fit.yaml")

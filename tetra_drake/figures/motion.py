@@ -204,7 +204,8 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
     page = page_of(height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
 
-    panels = panels_in_columns(upper, instants, columns, x_label=f"x ({unit.length_name})")
+    x_label = f"x, forward ({unit.length_name}) →"
+    panels = panels_in_columns(upper, instants, columns, x_label=x_label)
     for sample, panel in zip(samples, panels, strict=True):
         name_panel(panel, f"{float(step.time[sample]) - start:.2f} s")
         panel.plot(x, profile + across[0] - high, **_GROUND)

@@ -36,17 +36,34 @@ def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
     around = structure.p_WN - structure.p_WN.mean(axis=0)
     camera = p_WN.mean(axis=0) + camera_position(1.2 * around, np.zeros(3))
     struts, nodes = drawn_radii(structure)
+    drawn = []
+    if robot.scenario.terrain.is_ground:
+        reach, least = float(np.linalg.norm(around, axis=1).max()), robot.scenario.units.square
+        side = least * np.ceil(FLOOR_MARGIN * reach / _SQUARES[-1] / least)
+        x, y = side * (_SQUARES + np.round(p_WN.mean(axis=0)[:2, np.newaxis] / side))
+        floor = np.zeros((y.size, x.size, 3))
+        floor[..., :2] = np.stack(np.meshgrid(x, y), axis=-1)
+        floor[..., 2] = ground_heights(floor[..., :2], robot.ground)
+        seen, depth = _seen(floor, camera)
+        seen[depth < 0.1 * reach] = np.nan  # behind the camera
+        lines = [*seen, *seen.swapaxes(0, 1)]
+        drawn.append(LineCollection(lines, colors=COLOURS["dark_line"], linewidths=0.5))
+        below = p_WN[structure.struts]
+        below[..., 2] = ground_heights(below[..., :2], robot.ground)
+        shadows, depth = _seen(below, camera)
+        thick = _widths(struts, depth)
+        drawn.append(LineCollection(list(shadows), colors=COLOURS["square"], linewidths=thick))
+
     is_driven = structure.cables["signal"] != PASSIVE
     cables = np.where(is_driven, COLOURS["actuated"], COLOURS["passive"])
     points = np.tile(np.arange(len(p_WN))[:, np.newaxis], 2)  # round caps are spheres
     ends, depth = _seen(p_WN[np.vstack([structure.struts, structure.cable_ends, points])], camera)
     colours = [COLOURS["rear"]] * len(struts), cables, [COLOURS["node"]] * len(nodes)
     radii = np.concatenate([struts, np.full(len(cables), 0.5 * THICKEST * struts.min()), nodes])
-    order, reach = np.argsort(-depth.mean(axis=1)), float(np.linalg.norm(around, axis=1).max())
+    order = np.argsort(-depth.mean(axis=1))
     colour, width = np.concatenate(colours)[order], _widths(radii, depth)[order]
-    is_ground = robot.scenario.terrain.is_ground
-    drawn = _floor(robot, p_WN, camera, reach=reach) if is_ground else []
     drawn.append(LineCollection(list(ends[order]), colors=colour, linewidths=width))
+
     size = ASPECT * _HEIGHT / _DPI, _HEIGHT / _DPI
     canvas = FigureCanvasAgg(Figure(size, dpi=_DPI, facecolor=COLOURS["sky"]))
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -57,28 +74,6 @@ def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
         axes.add_collection(collection, autolim=False)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
-
-def _floor(
-    robot: Robot, p_WN: np.ndarray, camera: np.ndarray, *, reach: float
-) -> list[LineCollection]:
-    """Lines of the floor around the robot, and the shadows of its struts."""
-    least = robot.scenario.units.square
-    side = least * np.ceil(FLOOR_MARGIN * reach / _SQUARES[-1] / least)
-    x, y = side * (_SQUARES + np.round(p_WN.mean(axis=0)[:2, np.newaxis] / side))
-    floor = np.zeros((y.size, x.size, 3))
-    floor[..., :2] = np.stack(np.meshgrid(x, y), axis=-1)
-    floor[..., 2] = ground_heights(floor[..., :2], robot.ground)
-    seen, depth = _seen(floor, camera)
-    seen[depth < 0.1 * reach] = np.nan  # behind the camera
-    below = p_WN[robot.structure.struts]
-    below[..., 2] = ground_heights(below[..., :2], robot.ground)
-    shadows, depth = _seen(below, camera)
-    widths = _widths(drawn_radii(robot.structure)[0], depth)
-    return [
-        LineCollection([*seen, *seen.swapaxes(0, 1)], colors=COLOURS["dark_line"], linewidths=0.5),
-        LineCollection(list(shadows), colors=COLOURS["square"], linewidths=widths),
-    ]
 
 
 def _seen(points: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
