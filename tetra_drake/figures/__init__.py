@@ -1,1 +1,1 @@
-"""Figures of simulations, runs and analyses."""
+"""Figures of simulations and runs, and the common style of all figures."""

@@ -98,7 +98,7 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
 
 
 def _rows_of_names(names: Iterable[str]) -> float:
-    """Height in rows that each of these names needs."""
+    """Height of one of these names, in rows of the diagram."""
     return 1.3 * most_lines(names) - 0.3
 
 

@@ -32,7 +32,7 @@ def command_columns(robot: Robot) -> list[str]:
 
 
 def command_text(robot: Robot, command: Command) -> str:
-    """Content of the file of a command."""
+    """CSV text of a command, as load_command() reads it."""
     times = command.period * np.arange(len(command.samples))
     values = command.samples / robot.scenario.actuation.command_unit
     return table_text(command_columns(robot), times, values)
@@ -45,7 +45,7 @@ def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) ->
 
 
 def scenario_beside(path: Path) -> Path | None:
-    """The scenario file in the folder of a command file; None if there is none."""
+    """Path of the scenario file in the folder of a command file; None if there is none."""
     scenario = path.parent / SCENARIO
     return scenario if os.path.isfile(scenario) else None
 

@@ -212,7 +212,7 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
 def load_or_simulate(
     source: Path, *, scenario: str | None = None, warn: Say = silent
 ) -> SimulationResult:
-    """The result of a result folder; or simulates a gait file, or the fittest gait of a run.
+    """Result of a result folder; or of a new simulation of a gait file, or of a run's best gait.
 
     `scenario` is for gait files only: folders have their own. For `warn`, see load_source().
 

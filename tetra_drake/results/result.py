@@ -1,4 +1,4 @@
-"""Result of a simulation: SimulationResult, which every engine returns, and result.json."""
+"""Result of a simulation, which every engine returns: metrics, path and trajectory."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ class IntegratorWork(Section):
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """Result of simulate()."""
+    """Result of one simulation: metrics, fitness, path of the centre, and the trajectory if it was
+    recorded."""
 
     scenario: Scenario = field(repr=False, compare=False)
     robot: Robot = field(repr=False, compare=False)
@@ -113,7 +114,7 @@ class SimulationResult:
         return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
 
     def show(self, *, height: int = 480) -> ReplayFrame:
-        """The replay as a value that a notebook shows. `height` is in pixels."""
+        """Replay page for a notebook, which shows it in a frame `height` pixels high."""
         return ReplayFrame(self.replay_page(), height)
 
     def replay_page(self) -> str:

@@ -1,1 +1,1 @@
-"""Robustness, comparisons and maps of recorded runs, as tables."""
+"""Studies of robots, gaits and runs, each with its table, text and figure."""

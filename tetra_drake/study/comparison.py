@@ -51,7 +51,7 @@ _BESIDE = 5.5  # least width (in) of two panels side by side, with letters of th
 
 @dataclass(frozen=True)
 class Compared:
-    """Result of compare(): tables of trials, curves and runs."""
+    """Comparison of runs, as compare() returns it: tables of trials, curves and runs."""
 
     scenario: Scenario
     """Scenario of the first run."""
@@ -184,8 +184,8 @@ def compare_scenarios(
 
 
 def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Probability of improvement: that one of our numbers (..., n) exceeds one of theirs (..., m),
-    over all n m pairs. Equal numbers count one half.
+    """Probability that one of our numbers exceeds one of theirs: the share of all pairs in which it
+    does. Equal numbers count one half. The numbers are along the last axes, (..., n) and (..., m).
 
     From R. Agarwal et al., "Deep reinforcement learning at the edge of the statistical precipice",
     NeurIPS 2021 (rliable).
@@ -195,8 +195,10 @@ def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.fl
 
 
 def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
-    """Mean probability of improvement over the scenarios that have both runs, in the form of
-    Compared.improvement. The bootstrap draws trials within each scenario.
+    """Mean probability of improvement over several scenarios, in the form of Compared.improvement.
+
+    A pair of runs is averaged over the scenarios that have both. The bootstrap draws trials within
+    each scenario.
 
     Args:
         scenarios: a table of trials for each scenario, with at least the columns `run` and
@@ -365,7 +367,7 @@ def comparison_text(compared: Compared) -> str:
 
 
 def improvement_text(improvement: pandas.DataFrame) -> str:
-    """Table of the probabilities of improvement, with their intervals. See Compared.improvement."""
+    """Table of the probabilities in Compared.improvement, with their confidence intervals."""
     cells = {}
     for pair, row in improvement.iterrows():
         probability, low, high = (fixed(row[name]) for name in ("probability", "low", "high"))

@@ -92,7 +92,8 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
 
 
 def kept_gaits(gaits: pandas.DataFrame) -> pandas.DataFrame:
-    """Elites that keep at least the share LUCKY of the draws, the fittest first."""
+    """Elites that are not lucky, the fittest first: all but those that keep less than the share
+    LUCKY of the draws."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 

@@ -53,7 +53,7 @@ _SURROUNDINGS = "prism"
 
 @dataclass(frozen=True)
 class EquilibriumStudy:
-    """Result of study_equilibrium(); SI units."""
+    """Robot in equilibrium: statics, nodes, cables, natural frequencies and modes; SI units."""
 
     robot: Robot
     statics: Statics
@@ -85,7 +85,7 @@ class EquilibriumStudy:
 
 
 def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
-    """Studies a robot in equilibrium.
+    """Statics, node positions, tensions and natural frequencies of a robot in equilibrium.
 
         >>> study = td.study_equilibrium("prism")
         >>> study.frequencies.round(1)[:3]
@@ -136,8 +136,8 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
 
 
 def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
-    """K and M of the motion M x'' = -K x about the equilibrium, without damping. For x see
-    displaced()."""
+    """Stiffness matrix K and mass matrix M of small motions M x'' = -K x about the equilibrium,
+    without damping. For x see displaced()."""
     state = robot.equilibrium.state
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
@@ -145,8 +145,8 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
-    """The robot of a structure or of a scenario on flat ground, with forces as actuators, for
-    MuJoCo. A structure gets Coulomb friction.
+    """Robot of a structure file or of a scenario, on flat ground, with forces as actuators, so that
+    MuJoCo can simulate it. A structure gets Coulomb friction.
 
     A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
     for it. A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in
@@ -229,8 +229,8 @@ def structure_text(study: EquilibriumStudy) -> str:
 
 
 def _faults(study: EquilibriumStudy) -> list[str]:
-    """Lines with the depth of a robot that sinks in, the nodes that are below the ground at rest,
-    and the struts that overlap."""
+    """Warnings about a robot at rest: how deep it sinks into the ground, nodes below ground
+    that cannot touch it, and struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
     lines = [sentence(robot.sinking_remark())] if robot.sinking_remark() else []

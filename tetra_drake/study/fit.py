@@ -69,7 +69,7 @@ noise, there may be an interval."""
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of fit()."""
+    """Fitted values of scenario keys, with intervals, residuals and warnings."""
 
     scenario: Scenario = field(repr=False)
     """The scenario with the fitted values."""
@@ -107,14 +107,14 @@ class Fit:
 
     @property
     def notes(self) -> list[str]:
-        """Warnings, and the offsets of clocks."""
+        """Warnings, and the offsets of the clocks of measurements, as sentences."""
         offsets = {name: 1e3 * offset for name, offset in self.clock_offsets.items() if offset}
         clocks = [f"the clock of {name} is ahead by {ms:.2f} ms" for name, ms in offsets.items()]
         return [*self.warnings, *clocks]
 
     @property
     def table(self) -> TextTable:
-        """Values and intervals."""
+        """Table of the fitted values and their intervals, beside the start values."""
         rows = []
         for key, row in self.parameters.iterrows():
             value, half = row["value"], row["high"] - row["value"]
@@ -138,7 +138,7 @@ def fit_values(
     say: Say = silent,
     source: object = "fit",
 ) -> Fit:
-    """Values of a scenario's keys within bounds for which it meets measurements best.
+    """Fit of a scenario's values to measurements, within bounds, by weighted least squares.
 
     Args:
         scenario: the scenario whose values are the start.
@@ -193,8 +193,8 @@ def fit_values(
 
 
 def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
-    """Relative parameters (n,) with the least sum of squares in a search by CMA-ES, which ends when
-    it has converged roughly."""
+    """Best point (n,) of a global search by CMA-ES for the least sum of squares. The search ends
+    when it has converged roughly."""
     low, high = problem.bounds
     origin = (start - low) / (high - low)
     search = Search(POPULATION, Box(start.size), np.random.default_rng(0), origin)
@@ -263,8 +263,9 @@ def _uncertainty(
 def _warnings(
     table: pandas.DataFrame, correlations: pandas.DataFrame, *, explained: bool
 ) -> list[str]:
-    """What a reader of a fit has to know. `explained` is True if the residuals are as small as the
-    uncertainties."""
+    """Warnings about a fit: values that the data do not determine, that are at a bound, that cannot
+    be told apart, or whose predictions are not smooth. `explained` is True if the residuals are as
+    small as the uncertainties."""
     warnings = []
     for key, row in table.iterrows():
         value, width = row["value"], row["most"] - row["least"]

@@ -55,13 +55,13 @@ class Parameter(NamedTuple):
         return min(abs(self.start) or width, width)
 
     def value(self, number: float) -> str | float:
-        """The number as a value for the scenario."""
+        """The number with its unit, as Scenario.with_changes() takes it."""
         return f"{number!r} {self.unit}" if self.unit else number
 
 
 def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -> Parameter:
-    """The parameter of a key. Raises InputError, naming `source`, if key or bounds cannot be
-    used."""
+    """Parameter for a scenario key, within its bounds. Raises InputError, naming `source`, if key
+    or bounds cannot be used."""
     place = f"parameters.{key}"
     values = scenario.model_dump()
     starts = [value_at(values, each) for each in separate(key)]
@@ -95,8 +95,9 @@ def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -
 
 @dataclass(eq=False)
 class FitProblem:
-    """Weighted residuals and their derivatives by relative parameters. All scenarios of an
-    iteration are simulated side by side.
+    """Weighted residuals of a fit, and their derivatives by relative parameters.
+
+    All scenarios of an iteration are simulated side by side.
 
     A point is an array (n,) of relative parameters.
     """
@@ -129,7 +130,7 @@ class FitProblem:
         return len(self._known)
 
     def scenario_at(self, x: np.ndarray) -> Scenario:
-        """The scenario at a point."""
+        """The scenario with the values of a point."""
         pairs = zip(self.parameters, (x * self.scale).tolist(), strict=True)
         changes = {parameter.key: parameter.value(number) for parameter, number in pairs}
         return with_joined_changes(self.scenario, changes)
@@ -179,7 +180,7 @@ class FitProblem:
         return np.column_stack(columns)
 
     def misfit(self, residuals: np.ndarray) -> float:
-        """Sum of squares per degree of freedom."""
+        """Sum of the squared residuals per degree of freedom."""
         return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
 
     def tell(self, residuals: np.ndarray) -> None:

@@ -54,7 +54,7 @@ _SIZE, _UNCERTAINTY = Field(ge=-MOST, le=MOST), Field(ge=LEAST, le=MOST)
 
 
 class Prediction(NamedTuple):
-    """Predicted numbers of a measurement."""
+    """Numbers that a scenario predicts for a measurement."""
 
     values: np.ndarray
     """Numbers (numbers,) in SI; NaN if there is none."""
@@ -64,7 +64,7 @@ class Prediction(NamedTuple):
 
 @dataclass(frozen=True)
 class Measured:
-    """Measured numbers, and their prediction."""
+    """Numbers of one measurement, and the function that predicts them."""
 
     name: str
     numbers: pandas.DataFrame
@@ -101,7 +101,8 @@ class MotionCapture(Section):
         return {key: path for key, path in paths.items() if path is not None}
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Reads the log. Raises InputError, naming file and line or column, if it is wrong."""
+        """Table of the measured numbers in the log. Raises InputError, naming file and line or
+        column, if the log is wrong."""
         if (self.command is None) == (self.gait is None):
             problem = f"found {'neither' if self.gait is None else 'both'}, expected one of them"
             raise InputError(name, "command", f"{problem}, a command or a gait")
@@ -136,7 +137,7 @@ class MotionCapture(Section):
     def predict(
         self, scenarios: Sequence[Scenario], *, driver: Driver, log: pandas.DataFrame
     ) -> list[Prediction]:
-        """Predictions for a log, a table of coordinates in m by time in s."""
+        """Simulated coordinates at the times of a log, a table of coordinates in m by time in s."""
         often = {"simulation.sample_period": SAMPLE_PERIOD}
         finely = [each.with_numbers(often) for each in scenarios]
         outcomes = simulate_many(finely, [driver] * len(finely), record=True)
@@ -203,7 +204,7 @@ class Rest(Section):
         return {}
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Checks the names. Raises InputError for a node or cable that there is not."""
+        """Table of the measured numbers. Raises InputError for an unknown node or cable."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
         places = _coordinates(structure.node_names)
         for key, known in {"positions": places, "tensions": structure.cable_names}.items():
@@ -252,7 +253,7 @@ Measurement = Annotated[MotionCapture | Rest, Kinds()]
 
 
 class FitFile(Section):
-    """What a fit needs beside the scenario."""
+    """File of a fit: parameters with their bounds, and measurements."""
 
     parameters: Annotated[Keyed[str, _Pair], Field(min_length=1), AfterValidator(different_keys)]
     """Bounds, least and most, by scenario key. Keys joined by commas get the same value."""
@@ -260,8 +261,8 @@ class FitFile(Section):
 
 
 def load_fit_file(path: str | Path) -> FitFile:
-    """Reads the file of a fit. Paths in it are relative to it. Raises InputError, naming file and
-    key, if it is wrong."""
+    """Reads the file of a fit. Paths in the file are relative to its folder. Raises InputError,
+    naming file and key, if the content is wrong."""
     path = Path(path)
     tree = read_mapping(path, "file of a fit", keys=keys_of(FitFile))
     given = FitFile.from_tree(tree, path)

@@ -74,7 +74,7 @@ _NAMES = 0.3  # largest width of the names, as a share of the page's width
 
 @dataclass(frozen=True)
 class Judgement:
-    """Result of robustness(): tables with one row per simulation.
+    """Simulations of gaits on disturbed robots: tables with one row per simulation.
 
     All tables have the columns gait (its key), failure (reason, or missing), missed (requirements
     of the scenario that are not met), fitness, and the metrics in SI. Fitness and metrics are NaN
@@ -94,8 +94,8 @@ class Judgement:
     relative change of the key), draw (the draw that start or terrain seed are taken from)."""
 
     def compared(self, table: pandas.DataFrame) -> pandas.DataFrame:
-        """A table with three more columns: undisturbed (distance without disturbances), change
-        (difference of the distance to it), kept (see LOSS)."""
+        """A table of simulations with three more columns: undisturbed (distance without
+        disturbances), change (difference of the distance to it), kept (see LOSS)."""
         before = table["gait"].map(self.undisturbed.set_index("gait")["distance"])
         change = table["distance"] - before
         kept = (change >= -LOSS * before.abs()) & (table["missed"] == "")  # False where NaN
@@ -219,7 +219,7 @@ def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
 
 
 def by_gait(judgement: Judgement) -> pandas.DataFrame:
-    """Summary of a judgement with a row per gait. Columns:
+    """Robustness of each gait: a table with a row per gait. Columns:
 
     - undisturbed: distance (m) without disturbances
     - 5 %, 25 %, 50 %, 75 %, 95 % (quantiles) and mean of the distance (m) over the draws that did
@@ -243,7 +243,8 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
 
 
 def by_change(judgement: Judgement) -> pandas.DataFrame:
-    """Summary of a judgement with a row per change, the most harmful change first. Columns:
+    """Effect of each disturbance: a table with a row per changed key, start or terrain, the most
+    harmful one first. Columns:
 
     - median: absolute change of the distance (m) by this change alone, median over the simulations
     - worst: most negative change of the distance; failed: number of failures
@@ -269,14 +270,14 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
 
 
 def chance(draws: int) -> float:
-    """Limit below which 95 % of the rank correlations of unrelated numbers lie, in absolute
-    value."""
+    """Rank correlation that chance alone may give: 95 % of the correlations of unrelated numbers
+    are smaller in absolute value."""
     return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
 
 
 def robustness_text(judgement: Judgement) -> str:
-    """Tables of a judgement: distances of gaits on disturbed robots, and the most harmful
-    changes."""
+    """Tables of the distances of gaits on disturbed robots, and of the most harmful
+    disturbances."""
     units, count = judgement.scenario.units, judgement.draws["draw"].nunique()
     shown, counts, misses = ["undisturbed", "5 %", "50 %", "95 %"], ["failed"], ""
     if judgement.scenario.require:

@@ -49,7 +49,7 @@ def launch_browser() -> Iterator[Browser]:
 
 
 def picture_of(page: Page) -> Image.Image:
-    """Picture of a page as it is."""
+    """Screenshot of a page, in RGB."""
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 

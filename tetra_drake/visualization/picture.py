@@ -77,7 +77,8 @@ def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
 
 
 def _seen(points: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (..., 2) of points (..., 3) in a picture, and their distances (...) along the view."""
+    """Projections (..., 2) of points (..., 3) onto the picture, and distances (...) of the points
+    from the camera along the view."""
     right, up, forward = view_axes()
     offset = points - camera
     depth = offset @ forward

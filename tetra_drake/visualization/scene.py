@@ -149,7 +149,7 @@ def least_drawn_radius(structure: Structure) -> float:
 
 
 def radius_per_newton(structure: Structure, tension: float) -> float:
-    """Scale from tension to the drawn radius of a cable. The radius for `tension` (N) is
+    """Drawn radius of a cable per newton of tension. A cable with `tension` (N) has the radius
     THICKEST."""
     return THICKEST * least_drawn_radius(structure) / max(tension, 1e-9)
 
