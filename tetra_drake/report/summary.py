@@ -58,7 +58,7 @@ def metrics_table(
 
 
 def _size_and_title(name: str, units: Units) -> tuple[float, str]:
-    """Size of the unit in which a number is shown, and the title of its row in a table."""
+    """Size of the unit of a shown number, and the title of the number's row in a table."""
     title = _TITLES.get(name, name.replace("_", " "))
     if name in _SHARES:
         return 0.01, f"{title} (%)"
