@@ -53,11 +53,10 @@ def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
 def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
     fitnesses = np.random.default_rng(2).normal(0.5, 2.0, 40)
     figure = initial_fitness(run_of(initial(1.0), initial(*fitnesses.tolist(), None)), 1)
-    forward, backward = bars(figure)
     group = bar_groups(figure)[0]
     edges = [*(bar.get_x() for bar in group), group[-1].get_x() + group[-1].get_width()]
-    assert forward == np.histogram(fitnesses[fitnesses >= 0.0], edges)[0].tolist()
-    assert backward == np.histogram(fitnesses[fitnesses < 0.0], edges)[0].tolist()
+    sides = fitnesses[fitnesses >= 0.0], fitnesses[fitnesses < 0.0]  # forward, backward
+    assert bars(figure) == [np.histogram(side, edges)[0].tolist() for side in sides]
 
 
 def test_fitness_lines_are_the_recorded_means_over_evaluations(run_of):
