@@ -52,6 +52,13 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
     assert figures_in(run / "figures") == OF_A_RUN - missing
 
 
+def test_a_run_without_a_whole_iteration_has_no_curves(run):
+    for file in run.rglob("iterations.jsonl"):
+        file.unlink()
+    write_figures(run)
+    assert figures_in(run / "figures") == OF_A_RUN - {"fitness_of_trials"}
+
+
 def test_what_cannot_be_drawn_is_refused_before_simulations(run, tmp_path, monkeypatch, refused):
     monkeypatch.setattr("tetra_drake.report.run_page.simulate", None)
     (tmp_path / "file").touch()

@@ -192,7 +192,7 @@ def pictures_of_run(shown: ShownGaits) -> Pictures:
     """The figures of a run and of its best gait."""
     run, trial = shown.run, shown.best.recorded["trial"]
     best, initial, trials = shown.best.result, shown.initial.result, initial_extremes(run).index
-    evolution = [Picture(fitness_of_trials, [run])]
+    evolution = [Picture(fitness_of_trials, [run])] if len(run.iterations) else []
     if len(trials):
         evolution.append(Picture(initial_distances, [run]))
     if trial in trials:

@@ -224,8 +224,7 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
         meshcat.SetTransform("/floor/slab", RigidTransform(middle))
     else:
         _add_relief(meshcat, floor, scale=robot.structure.scale)
-    light: list[np.ndarray] = []
-    dark: list[np.ndarray] = []
+    lines: dict[str, list[np.ndarray]] = {"squares": [], "dark": []}
     for axis in (0, 1):
         for line in np.moveaxis(floor, axis, 0):
             position = line[0, axis] / units.square
@@ -233,12 +232,11 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
                 continue
             # A straight line has pieces, too: some browsers lose lines that pass the camera.
             points = line[:: units.squares] if np.ptp(line[:, 2]) == 0.0 else line
-            (light if round(position) % units.squares else dark).append(points)
+            lines["squares" if round(position) % units.squares else "dark"].append(points)
     # Lines are a little above the floor. Otherwise the floor would hide parts of them.
     square = "square" if ground.flat else "square_on_relief"
-    looks = [("squares", light, 0.0002, square), ("dark", dark, 0.0004, "dark_line")]
-    for name, lines, lift, look in looks:
-        raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
+    for name, lift, look in (("squares", 0.0002, square), ("dark", 0.0004, "dark_line")):
+        raised = [line + np.array([0.0, 0.0, lift]) for line in lines[name]]
         if raised:
             start = np.vstack([line[:-1] for line in raised])
             end = np.vstack([line[1:] for line in raised])
