@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Sample(NamedTuple):
-    """Content of a diagram's context at one time (s)."""
+    """State of a diagram at one time (s)."""
 
     time: float
     continuous: np.ndarray
@@ -27,7 +27,7 @@ class Sample(NamedTuple):
 
     @classmethod
     def of(cls, context: Context) -> Sample:
-        """A copy of the content of a context."""
+        """The state in a context, copied."""
         discrete = context.get_discrete_state()
         return cls(
             context.get_time(),
@@ -37,10 +37,10 @@ class Sample(NamedTuple):
 
 
 class Sampler:
-    """Takes samples at given times; steps of the simulation may end at other times.
+    """Samples of a simulation at given times, where no step has to end.
 
-    It copies the context and interpolates within a step. Forces and lengths are computed after the
-    simulation. So recording does not change the simulation.
+    States are interpolated within a step; modes are those at its end. Forces and lengths are
+    computed after the simulation. So recording does not change it.
     """
 
     def __init__(self, diagram: Diagram, times: np.ndarray, *, max_step: float) -> None:
@@ -52,7 +52,7 @@ class Sampler:
         self._latest: Sample | None = None
 
     def follow(self, other: Sampler) -> None:
-        """Continues the samples of another sampler."""
+        """Goes on with copies of another sampler's samples."""
         self._samples, self._latest = other._samples.copy(), other._latest
 
     def after_step(self, context: Context) -> None:
@@ -63,34 +63,27 @@ class Sampler:
             return
         after = Sample.of(context)
         before, self._latest = self._latest or after, after
-        for time in due:
-            if time > after.time:
-                return
-            self._samples.append(self._between(before, after, float(time)))
+        step, bodies = after.time - before.time, self._bodies
+        for time in due[due <= after.time].tolist():
+            if time == after.time:
+                self._samples.append(after)
+                continue
+            part = (time - before.time) / step
+            state = before.continuous + part * (after.continuous - before.continuous)
+            ends = before.continuous[bodies], after.continuous[bodies]
+            state[bodies] = interpolate_state(*ends, step, part)
+            self._samples.append(Sample(time, state, after.discrete))
 
     def motion(self) -> Motion:
         """The motion up to now, at the times of the samples."""
         return motion_of(self._diagram, self._samples)
 
-    def _between(self, before: Sample, after: Sample, time: float) -> Sample:
-        """The sample at a time (s) within a step. Its discrete state is from the end of the
-        step."""
-        if time == after.time:
-            return after
-        step, bodies = after.time - before.time, self._bodies
-        part = (time - before.time) / step
-        state = before.continuous + part * (after.continuous - before.continuous)
-        ends = before.continuous[bodies], after.continuous[bodies]
-        state[bodies] = interpolate_state(*ends, step, part)
-        return Sample(time, state, after.discrete)
-
 
 def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
-    """The motion that samples of a robot's diagram contain."""
+    """Motion of a robot from samples of its diagram."""
     state, signals = diagram.GetOutputPort("state"), diagram.GetOutputPort("signals")
     context = diagram.CreateDefaultContext()
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
-    drives_at = drives_of(diagram)
     rows = []
     for sample in samples:
         context.SetTime(sample.time)
@@ -103,21 +96,20 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
             "states": state.Eval(context),
             "signals": signals.Eval(context),
             "modes": modes,
-            "drives": drives_at(context),
+            "drives": drives_at(diagram, context),
         }
         rows.append(row)
     return Motion(**{name: np.array([row[name] for row in rows]) for name in rows[0]})
 
 
 def frame_of(robot: Robot, diagram: Diagram, context: Context) -> xarray.Dataset:
-    """A trajectory of one sample: a robot's diagram in a context."""
+    """Trajectory of a single sample: a robot's diagram in a context."""
     return make_dataset(robot, motion_of(diagram, [Sample.of(context)]))
 
 
-def drives_of(diagram: Diagram) -> Callable[[Context], np.ndarray]:
-    """Function that reads the drives (drives,) from a context of a robot's diagram. They are empty
-    without actuators."""
+def drives_at(diagram: Diagram, context: Context) -> np.ndarray:
+    """States of the actuators (drives,) of a robot's diagram in a context; empty without states."""
     if not diagram.HasOutputPort("drives"):
-        return lambda context: np.zeros(0)
-    evaluate: Callable[[Context], np.ndarray] = diagram.GetOutputPort("drives").Eval
-    return evaluate
+        return np.zeros(0)
+    drives: np.ndarray = diagram.GetOutputPort("drives").Eval(context)
+    return drives

@@ -83,7 +83,13 @@ class GroundContact(LeafSystem):
         # The witness function has no event: it only ends the step, and the per-step update follows.
         # A bound method in place of the lambda would keep the system alive for ever.
         this, falls = weakref.proxy(self), WitnessFunctionDirection.kPositiveThenNonPositive
-        margin = self.MakeWitnessFunction("mode margin", falls, lambda c: this._margin(c))
+        margin = self.MakeWitnessFunction(
+            "mode margin",
+            falls,
+            lambda context: mode_margin(
+                this._parts, this._state.Eval(context), this._modes(context)
+            ),
+        )
         self._witnesses = [margin] if witness else []
         sources = {self._state.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
@@ -108,7 +114,7 @@ class GroundContact(LeafSystem):
         return self._next_change(self._parts, state, acceleration, modes, horizon)
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
-        """The witness function; none without `witness`."""
+        """Witness functions of the system: one with `witness`, otherwise none."""
         return self._witnesses
 
     def _modes(self, context: Context) -> np.ndarray:
@@ -126,9 +132,6 @@ class GroundContact(LeafSystem):
         if changed or (self._is_round and modes[:, contact.CONTACT].any()):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
-
-    def _margin(self, context: Context) -> float:
-        return mode_margin(self._parts, self._state.Eval(context), self._modes(context))
 
     def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
         """The table `ground_forces`. Writes the generalized force to `force`, if given."""
