@@ -203,15 +203,9 @@ class LaneBatch(Batch):
 
     def motion(self, place: int) -> Motion:
         """Samples of the robot in a place, up to now."""
-        log = self._log
-        kept = slice(log.kept[place])
-        return Motion(
-            times=log.times[place, kept].copy(),
-            states=log.states[place, kept].copy(),
-            signals=log.signals[place, kept].copy(),
-            modes=log.modes[place, kept].copy(),
-            drives=log.drives[place, kept].copy(),
-        )
+        log, kept = self._log, slice(self._log.kept[place])
+        tables = log.times, log.states, log.signals, log.modes, log.drives
+        return Motion(*(table[place, kept].copy() for table in tables))
 
     def _failure(self, place: int) -> SimulationFailure:
         """The failure of the robot in a place, by its status."""
