@@ -179,16 +179,8 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     for i in range(drives.shape[0]):  # predicted, for the forces at the end of the step
         drives[i, actuator.RATE] = at_end[i, actuator.RATE]
         at_end[i, actuator.DRIVE] = drives[i, actuator.DRIVE] + step * drives[i, actuator.RATE]
-    error = take_step(
-        constants.robot,
-        constants.solver,
-        lanes.step,
-        lanes.modes,
-        lanes.forces,
-        lanes.end_signals,
-        step,
-        live,
-    )
+    robot, solver, signals = constants.robot, constants.solver, lanes.end_signals
+    error = take_step(robot, solver, lanes.step, lanes.modes, lanes.forces, signals, step, live)
     for i in range(drives.shape[0]):  # corrected, with the mean of the rates at both ends
         rate = 0.5 * (drives[i, actuator.RATE] + at_end[i, actuator.RATE])
         lanes.end_drives[i] = drives[i, actuator.DRIVE] + step * rate
