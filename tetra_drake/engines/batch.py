@@ -31,10 +31,10 @@ class Viewer(Protocol):
 
 
 class Batch:
-    """Robots side by side, each in a numbered place. A place without a robot is idle."""
+    """Robots that are simulated side by side. Each has a number, its place; a place may be idle."""
 
     def __init__(self, structure: Structure, places: int) -> None:
-        """Idle places for robots of a structure."""
+        """Makes idle places for robots of a structure."""
         self.readings = Readings.empty(structure, places)
         """Readings of all robots at their last pause. At the start only the times are set."""
         self.failures: list[SimulationFailure | None] = [None] * places
@@ -139,7 +139,7 @@ class LoneRobot(Protocol):
 
 
 class SerialBatch(Batch):
-    """Robots that an engine simulates one after another."""
+    """Robots that are simulated one after another."""
 
     def __init__(
         self, start: Callable[[DrivenRobot], LoneRobot], robots: Sequence[DrivenRobot], places: int

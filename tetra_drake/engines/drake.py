@@ -57,7 +57,7 @@ FINEST, COARSEST = 2e-5, 5e-3
 
 
 class DrakeEngine(Engine):
-    """Engine that simulates the Drake diagram, one robot at a time."""
+    """Engine `drake`: simulates the Drake diagram of one robot at a time."""
 
     can_be_watched, has_threads = True, False
 
@@ -190,7 +190,7 @@ class _DiagramRobot(LoneRobot):
 
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
-    """Simulator of a robot's diagram with these integrator settings."""
+    """Drake's Simulator of a robot's diagram, with the integrator settings of a scenario."""
     accuracy = settings.accuracy or default_accuracy(robot.structure)
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)

@@ -1,4 +1,4 @@
-"""Engine of a scenario: what all engines have in common, and the choice of one by name."""
+"""Base class of the engines, and the choice of a scenario's engine."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BRIEF = 0.01
 
 
 class Engine:
-    """Base class of engines. A subclass must implement alone() or start()."""
+    """Base class of engines, which simulate robots. Subclasses implement alone() or start()."""
 
     can_be_watched: ClassVar[bool] = False
     """True if start() accepts a viewer."""
@@ -82,7 +82,7 @@ class Engine:
 
 
 def engine_of(scenario: Scenario) -> Engine:
-    """The engine of a scenario. The engine's module is imported on demand."""
+    """Engine of a scenario. The engine's module is imported on demand."""
     engine: Engine = importlib.import_module(scenario.engine.module).ENGINE
     return engine
 

@@ -65,7 +65,7 @@ _STRETCH = 5000  # steps between two checks of stability
 
 
 class MujocoEngine(Engine):
-    """Engine that simulates with MuJoCo, in steps of `engine.step`.
+    """Engine `mujoco`: simulates with MuJoCo, in steps of `engine.step`.
 
     Other Python threads run meanwhile. Samples are taken at the nearest steps.
     """

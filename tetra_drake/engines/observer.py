@@ -1,4 +1,4 @@
-"""Observer of a Drake or MuJoCo simulation: sums over its steps, such as work and lifted time.
+"""Sums over the steps of a Drake or MuJoCo simulation, such as work and lifted time.
 
 See laws.tally for the sums.
 """
@@ -23,7 +23,7 @@ CLEARED = 16
 """Number of states from one computation of the clearance to the next, of states added at once."""
 
 TallyParts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
-"""A robot, its tally, and the memory for its forces."""
+"""Robot, tally, and memory for the forces."""
 
 
 class Observer:

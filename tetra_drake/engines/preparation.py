@@ -30,7 +30,7 @@ _NOWHERE = subprocess.DEVNULL
 
 
 def prepare(tell: Callable[[], None] = lambda: None) -> None:
-    """Compiles all kernels for this processor. Later runs reuse the machine code.
+    """Compiles the package's kernels for this processor. Later runs reuse the machine code.
 
         >>> td.prepare()
 

@@ -85,7 +85,6 @@ class SimulationQueue:
         return [job.future for job in jobs]
 
     def _work(self) -> None:
-        """Main loop of a thread."""
         crew = _Crew(self._driven, record=self._record)
         while (jobs := self._take(crew)) is not None:
             refused = [job for job in jobs if not crew.begin(job)]
@@ -127,7 +126,7 @@ class SimulationQueue:
 
 
 class _Crew:
-    """Batch of one thread, and the jobs in it."""
+    """Simulations of one thread: a batch, and the jobs in its places."""
 
     def __init__(self, driven: Callable[[_Job], DrivenRobot], *, record: bool) -> None:
         """`driven` makes the robot of a job."""

@@ -67,7 +67,7 @@ class Sampler:
 
 
 def motion_at(diagram: Diagram, context: Context) -> Motion:
-    """The motion at a single time: that of a robot's diagram in a context."""
+    """Motion at a single time, from a robot's diagram in a context."""
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
     modes = ground.get_discrete_state_vector().CopyToVector().reshape(-1, MODE_COLUMNS)
     return Motion(

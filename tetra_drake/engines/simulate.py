@@ -1,4 +1,4 @@
-"""Simulation of gaits on the scenario's engine: `simulate`, `simulate_many`."""
+"""Simulation of gaits, commands and controllers on the engine of a scenario."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def simulate(
     viewer: Viewer | None = None,
     steering: SteeringSignal | float | None = None,
 ) -> SimulationResult:
-    """Simulates a gait, a command for actuators, or a controller, on a scenario.
+    """Simulates a robot that follows a gait, a command for its actuators, or a controller.
 
         >>> scenario = td.load_scenario("quick")
         >>> result = td.simulate(scenario, td.seeded_gait(scenario, 80), record=True)

@@ -254,7 +254,6 @@ class Simulation:
             self._owner.release()
 
     def _new_batch(self) -> Batch:
-        """A batch of the scenario's engine for all robots."""
         first, engine = self._driven(self.robot), engine_of(self.scenario)
         return engine.start(
             [first],
@@ -287,13 +286,13 @@ class Simulation:
 
 
 def is_list(values: object) -> TypeGuard[Sequence[Any]]:
-    """True for a list, a tuple, or an array of one dimension."""
+    """Whether a value is a list, a tuple, or an array of one dimension."""
     return isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim == 1)
 
 
 def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
-    """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, naming
-    `source`, if they have another shape, or are not real numbers."""
+    """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, which
+    names `source`, if they have another shape, or are not real numbers."""
     least = shape[1:] if shape[0] == 1 else shape
     return checked_numbers(actions, least, shape, source=source, key="actions").reshape(shape)
 

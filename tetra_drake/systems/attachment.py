@@ -130,8 +130,8 @@ class BodyForces(LeafSystem):
 def checked_numbers(
     source: str, key: str, given: npt.ArrayLike, *, count: int, least: float = -math.inf
 ) -> np.ndarray:
-    """Numbers (count,) from a number for all, or a number for each. Raises InputError that names
-    `source` and `key` unless they are finite and at least `least`."""
+    """Numbers (count,) from a number for all, or a number for each. Raises InputError, which names
+    `source` and `key`, unless they are finite and at least `least`."""
     found = np.full(count, np.nan)
     with contextlib.suppress(TypeError, ValueError):
         found[:] = given
@@ -143,8 +143,8 @@ def checked_numbers(
 
 
 def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None:
-    """Raises InputError that names `source` and `key` unless the constants of a law are numbers
-    that it can have: finite and not negative."""
+    """Raises InputError, which names `source` and `key`, unless the constants of a law are finite
+    numbers of 0 or more."""
     for name, value in constants.items():
         if not (isinstance(value, numbers.Real) and 0.0 <= float(value) < math.inf):
             problem = f"found {value!r:.60}, expected a number of 0 or more"
@@ -152,8 +152,8 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
 
 
 def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:
-    """Raises InputError that names `source` unless a system called `name` can be attached to a
-    plant: a finalized one of the builder, with a mass matrix that can be inverted."""
+    """Raises InputError, which names `source`, unless a system called `name` can be attached to a
+    plant of the builder: it must be finalized and have a mass matrix that can be inverted."""
     check_type(source, "builder", builder, DiagramBuilder)
     check_type(source, "name", name, str)
     if builder.already_built():
@@ -175,15 +175,15 @@ def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, n
 def check_part(
     source: str, key: str, builder: DiagramBuilder, system: System, kind: type[System]
 ) -> None:
-    """Raises InputError that names `source` and `key` unless a system is of a kind, and one of the
-    builder's."""
+    """Raises InputError, which names `source` and `key`, unless a system is of a class and in the
+    builder."""
     check_type(source, key, system, kind)
     if not any(part is system for part in builder.GetSystems()):
         raise InputError(source, key, "is no system of the builder; add it first")
 
 
 def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> None:
-    """Raises InputError that names `source` and `key` unless a frame is one of the plant's."""
+    """Raises InputError, which names `source` and `key`, unless a frame is in the plant."""
     check_type(source, key, frame, Frame)
     if frame.GetParentPlant() is not plant:
         raise InputError(source, key, f"found frame '{frame.name()}' of another plant")
@@ -192,7 +192,7 @@ def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> N
 
 
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:
-    """Connects a system with the ports `state` and `generalized_force` to a plant.
+    """Connects a system that exerts forces to a plant: its ports `state` and `generalized_force`.
 
     Its force is added to all forces that are connected to the plant before. The plant must be
     finalized.
@@ -235,5 +235,4 @@ def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> No
 
 
 def _bodies(plant: MultibodyPlant) -> list[RigidBody]:
-    """The bodies of a plant without the world."""
     return [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]

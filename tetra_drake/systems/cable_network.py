@@ -1,4 +1,4 @@
-"""Cables between bodies of a plant as a LeafSystem."""
+"""Cables between bodies of a plant, as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -239,7 +239,7 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
 def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
-    """Records of the cables, of dtype CABLE."""
+    """Records of the cables (cables,), of dtype CABLE. Raises InputError for a wrong `actuated`."""
     places = {one.name: place for place, one in enumerate(cables)}
     table = np.zeros(len(cables), dtype=cable.CABLE)
     table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]

@@ -1,4 +1,4 @@
-"""Wiring of the robot as one Drake diagram, after the thesis's Simulink model (appendix C)."""
+"""Drake diagram of a robot, after the thesis's Simulink model (appendix C)."""
 
 from __future__ import annotations
 
@@ -193,7 +193,6 @@ def _AddController(
 
 
 def _check_size(port: InputPort | OutputPort, size: int) -> None:
-    """Raises InputError unless a port of a controller has a size."""
     if port.size() != size:
         problem = f"found size {port.size()} of port '{port.get_name()}', expected {size}"
         raise InputError("MakeTensegrityDiagram", "controller", problem)

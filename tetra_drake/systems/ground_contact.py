@@ -1,4 +1,4 @@
-"""Ground under bodies of a plant as a LeafSystem: normal forces and friction."""
+"""Ground under bodies of a plant, as a LeafSystem: normal forces and friction."""
 
 from __future__ import annotations
 
@@ -104,8 +104,9 @@ class GroundContact(LeafSystem):
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
     ) -> tuple[bool, float]:
-        """Predicts mode changes: True if a mode changes when a step ends here, and the time (s) to
-        the next change after that, at most `horizon` (s).
+        """Whether a mode changes if a step ends here, and the time (s) to the next change.
+
+        The time is at most `horizon` (s).
 
         `acceleration` (6 n,) is dv/dt of the bodies. The prediction assumes that the acceleration
         of each node is constant.
@@ -168,7 +169,7 @@ def AddGroundContact(
     witness: bool = False,
     name: str = "ground",
 ) -> GroundContact:
-    """Adds a ground that touches spheres about the origins of frames of a plant's bodies.
+    """Adds a ground under spheres at the origins of frames of a plant's bodies.
 
     The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is the
     radius of all spheres, or of each; the ground touches the origins themselves if it is 0.

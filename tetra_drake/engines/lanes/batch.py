@@ -1,4 +1,8 @@
-"""Engine `compiled`: the same equations without Drake, with several robots in lanes."""
+"""Engine `compiled`: several robots side by side in the registers of each core, without Drake.
+
+A core of the processor simulates 4 or 8 robots at once, each in a lane. A batch may have more
+robots than there are lanes: each robot has a place in tables, and they take turns in the lanes.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +53,7 @@ of the operating system, and limits of time."""
 
 
 class LaneBatch(Batch):
-    """Robots in places. Threads take them into their lanes, and put them back when they pause."""
+    """Batch of the compiled engine. Threads simulate its robots in their lanes."""
 
     def __init__(
         self,
@@ -115,10 +119,6 @@ class LaneBatch(Batch):
         log.kept[place], log.passed[place], log.change_ends[place] = 1, 0, 0.0
 
         state[:] = numbers_of(start)[: state.size]
-        engine = robot.robot.scenario.settings_of(Compiled)
-        state[loop.STATUS], state[loop.SAMPLES] = loop.DONE, len(samples)
-        state[loop.PLANNED] = min(engine.look_ahead, engine.max_step)
-        state[loop.DUE] = log.times[place, 1]
         self._places.signals[place], self._places.holds[place] = start.signals, 0
         self._prepared[place], self._ends[place] = prepared, marks[-1]
         self.readings.time[place] = 0.0
@@ -208,7 +208,6 @@ class LaneBatch(Batch):
         return Motion(*(table[place, kept].copy() for table in tables))
 
     def _failure(self, place: int) -> SimulationFailure:
-        """The failure of the robot in a place, by its status."""
         prepared, time = self._prepared[place], float(self._times[place])
         assert prepared is not None
         failure: SimulationFailure
@@ -226,7 +225,7 @@ class LaneBatch(Batch):
 
 
 class LaneThread:
-    """Lanes of one thread, and its queue of robots that wait for a lane."""
+    """Lanes of one thread, and the queue of the robots that wait for one of them."""
 
     def __init__(
         self,
@@ -236,7 +235,7 @@ class LaneThread:
         heights: np.ndarray,
         readings: Readings,
     ) -> None:
-        """Lanes for robots like `first`. All threads share the tables of the places."""
+        """Makes lanes for robots like `first`. All threads share the tables of the places."""
         width = processor_lanes()
         self._lane_places = np.zeros_like(log.place)
         self._queue, self._waiting = np.zeros_like(places.queue), np.zeros_like(places.waiting)
@@ -294,9 +293,10 @@ class LaneThread:
 
 
 def processor_lanes() -> int:
-    """Number of lanes on this processor, for any number of robots, so that one kernel is compiled.
+    """Number of robots that a core of this processor simulates at once.
 
-    The results do not depend on it. Eight doubles fill a register of AVX-512. With narrower
+    It is the same for any number of robots, so that one kernel is compiled. The results do not
+    depend on it. Eight doubles fill a register of AVX-512. With narrower
     registers, eight lanes would need more registers than there are, so four are faster.
     """
     features = registry.cpu_target.target_context.codegen().magic_tuple()[2]  # such as "+avx2"
@@ -304,7 +304,7 @@ def processor_lanes() -> int:
 
 
 class CompiledEngine(Engine):
-    """Engine that simulates in compiled kernels. Other Python threads run meanwhile."""
+    """Engine `compiled`: simulates in compiled kernels. Other Python threads run meanwhile."""
 
     lanes = processor_lanes()
 

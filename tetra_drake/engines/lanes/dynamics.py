@@ -31,7 +31,7 @@ times time."""
 
 
 class Solver(NamedTuple):
-    """Positions of the blocks of the implicit matrix, and the schedule of its elimination."""
+    """Positions of the blocks of the implicit matrix, and the order of its elimination."""
 
     schedule: Schedule
     coupled: Table
@@ -41,14 +41,13 @@ class Solver(NamedTuple):
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """The solver for a robot."""
+        """The solver for the coupled bodies of a robot."""
         first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
         return cls._of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
 
     @classmethod
     @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
     def _of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
-        """The solver for a number of bodies and the coupled pairs among them."""
         schedule = Schedule.of(bodies, pairs)
         blocks = schedule.blocks
         coupled = np.array([blocks.pop(pair) for pair in pairs], dtype=np.int64)
@@ -76,7 +75,7 @@ def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table
 
 @inlined
 def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tuple[Real, ...]:
-    """Momentum of a body: its mass matrix times its part of a vector over bodies.
+    """Momentum of a body: its mass matrix times its velocity, part of `velocity` (6 bodies,).
 
     `inertia_W` is Forces.inertia.
     """
@@ -234,7 +233,7 @@ def add_cables(
 
 @inlined
 def put(value: Real, adds: bool, block: int, r: int, c: int, blocks: Table) -> None:
-    """Writes a value to a block, or adds it if `adds`.
+    """Writes a number to a block, or adds it if `adds`.
 
     If all blocks were set to zero first, a step would take 2 to 5 % longer.
     """

@@ -1,4 +1,4 @@
-"""Simulation loop of several simulations in lanes; each has its own time, step and modes.
+"""Simulation loop: several simulations in lanes, each with its own time, step and modes.
 
 All lanes do the same iteration: forces, prediction of the next mode change, signals, one step. If
 the step of a lane is rejected, the lane repeats it with a shorter step in the next iteration.
@@ -71,7 +71,7 @@ SCRATCH_ROWS = 3
 
 
 class Constants(NamedTuple):
-    """Constants of the simulations in lanes; SI units. Tables without a shape have one number."""
+    """Constants of the simulations in SI units. Tables without a shape have one number."""
 
     robot: Model
     solver: Solver
@@ -100,7 +100,7 @@ class Constants(NamedTuple):
 
 
 class LaneState(NamedTuple):
-    """State of the simulations, in lanes, with scratch memory.
+    """State of the simulations, with scratch memory.
 
     The numbers before `step.end` are the state of a simulation; see places.Places.
     """
@@ -131,7 +131,7 @@ class LaneState(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Schedule and recorded samples of each simulation; a row per place."""
+    """Times at which each simulation stops or is sampled, and its samples; a row per robot."""
 
     place: Annotated[Table, "lanes", int]
     """Place of the simulation in each lane."""
@@ -208,7 +208,7 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
 
 @inlined
 def arrive(constants: Constants, lanes: LaneState) -> None:
-    """Updates the modes for the state, computes the forces, and adds them to the tally."""
+    """Computes modes and forces at the beginning of the step, and adds them to the tally."""
     robot, forces, state = constants.robot, lanes.forces, lanes.step.state
     move_robot(robot, state, forces)
     for i in range(lanes.drives.shape[0]):
@@ -270,7 +270,7 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def fate(constants: Constants, lanes: LaneState) -> Real:
-    """Status of each lane after a step, computed as if all lanes were running."""
+    """Status of each lane after a step. Lanes that do not run have one, too."""
     state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):
@@ -313,7 +313,7 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
 
 @inlined
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
-    """Writes the inputs of a live network at a time (s), from a state and its forces."""
+    """Writes the inputs of a live network at a time (s): the tonic input and the feedback."""
     steer(constants, lanes, log, time / constants.period[0])
     sense(constants.senses, constants.gains, state, lanes.modes, lanes.forces, lanes.inputs)
     for i in range(lanes.inputs.size):
@@ -403,7 +403,7 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
 
 @inlined
 def next_mark(log: Log, place: int, time: float) -> float:
-    """Time (s) of the next mark of a simulation at a time (s): a pause is one, too."""
+    """Next time (s), after a time (s), at which a step of a simulation must end."""
     mark = min(log.marks[place, log.passed[place]], log.until[place])
     if log.change_ends[place] > time:
         mark = min(mark, log.change_ends[place])

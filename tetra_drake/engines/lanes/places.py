@@ -1,7 +1,8 @@
-"""Robots in places: they take turns in the lanes of the simulation loop.
+"""Tables of robots that take turns in the lanes of the simulation loop.
 
-A lane simulates a robot until its pause, or its failure. Then the robot goes back to its place, its
-readings are written, and the lane takes the next one that waits. So no lane waits for the slowest.
+A place is a row of the tables. A lane simulates a robot until its pause, or its failure. Then the
+robot goes back to its place, its readings are written, and the lane takes the next one that waits.
+So no lane waits for the slowest.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ NEXT, LAST = range(2)
 
 
 class Places(NamedTuple):
-    """Robots in places; a row per place."""
+    """State and constants of each robot, and the queue of waiting robots; a row per robot."""
 
     states: Annotated[Table, "places", "numbers"]
     """The numbers of LaneState before `step.end`."""
@@ -45,7 +46,7 @@ class Places(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The numbers (numbers, lanes) of tables in lanes."""
+    """Numbers of the robots in the lanes, in the order of a row of `Places`."""
 
     states: Table
     constants: Table

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetra_drake.engines.lanes import loop
 from tetra_drake.engines.lanes.dynamics import Solver
 from tetra_drake.engines.lanes.loop import Constants, LaneState
 from tetra_drake.engines.lanes.tables import shared
@@ -24,7 +25,7 @@ from tetra_drake.scenario.engine_kinds import Compiled
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A driven robot, prepared for a lane. Its arrays have no lanes yet."""
+    """Driven robot in the form that the lanes need: constants and state of its kernels."""
 
     driven: DrivenRobot
     record: bool
@@ -87,6 +88,9 @@ class Prepared:
         kind = driven.is_live, shared(constants._replace(network=alike))
 
         start = allocate(LaneState, sizes)
+        start.clock[loop.STATUS], start.clock[loop.DUE] = loop.DONE, times[1]
+        start.clock[loop.PLANNED] = min(engine.look_ahead, engine.max_step)
+        start.clock[loop.SAMPLES] = len(driven.samples)
         start.tally.begins[0] = round(driven.steady_start, MARK_DECIMALS)
         start.step.state[:] = structure.initial_state
         start.modes[:] = robot.starting_modes
@@ -97,8 +101,8 @@ class Prepared:
         return cls(driven, record, times, turns, sizes, constants, kind, start)
 
     def like(self, driven: DrivenRobot) -> Prepared:
-        """As Prepared.of(driven), in less time if it is the same robot with another gait, or with
-        other first signals."""
+        """The same as Prepared.of(driven), in less time if it is the same robot with another gait
+        or other first signals."""
         robot, own = driven.robot, self.driven.robot
         is_alike = (
             type(driven) is type(self.driven)

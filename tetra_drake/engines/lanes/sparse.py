@@ -22,7 +22,7 @@ BLOCK = 6
 
 
 class Schedule(NamedTuple):
-    """Positions of the blocks of a system, for elimination and fill-in."""
+    """Positions of the blocks of a sparse matrix, in the order of elimination."""
 
     first: Table
     """Index of the first block of each body with a later body (bodies + 1,); the last number is the

@@ -1,4 +1,4 @@
-"""Tables in lanes: the numbers of NamedTuples in one table, with a column per lane."""
+"""Conversion of NamedTuples of arrays to tables in lanes, which have a column per robot."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from tetra_drake.kernels.lanes import FieldArray, lane_table
 
 
 def numbers_of(values: Any) -> np.ndarray:
-    """The real numbers of NamedTuples of arrays, in a row."""
+    """All real numbers of NamedTuples of arrays, in one row."""
     if isinstance(values, tuple):
         return np.concatenate([np.zeros(0), *map(numbers_of, values)])
     return values.ravel() if _is_real(values) else np.zeros(0)
 
 
 def shared(values: Any) -> Any:
-    """Everything of NamedTuples of arrays that lanes share: indices, truths, and the shapes of the
-    tables of real numbers."""
+    """Parts of NamedTuples of arrays that are the same in all lanes: indices, truths, and the
+    shapes of the tables of real numbers."""
     if isinstance(values, tuple):
         return tuple(map(shared, values))
     if not isinstance(values, np.ndarray):
@@ -27,9 +27,11 @@ def shared(values: Any) -> Any:
 
 
 def views(values: Any, numbers: np.ndarray, *, lanes: bool = False) -> Any:
-    """NamedTuples like `values`, with views of `numbers` (numbers, ...) in place of the arrays of
-    real numbers. With `lanes`, the views are fields of (numbers, lanes), and arrays of indices are
-    fields of copies. Other values stay as they are."""
+    """NamedTuples like `values` whose arrays of real numbers are views of `numbers`.
+
+    The first axis of `numbers` is in the order of numbers_of(). With `lanes`, its second axis is
+    the lanes: all arrays become fields of kernels, and arrays of indices are copied.
+    """
     first = 0
 
     def view(value: Any) -> Any:
@@ -47,7 +49,7 @@ def views(values: Any, numbers: np.ndarray, *, lanes: bool = False) -> Any:
 
 
 def numbered(values: Any) -> Any:
-    """NamedTuples like `values`, with the index of each number in numbers_of() in its place."""
+    """NamedTuples like `values` with the indices of the numbers in numbers_of()."""
     return views(values, np.arange(numbers_of(values).size, dtype=float))
 
 
