@@ -67,8 +67,7 @@ def swaying(actuation: Actuation, *, damping: float) -> Scenario:
 
 
 def trajectory_of(robot: Robot) -> xarray.Dataset:
-    gait = seeded_gait(robot.scenario)
-    walk = DrivenByGait.of(robot, gait)
+    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario))
     return engine_of(robot.scenario).simulate(walk, record=True).trajectory
 
 

@@ -9,7 +9,7 @@ import xarray
 from helpers.actuations import LIMITED
 from helpers.converged import shortly
 
-from tetra_drake.engines.mujoco import INSTALL, installed
+from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.laws.feedback import PATHWAYS
@@ -23,15 +23,11 @@ from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 
-NEEDS_MUJOCO = pytest.mark.skipif(not installed(), reason=INSTALL)
-MUJOCO = pytest.param("mujoco", marks=NEEDS_MUJOCO)
-
-
 WAVES = Command("waves", 0.1, 1.5 * np.sin(np.arange(10.0)[:, np.newaxis] + np.arange(8)))
 ROUGH = {"terrain": Rough(amplitude=2e-3, wavelength=0.1), "friction": Coulomb()}
 FEELS = {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)}
 WALKS = {
-    "thesis": ("thesis", {}, ["drake", "compiled"]),
+    "thesis": ("thesis", {}, ["drake", "compiled", *(["mujoco"] if installed() else [])]),
     "witnessed": ("thesis", {"engine": Drake(mode_changes="witness")}, ["drake"]),
     "rough": ("thesis", ROUGH, ["compiled"]),
     "feedback": ("thesis", FEELS, ["drake", "compiled"]),
@@ -42,8 +38,7 @@ WALKS = {
 
 @pytest.mark.parametrize(
     ("walk", "engine"),
-    [(walk, engine) for walk, (_, _, engines) in WALKS.items() for engine in engines]
-    + [pytest.param("thesis", "mujoco", marks=NEEDS_MUJOCO)],
+    [(walk, engine) for walk, (_, _, engines) in WALKS.items() for engine in engines],
 )
 def test_recording_and_watching_change_nothing(walk, engine):
     name, changes, _ = WALKS[walk]
@@ -83,11 +78,9 @@ def test_a_robot_follows_a_gait_or_a_command(scenario, what, key, refused):
         simulate(scenario, **{name: chosen[name] for name in what})
 
 
-@pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
 def test_the_path_is_that_of_the_trajectory(scenario, engine):
     beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3, 1, 6)]
-    changes = {"robot.offsets": beside, "engine": f"!{engine.capitalize()}"}
-    short = shortly(scenario, 1.0, **changes)
+    short = shortly(scenario, 1.0, **{"robot.offsets": beside, "engine": engine})
     result = simulate(scenario=short, gait=seeded_gait(short), record=True)
     path, whole = result.path, path_of_centre(result.trajectory, make_structure(short))
     assert path.times.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]

@@ -44,7 +44,6 @@ def wheels(strut: dict[str, Any] | None = None, **changes: object) -> Scenario:
     return shortly(scenario, 1.0, **{"friction": sure, "ground.stiffness": "100 kN/m"} | changes)
 
 
-@pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])
 @pytest.mark.parametrize("kind", ["balls", "cylinder"])
 def test_what_is_round_rolls_down_a_slope_by_its_inertia(engine, kind):
     # s = g sin(slope) t^2 / 2 / (1 + I / (m r^2)): I = 2/5 m r^2 of a ball, 1/2 of a cylinder.

@@ -18,13 +18,12 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
 
-BOTH = pytest.mark.parametrize("engine", ["drake", "compiled"])
+BOTH = pytest.mark.parametrize("engine", ["!Drake", "!Compiled"])
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
 
 def walk(scenario: Scenario, gait: Gait, engine: str | Compiled) -> xarray.Dataset:
-    kind = f"!{engine.capitalize()}" if isinstance(engine, str) else engine
-    return simulate(scenario.with_changes({"engine": kind}), gait, record=True).trajectory
+    return simulate(scenario.with_changes({"engine": engine}), gait, record=True).trajectory
 
 
 def mirrored(trajectory: xarray.Dataset) -> np.ndarray:
@@ -68,7 +67,7 @@ def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
     scenario = shortly(load_scenario("undulation"), 0.6, **changes)
     gait = dataclasses.replace(seeded_gait(scenario, 3), turn=0.4)
     # By default the compiled engine's two walks soon step differently, by rounding.
-    engine = CONVERGED["compiled"] if engine == "compiled" else engine
+    engine = CONVERGED["compiled"] if engine == "!Compiled" else engine
     one, other = walk(scenario, gait, engine), walk(scenario, image(gait, scenario), engine)
     np.testing.assert_allclose(mirrored(other), one.p_WN.values, atol=1e-8)
     assert np.abs(one.p_WB.sel(axis="y")).max() > 1e-4, "it goes to a side"
@@ -89,7 +88,7 @@ def test_each_feedback_changes_the_signals(scenario):
     short = shortly(scenario, 0.3, **live)
     gaits = [Gains(), *(Gains(**{pathway: 1.0}) for pathway in PATHWAYS)]
     none, *felt = (
-        walk(short, dataclasses.replace(seeded_gait(short), gains=gains), "compiled").signal
+        walk(short, dataclasses.replace(seeded_gait(short), gains=gains), "!Compiled").signal
         for gains in gaits
     )
     for signal in felt:

@@ -36,12 +36,8 @@ def test_no_shipped_scenario_compiles_anything(name):
         scenario = shortly(load_scenario(name), 0.05, engine=engine)
         result = simulate(scenario, seeded_gait(scenario), record=True)
         assert result.trajectory.tension.size > 0
-
-
-@pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("name", shipped_structures())
-def test_no_structure_compiles_anything_as_it_rests(name):
-    assert np.isfinite(Robot.of(load_scenario(name)).equilibrium.state).all()
+    if name in shipped_structures():
+        assert np.isfinite(Robot.of(scenario).equilibrium.state).all()
 
 
 @pytest.mark.usefixtures("compiled")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from helpers.converged import shortly
 
-from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.command import driven_robot
 from tetra_drake.robot.gait import seeded_gait
@@ -32,10 +31,7 @@ def similar(scenario: Scenario, length: float) -> Scenario:
     return scaled.with_sections(robot=scaled.robot.model_copy(update={"nodes": nodes}))
 
 
-@pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])
 def test_a_robot_of_another_size_moves_as_its_model(engine):
-    if engine == "!Mujoco" and not installed():
-        pytest.skip(INSTALL)
     changes = {"friction.stiffness": "0 N/m", "simulation.sample_period": "0.1 s"}
     prism = shortly(load_scenario("prism"), 2.5, engine=engine, **changes)
     robots = {length: similar(prism, length) for length in (1.0, 0.01, 10.0)}

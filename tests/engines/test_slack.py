@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.scenario import Scenario
 
 DROP, G = 0.5, 9.80665  # m until the tether of 1 m is taut, m/s^2
@@ -65,20 +64,3 @@ def test_a_loose_tether_neither_brakes_nor_pushes_a_falling_ball(engine, damping
     caught = solve_ivp(motion, (0.0, 1.0), [0.0, 0.0], t_eval=found.time.values, max_step=1e-3)
     np.testing.assert_allclose(1.5 - height, caught.y[0], atol=1e-3)
     assert max(map(pull, caught.y.T)) > 50.0
-
-
-def test_a_ball_on_an_elastic_tether_swings_by_its_equation_on_the_diagram():
-    tree = TETHER | {"offsets": [[0.0, 0.0, 0.0], [0.2, 0.1, -0.3]]}
-    scenario = scenario_of(tree, duration=5.0, engine="!Drake")
-    found = simulate(scenario, seeded_gait(scenario), record=True)
-    place = found.trajectory.p_WN.sel(node="ball") - [0.0, 0.0, 2.0]
-
-    def motion(time: float, y: np.ndarray) -> np.ndarray:
-        length = math.hypot(*y[:3])
-        pull = max(0.0, LINE["stiffness"] * (length - 1.0)) / length
-        return np.concatenate([y[3:], -pull * y[:3] - [0.0, 0.0, G]])
-
-    start, times = [*place.values[0], 0.0, 0.0, 0.0], found.trajectory.time.values
-    exact = solve_ivp(motion, (0.0, 5.0), start, t_eval=times, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(place, exact.y[:3].T, atol=3e-4)
-    assert np.ptp(exact.y[:3], axis=1).min() > 0.2

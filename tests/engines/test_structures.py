@@ -123,8 +123,9 @@ def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
     sides = [["outer bottom_left"], ["outer bottom_right"]]
     changes |= {"robot.tetrahedra": 2, "robot.actuation": sides}
     row = Robot.of(load_scenario("coulomb").with_changes(changes))
-    walks = {"robot": row_as_kind(row), "objective": {"speed": "1 s/in"}}
-    scenario = row.scenario.with_changes(walks)
+    scenario = row.scenario.with_changes(
+        {"robot": row_as_kind(row), "objective": {"speed": "1 s/m"}}
+    )
     gait = seeded_gait(scenario, 3)
     left, right = (simulate(scenario, gait, steering=turn).path.centre for turn in (0.6, -0.6))
     np.testing.assert_allclose(left * [1.0, -1.0, 1.0], right, atol=1e-5)
@@ -214,10 +215,7 @@ LOAD_ON_TWO_ROPES = {
 }
 
 
-@pytest.mark.parametrize("engine", ["!Compiled", "!Drake", "!Mujoco"])
 def test_parallel_cables_add_and_a_load_needs_no_strut(engine):
-    if engine == "!Mujoco" and not installed():
-        pytest.skip("MuJoCo is not installed")
     changes = {"engine": engine, "friction.stiffness": "0 N/m"}
     scenario = load_scenario("prism").with_changes(BRIEF | changes)
     scenario = scenario.with_sections(robot=StructureFile.model_validate(LOAD_ON_TWO_ROPES))

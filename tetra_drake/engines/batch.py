@@ -1,4 +1,4 @@
-"""Batches: robots side by side on an engine, each in a place of its own."""
+"""Batch: robots that an engine simulates side by side."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.structure import Structure
 
 if TYPE_CHECKING:
     import xarray
 
 
 class Viewer(Protocol):
-    """Observer that shows a simulation while it runs."""
+    """Display of a simulation while it runs."""
 
     def wants(self, time: float) -> bool:
         """True if the viewer needs the state at this time (s)."""
@@ -30,14 +31,16 @@ class Viewer(Protocol):
 
 
 class Batch:
-    """Robots side by side. A place without a robot is idle."""
+    """Robots that are simulated side by side. Each has a number, its place; a place may be idle."""
 
-    readings: Readings
-    """Readings of all robots at their last pause. At the start only the times are set."""
-    failures: list[SimulationFailure | None]
-    """Failure of the robot in each place; None if it has not failed."""
-    signals: int
-    """Number m of signals of each robot."""
+    def __init__(self, structure: Structure, places: int) -> None:
+        """Makes idle places for robots of a structure."""
+        self.readings = Readings.empty(structure, places)
+        """Readings of all robots at their last pause. At the start only the times are set."""
+        self.failures: list[SimulationFailure | None] = [None] * places
+        """Failure of the robot in each place; None if it has not failed."""
+        self.signals = structure.signals
+        """Number m of signals of each robot."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
         """Puts robots in the first places. Raises InputError if one does not fit."""
@@ -47,7 +50,8 @@ class Batch:
                 raise InputError(robot.name, f"robot {place}", problem)
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
-        """Puts a robot at its start. Returns False if its tables do not fit beside the others'.
+        """Puts a robot at its start in a place. Returns False if the robot is too different from
+        the first one: it has another structure, kind of law, or size.
 
         Raises InputError if the engine cannot simulate it, and SimulationFailure if it fails before
         its first step.
@@ -66,12 +70,12 @@ class Batch:
         Calls time_limit.check_time() often, which raises TimeBudgetExceeded.
 
         Args:
-            until: times (s), for each place (N,) or for all. A robot that is not before its time
+            until: times (s), for each place (N,) or for all. A robot that has reached its time
                 pauses.
             signals: signals (N, m) in N that controllers hold from now on. A change takes one
                 `cpg.listing_step`. A robot that pauses, or has a gait or a command, ignores them.
-            briefly: returns earlier: as soon as a robot has ended, or after some 30 ms. An engine
-                without lanes simulates at least one robot to its time.
+            briefly: returns as soon as a robot has ended, or after some 30 ms. An engine without
+                lanes ignores it.
 
         Raises:
             InputError: if an argument has another shape.
@@ -91,8 +95,8 @@ class Batch:
         raise NotImplementedError
 
     def result(self, place: int) -> SimulationResult:
-        """The result of the robot in a place, at the end of its simulation. Raises its failure if
-        it failed, and InputError if it has not ended."""
+        """The result of a robot that has ended. Raises its failure if it failed, and InputError if
+        it has not ended."""
         if failure := self.failures[place]:
             raise failure
         if not self.ended(place):
@@ -103,20 +107,20 @@ class Batch:
         raise NotImplementedError
 
     def copy(self, place: int, to: int) -> None:
-        """Makes the robot in place `to` a copy of the one in `place`: it goes on as that one
-        does."""
+        """Replaces the robot in place `to` by a copy of the one in `place`."""
         raise NotImplementedError
 
     def stop(self, place: int) -> float:
-        """Empties a place, which then has no failure. Returns the wall time of its robot in s."""
+        """Removes the robot of a place, and its failure. Returns its wall time (s)."""
         raise NotImplementedError
 
 
 class LoneRobot(Protocol):
-    """A robot that an engine without lanes simulates."""
+    """Robot that is simulated alone."""
 
     driven: DrivenRobot
     wall_time: float
+    """Time (s) that the simulation has taken."""
 
     def hold(self, signals: np.ndarray) -> None:
         """Sets the signals (m,) in N from now on."""
@@ -128,28 +132,30 @@ class LoneRobot(Protocol):
         """The readings of the robot now."""
 
     def result(self) -> SimulationResult:
-        """The result, at the end."""
+        """The result at the end of the simulation."""
 
     def copied(self) -> Self:
-        """A copy of the robot, which goes on by itself."""
+        """A copy that goes on independently."""
 
 
 class SerialBatch(Batch):
-    """Robots that an engine simulates one after another."""
+    """Robots that are simulated one after another."""
 
     def __init__(
         self, start: Callable[[DrivenRobot], LoneRobot], robots: Sequence[DrivenRobot], places: int
     ) -> None:
-        """Robots in the first of the places. `start` puts a robot at its start."""
-        self.readings = Readings.empty(robots[0].robot.structure, places)
-        self.failures, self.signals = [None] * places, robots[0].robot.structure.signals
-        self._start, self._sizes = start, _sizes(robots[0])
+        """Puts robots in the first of the places. `start` puts one at its start."""
+        super().__init__(robots[0].robot.structure, places)
+        self._start = start
         self._robots: list[LoneRobot | None] = [None] * places
         self._reached, self._ends = np.zeros(places), np.zeros(places)
         self._begin_all(robots)
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
-        if _sizes(robot) != self._sizes:
+        structure = robot.robot.structure
+        like, ours = Readings.empty(structure, 1), self.readings
+        fits = all(a.shape[1:] == b.shape[1:] for a, b in zip(like, ours, strict=True))
+        if structure.signals != self.signals or not fits:
             return False
         self._robots[place] = self._start(robot)
         self.failures[place], self.readings.time[place] = None, 0.0
@@ -198,8 +204,8 @@ class SerialBatch(Batch):
 def checked_numbers(
     given: npt.ArrayLike, *shapes: tuple[int, ...], source: str, key: str
 ) -> np.ndarray:
-    """Real numbers of one of these shapes, as floats. Raises InputError, naming source and key, for
-    anything else."""
+    """Real numbers of one of these shapes, as floats. Raises InputError, which names `source` and
+    `key`, for anything else."""
     found = ""
     with contextlib.suppress(TypeError, ValueError):
         numbers = np.asarray(given)
@@ -209,10 +215,3 @@ def checked_numbers(
             found = f"the shape {numbers.shape}"
     problem = f"found {found or repr(given):.60}, expected real numbers of shape {shapes[0]}"
     raise InputError(source, key, problem)
-
-
-def _sizes(robot: DrivenRobot) -> tuple[int, ...]:
-    """Sizes of a robot's signals and readings."""
-    structure = robot.robot.structure
-    contacts, nodes = len(structure.contacts), len(structure.node_names)
-    return structure.signals, len(structure.cables), contacts, len(structure.bodies), nodes

@@ -1,4 +1,4 @@
-"""Engine `drake`: one gait in one Drake diagram, with error-controlled integration."""
+"""Engine `drake`: one robot in one Drake diagram, with error-controlled integration."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from pydrake.systems.framework import Context, Diagram
 from tetra_drake.engines.batch import LoneRobot, Viewer
 from tetra_drake.engines.engine import Engine
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.sampler import Sampler, drives_of, frame_of
+from tetra_drake.engines.sampler import Sampler, drives_at, frame_of
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.kernels.allocation import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
@@ -56,7 +57,7 @@ FINEST, COARSEST = 2e-5, 5e-3
 
 
 class DrakeEngine(Engine):
-    """Engine that simulates the Drake diagram, one robot at a time."""
+    """Engine `drake`: simulates the Drake diagram of one robot at a time."""
 
     can_be_watched, has_threads = True, False
 
@@ -65,7 +66,7 @@ class DrakeEngine(Engine):
 
 
 class _DiagramRobot(LoneRobot):
-    """A robot in a diagram of its own. Given signals are held by a system in place of a network."""
+    """Robot in a diagram of its own. Without a gait, a system holds given signals."""
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self.driven, self._record, self._viewer = driven, record, viewer
@@ -77,7 +78,7 @@ class _DiagramRobot(LoneRobot):
         self._diagram, self._engine = diagram, engine
         self._simulator = MakeSimulator(diagram, robot, engine)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
-        self._drives_at, self._observer = drives_of(diagram), Observer(driven)
+        self._observer = Observer(driven)
         self._work = _Work(self._simulator.get_integrator())
         self._aimer = _StepAimer(diagram, self._simulator, engine, self._work)
         times = motion_times(robot.scenario.simulation, record=record)
@@ -96,22 +97,19 @@ class _DiagramRobot(LoneRobot):
         if self._simulator.get_context().get_time() < self._change_end < time:
             stops.add(self._change_end)
         for stop in sorted(stops):
-            self._simulate_to(stop)
+            started = perf_counter()
+            try:
+                self._simulator.AdvanceTo(stop)
+            except SimulationFailure:
+                raise
+            except RuntimeError as error:
+                # Errors of Drake: the step became too small, or the state is not finite.
+                now, reason = self._simulator.get_context().get_time(), str(error).strip()
+                raise Diverged(time=now, reason=reason.splitlines()[0]) from error
+            finally:
+                self.wall_time += perf_counter() - started
             if stop in self._changes:
                 self.hold(self._changes[stop])
-
-    def _simulate_to(self, time: float) -> None:
-        started = perf_counter()
-        try:
-            self._simulator.AdvanceTo(time)
-        except SimulationFailure:
-            raise
-        except RuntimeError as error:
-            # Errors of Drake: the step became too small, or the state is not finite.
-            now, reason = self._simulator.get_context().get_time(), str(error).strip()
-            raise Diverged(time=now, reason=reason.splitlines()[0]) from error
-        finally:
-            self.wall_time += perf_counter() - started
 
     def hold(self, signals: np.ndarray) -> None:
         context = self._simulator.get_mutable_context()
@@ -142,10 +140,10 @@ class _DiagramRobot(LoneRobot):
         copy = _DiagramRobot(self.driven, record=self._record, viewer=self._viewer)
         copy._marks, copy._change_end = self._marks.copy(), self._change_end
         copy._held, copy.wall_time = self._held, self.wall_time
-        copy._work.follow(self._work)
+        copy._work.before = self._work.total()
         copy._aimer.follow(self._aimer)
         copy._sampler.follow(self._sampler)
-        copy._observer.follow(self._observer)
+        write_tables(copy._observer.tally, self._observer.tally)
         context = copy._simulator.get_mutable_context()
         context.SetTimeStateAndParametersFrom(self._simulator.get_context())
         parameters = InitializeParams()
@@ -158,7 +156,7 @@ class _DiagramRobot(LoneRobot):
         return make_result(
             self.driven,
             self._sampler.motion(),
-            totals=self._observer.totals(),
+            totals=self._observer.tally,
             work=self._work.total(self._engine.scheme, accuracy),
             wall_time=self.wall_time,
             record=self._record,
@@ -170,10 +168,16 @@ class _DiagramRobot(LoneRobot):
         robot, viewer = self.driven.robot, self._viewer
         bodies, now = self._state.Eval(context), context.get_time()
         velocities = bodies[7 * len(robot.structure.bodies) :]
-        self._check(now, velocities)
+        if not np.abs(velocities.reshape(-1, 6)[:, 3:]).max() <= self._speed_limit:
+            raise Diverged.too_fast(time=now, limit=self._speed_limit)
+        used, budget = self._work.evaluations(), robot.scenario.simulation.max_evaluations
+        if used > budget:
+            reason = f"{used} derivative evaluations, the budget is {budget}"
+            raise StepBudgetExceeded(time=now, reason=reason)
+
         self._aimer.aim(context, velocities)
         self._sampler.after_step(context)
-        signals, drives = [self._signals.Eval(context)], self._drives_at(context)
+        signals, drives = [self._signals.Eval(context)], drives_at(self._diagram, context)
         if now == self.driven.start_up and self._diagram.HasSubsystemNamed("cpg"):
             # The event that lets signals act is after this step.
             cpg = self._diagram.GetSubsystemByName("cpg")
@@ -184,20 +188,9 @@ class _DiagramRobot(LoneRobot):
         if viewer is not None and viewer.wants(now):
             viewer.show(frame_of(robot, self._diagram, context))
 
-    def _check(self, now: float, velocities: np.ndarray) -> None:
-        """Raises Diverged, if a body is beyond the speed limit, or StepBudgetExceeded."""
-        speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
-        used = self._work.derivative_evaluations()
-        budget = self.driven.robot.scenario.simulation.max_evaluations
-        if not speed <= self._speed_limit:
-            raise Diverged.too_fast(time=now, limit=self._speed_limit)
-        if used > budget:
-            reason = f"{used} derivative evaluations, the budget is {budget}"
-            raise StepBudgetExceeded(time=now, reason=reason)
-
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
-    """Simulator of a robot's diagram with these integrator settings."""
+    """Drake's Simulator of a robot's diagram, with the integrator settings of a scenario."""
     accuracy = settings.accuracy or default_accuracy(robot.structure)
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
@@ -223,42 +216,32 @@ def default_accuracy(structure: Structure) -> float:
 
 
 class _Work:
-    """Counter of an integrator's work. An integrator that is initialised again begins at zero;
-    this counter does not."""
+    """Steps and evaluations of an integrator. An integrator that is initialised again counts from
+    zero; this counter goes on, if its work so far is put into `before`."""
 
     def __init__(self, integrator: IntegratorBase) -> None:
         self._integrator = integrator
-        self._before = IntegratorWork(scheme="", accuracy=0.0, steps=0, derivative_evaluations=0)
+        self.before = IntegratorWork(scheme="", accuracy=0.0, steps=0, derivative_evaluations=0)
+        """Work before the integrator was initialised for the last time."""
 
     def total(self, scheme: str = "", accuracy: float = 0.0) -> IntegratorWork:
-        """The work in the whole simulation, with the settings."""
-        before, statistics = self._before, dict(self._integrator.GetStatisticsSummary())
+        before, statistics = self.before, dict(self._integrator.GetStatisticsSummary())
         for_jacobian = int(statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0))
         return IntegratorWork(
             scheme=scheme,
             accuracy=accuracy,
             steps=before.steps + self._integrator.get_num_steps_taken(),
-            derivative_evaluations=self.derivative_evaluations(),
+            derivative_evaluations=self.evaluations(),
             jacobian_evaluations=before.jacobian_evaluations + for_jacobian,
         )
 
-    def derivative_evaluations(self) -> int:
-        """Number of derivative evaluations of the whole simulation."""
-        earlier = self._before.derivative_evaluations
+    def evaluations(self) -> int:
+        earlier = self.before.derivative_evaluations
         return earlier + self._integrator.get_num_derivative_evaluations()
-
-    def follow(self, other: _Work) -> None:
-        """Continues another counter."""
-        self._before = other.total()
-
-    def keep(self) -> None:
-        """Adds the integrator's work so far to the counter. Call it before the integrator is
-        initialised again."""
-        self._before = self.total()
 
 
 class _StepAimer:
-    """Chooses the largest allowed length of the next step, by the time to the next mode change.
+    """Largest allowed length of the next step, by the time to the next mode change.
 
     | mode change             | longest step                                                    |
     |-------------------------|-----------------------------------------------------------------|
@@ -299,7 +282,7 @@ class _StepAimer:
         self._jacobian_is_old = False
 
     def follow(self, other: _StepAimer) -> None:
-        """Continues another aimer of the same robot."""
+        """Goes on where the aimer of a copied robot is."""
         self._last_time, self._last_velocities = other._last_time, other._last_velocities
         self._acceleration, self._longest = other._acceleration, other._longest
         self._jacobian_is_old = other._jacobian_is_old
@@ -326,22 +309,20 @@ class _StepAimer:
             self._longest, self._jacobian_is_old = _FIRST_STEP, True
         elif self._longest < self._settings.max_step:
             self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
-        step = min(longest, self._longest, self._step_towards(time_to_change))
+        look_ahead = self._settings.look_ahead
+        if _NEAR < time_to_change < self._settings.max_step:
+            aimed = _APPROACH * time_to_change
+        else:
+            margin = min(_AIM_BEYOND, 0.25 * look_ahead)
+            aimed = max(look_ahead, _AIM_FACTOR * time_to_change + margin)
+        step = min(longest, self._longest, aimed)
         if self._jacobian_is_old and step >= _RENEW_FROM:
-            self._work.keep()
+            self._work.before = self._work.total()
             # Initialize() needs a limit that allows the initial step, which is the longest.
             self._integrator.set_maximum_step_size(self._settings.max_step)
             self._integrator.Initialize()
             self._jacobian_is_old = False
         self._integrator.set_maximum_step_size(step)
-
-    def _step_towards(self, time_to_change: float) -> float:
-        """Length (s) of the step to a mode change that is predicted after `time_to_change` (s)."""
-        look_ahead = self._settings.look_ahead
-        if _NEAR < time_to_change < self._settings.max_step:
-            return _APPROACH * time_to_change
-        margin = min(_AIM_BEYOND, 0.25 * look_ahead)
-        return max(look_ahead, _AIM_FACTOR * time_to_change + margin)
 
 
 ENGINE = DrakeEngine()

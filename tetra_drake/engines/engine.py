@@ -1,8 +1,9 @@
-"""Interface of all engines; lookup of a scenario's engine."""
+"""Base class of the engines, and the choice of a scenario's engine."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 from collections.abc import Sequence
 from typing import ClassVar
@@ -20,7 +21,7 @@ _BRIEF = 0.01
 
 
 class Engine:
-    """Base class of engines. A subclass must implement alone() or start()."""
+    """Base class of engines, which simulate robots. Subclasses implement alone() or start()."""
 
     can_be_watched: ClassVar[bool] = False
     """True if start() accepts a viewer."""
@@ -51,7 +52,7 @@ class Engine:
         viewer: Viewer | None = None,
         threads: int = 1,
     ) -> Batch:
-        """A batch with robots at their start.
+        """Puts robots at their start, side by side.
 
         Args:
             robots: at least one robot; all have the same structure and kinds of laws.
@@ -64,14 +65,11 @@ class Engine:
             InputError: if the engine cannot simulate a robot.
             SimulationFailure: if a robot fails before its first step.
         """
-
-        def start(robot: DrivenRobot) -> LoneRobot:
-            return self.alone(robot, record=record, viewer=viewer)
-
+        start = functools.partial(self.alone, record=record, viewer=viewer)
         return SerialBatch(start, robots, places or len(robots))
 
     def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
-        """A robot at its start, which this engine simulates alone. Raises the errors of start()."""
+        """Puts one robot at its start. Raises the errors of start()."""
         raise NotImplementedError
 
     def simulate(
@@ -84,7 +82,7 @@ class Engine:
 
 
 def engine_of(scenario: Scenario) -> Engine:
-    """The engine of a scenario. The engine's module is imported on demand."""
+    """Engine of a scenario. The engine's module is imported on demand."""
     engine: Engine = importlib.import_module(scenario.engine.module).ENGINE
     return engine
 

@@ -61,14 +61,19 @@ def check_mjcf(scenario: Scenario) -> None:
 
 
 def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = False) -> str:
-    """Model of a robot with a tendon for each cable and a motor for each driven one. If actuators
-    bear the whole tension, tendons have no law, and a motor for each cable exerts its tension. With
-    `own_laws`, this is so wherever is_pulled() is true, and struts pass through each other: the
-    engine computes tensions and contacts by its own laws.
+    """MuJoCo's model of a robot, with a tendon for each cable and a motor for each driven one.
 
-    Motors are in the order of their cables; for their names see motor_names(). With a state
-    (13 bodies,) at `rest`, there is a key frame of this name. Raises InputError if MuJoCo does not
-    know the terrain or the friction.
+    If actuators bear the whole tension, tendons have no law: a motor for each cable exerts its
+    tension. Motors are in the order of their cables; for their names see motor_names().
+
+    Args:
+        robot: the robot at its start.
+        rest: state (13 bodies,) of a key frame of this name.
+        own_laws: for an engine that computes contacts of struts by its own law, and tensions where
+            is_pulled() is true.
+
+    Raises:
+        InputError: if MuJoCo does not know the terrain or the friction.
     """
     scenario = robot.scenario
     check_mjcf(scenario)
@@ -83,7 +88,11 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
         model.append(Comment(f" {remark} "))
     world = add_element(model, "worldbody")
     if scenario.terrain.is_ground:
-        _add_floor(world, robot)
+        slope = scenario.terrain.plane_slope or 0.0
+        pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
+        quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
+        floor = {"name": "floor", "type": "plane", "size": "0 0 1", "pos": pos, "quat": quat}
+        add_element(world, "geom", **floor, **_ALONE)
     structure = robot.structure
     for node in range(structure.first_node[-1], len(structure.node_names)):  # fixed nodes
         add_element(world, "site", name=structure.node_names[node], pos=structure.p_BN[node])
@@ -109,7 +118,7 @@ def is_pulled(robot: Robot) -> bool:
 
 
 def loose_remark(robot: Robot) -> str:
-    """What tendons do otherwise than the robot's cables; see tendon_faults()."""
+    """Differences between MuJoCo's tendons and the robot's cables; see tendon_faults()."""
     structure, remarks = robot.structure, []
     if not robot.scenario.actuation.keeps_spring:
         return ""
@@ -129,16 +138,6 @@ def integrator_of(robot: Robot, *, pulled: bool) -> str:
     """
     has_dampers = robot.structure.cables["damping"].any() and not pulled
     return "Euler" if has_dampers else "implicitfast"
-
-
-def _add_floor(world: Element, robot: Robot) -> None:
-    """Adds the floor: a plane, the first geom."""
-    slope = robot.scenario.terrain.plane_slope or 0.0
-    pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
-    quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
-    add_element(
-        world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE
-    )
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
@@ -245,8 +244,8 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
 
 
 def motor_names(structure: Structure) -> dict[str, str]:
-    """Names of the motors by their cables: the oscillator, and the cable too if the oscillator
-    drives several."""
+    """Names of the motors by their cables: names of oscillators. If an oscillator drives several
+    cables, the name of the cable is added."""
     names = {}
     for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
         for cable in (structure.cable_names[i] for i in group):

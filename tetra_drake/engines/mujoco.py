@@ -21,8 +21,9 @@ The ground must be a plane, level or inclined, or there is none.
 
 from __future__ import annotations
 
+import copy
 import math
-import time
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.kernels.allocation import write_tables
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws.actuator import DRIVE, DRIVE_COLUMNS, RATE
@@ -63,7 +65,7 @@ _STRETCH = 5000  # steps between two checks of stability
 
 
 class MujocoEngine(Engine):
-    """Engine that simulates with MuJoCo, in steps of `engine.step`.
+    """Engine `mujoco`: simulates with MuJoCo, in steps of `engine.step`.
 
     Other Python threads run meanwhile. Samples are taken at the nearest steps.
     """
@@ -101,7 +103,7 @@ def is_stable(robot: Robot, step: float) -> bool:
 
 
 def installed() -> bool:
-    """True if MuJoCo is installed, in a version with rollouts."""
+    """True if MuJoCo is installed in a version that this engine can use."""
     try:
         from mujoco.rollout import Rollout  # noqa: F401
     except ImportError:
@@ -109,68 +111,132 @@ def installed() -> bool:
     return True
 
 
-class _Simulator:
-    """MuJoCo's model of a robot, and its simulation."""
+class _MujocoRobot(LoneRobot):
+    """Robot in MuJoCo, simulated in stretches of steps."""
 
-    def __init__(self, driven: DrivenRobot) -> None:
+    def __init__(self, driven: DrivenRobot, *, record: bool) -> None:
+        """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
+        long, and InputError if MuJoCo refuses the robot."""
         import mujoco
 
+        self.driven, self._record, robot = driven, record, driven.robot
+        settings, self._step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
+        self._steps = max(1, round(settings.duration / self._step))
+        if self._steps > settings.max_evaluations:
+            reason = f"{self._steps} steps exceed the budget of {settings.max_evaluations}"
+            raise StepBudgetExceeded(time=0.0, reason=reason)
         if mujoco.get_mju_user_warning() is None:
             # Otherwise MuJoCo prints warnings of instability, also to a file in the working folder.
             # The handler is not restored, because other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
-        robot = driven.robot
-        self._robot = robot
-        self.pulled = is_pulled(robot)
-        """True if the law of the other engines computes the tensions at each step."""
-        self._touches = robot.model.strut_contact.acts
-        self.stepped = self.pulled or self._touches
-        """True if a law of the other engines computes forces at each step."""
+        self._pulled, self._touches = is_pulled(robot), robot.model.strut_contact.acts
         self._parts = Packed((robot.model, Forces.of(robot.model)))
-        model = make_mjcf(robot, own_laws=True)
         try:
-            self._model = mujoco.MjModel.from_xml_string(model)
+            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot, own_laws=True))
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
+        if not is_stable(robot, self._step):
+            problem = "is too long for the robot's springs or dampers"
+            raise Diverged(time=0.0, reason=f"engine.step, {self._step:g} s, {problem}")
         self._data = mujoco.MjData(self._model)
-        self._step = robot.scenario.settings_of(Mujoco).step
-        self._speed_limit = speed_limit(driven)
-        names = [robot.structure.node_names[node] for node in robot.structure.contacts]
-        self._contact_of_geom = {self._model.geom(name).id: i for i, name in enumerate(names)}
-        self._contacts = [self._model.site(name).id for name in names]
+        self._whole_state = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        self._state = np.empty(mujoco.mj_stateSize(self._model, self._whole_state))
+        mujoco.mj_getState(self._model, self._data, self._state, self._whole_state)
+        self._drives = robot.starting_drives()
+        self._speed_limit, self._observer = speed_limit(driven), Observer(driven)
         of_cables = robot.structure.cables["signal"]
         self._motors = of_cables[of_cables != PASSIVE]  # index of each motor's signal
 
-    def start(self) -> Array:
-        """MuJoCo's state at the start."""
-        kind = self._mujoco.mjtState.mjSTATE_FULLPHYSICS
-        state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
-        self._mujoco.mj_getState(self._model, self._mujoco.MjData(self._model), state, kind)
-        return state
+        self._times = motion_times(settings, record=record)
+        self._due = np.rint(self._times / self._step).astype(int)  # numbers of the sampled steps
+        count = len(self._times)
+        self._states_kept = np.tile(self._state, (count, 1))
+        self._signals_kept = np.zeros((count, robot.structure.signals))
+        self._drives_kept = np.tile(self._drives, (count, 1))
 
-    def roll_out(self, rollout: Any, state: Array, signals: Array) -> Array:
-        """MuJoCo's states (time, qpos, qvel) after each step from a state, with a row of signals
-        (steps, n) for each step."""
-        controls = np.zeros((len(signals), self._model.nu))  # 0 for anchors and loads
-        controls[:, : self._motors.size] = signals[:, self._motors]
-        (states,), _ = rollout.rollout(self._model, [self._data], state, controls)
-        return states
+        self._done, self.wall_time = 0, 0.0
+        self._before = self._held = robot.first_signals
+        self._is_held = False
+        self._began = self._paused = 0.0
 
-    def step_through(self, state: Array, signals: Array, drives: Array) -> tuple[Array, Array]:
-        """MuJoCo's states after each step from a state, as roll_out(), and the drives (steps,
-        drives) of the actuators. `drives` (drives,) are those at the state."""
+    def copied(self) -> _MujocoRobot:
+        copied = copy.copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, Array):
+                setattr(copied, name, value.copy())
+        copied._observer = Observer(self.driven)
+        write_tables(copied._observer.tally, self._observer.tally)
+        return copied
+
+    def hold(self, signals: Array) -> None:
+        self._before, self._held, self._began = self._held, signals.copy(), self._paused
+        self._is_held = True
+
+    def advance_to(self, time: float) -> None:
+        """Simulates the steps that begin before a time (s). Raises Diverged."""
+        from mujoco.rollout import Rollout
+
+        last = min(self._steps, math.ceil(time / self._step - 1e-6))
+        self._paused = time
+        signals = self._signals_at(self._step * np.arange(self._done, last + 1))
+        started = perf_counter()
+        if self._done == 0 and len(signals) > 1:
+            self._signals_kept[0] = signals[0]
+            start = self._body_states(self._states_kept[:1])
+            self._observer.add(np.zeros(1), start, signals[:1], self._drives[np.newaxis])
+        with Rollout(nthread=0) as rollout:
+            for first in range(0, len(signals) - 1, _STRETCH):
+                check_time()
+                some, after = signals[first:-1][:_STRETCH], signals[first + 1 :][:_STRETCH]
+                states, drives = self._stepped(rollout, some)
+                self._state, self._drives, done = states[-1], drives[-1], self._done
+                here = (done < self._due) & (self._due <= done + len(states))
+                rows = self._due[here] - done - 1
+                self._states_kept[here], self._signals_kept[here] = states[rows], after[rows]
+                self._drives_kept[here] = drives[rows]
+                times = self._step * np.arange(done + 1, done + len(states) + 1)
+                self._observer.add(times, self._body_states(states), after, drives)
+                v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
+                fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._speed_limit)
+                if fast.any():
+                    at = float(states[fast.argmax(), 0])
+                    raise Diverged.too_fast(time=at, limit=self._speed_limit)
+                # An unstable simulation starts again from time 0, or stops.
+                warned = np.abs(states[:, 0] - times) > 0.5 * self._step
+                if warned.any():
+                    at, reason = float(times[warned.argmax()]), "MuJoCo warns of instability"
+                    raise Diverged(time=at, reason=reason)
+                self._done += len(states)
+        self.wall_time += perf_counter() - started
+
+    def _signals_at(self, times: Array) -> Array:
+        """Signals (times, m) in N at times (s) after the latest pause."""
+        if not self._is_held:
+            return self.driven.signals_at(times)
+        change = self.driven.robot.scenario.cpg.listing_step
+        left = 1.0 - np.clip((times - self._began) / change, 0.0, 1.0)[:, np.newaxis]
+        return self._held - left * (self._held - self._before)
+
+    def _stepped(self, rollout: Any, signals: Array) -> tuple[Array, Array]:
+        """MuJoCo's states (time, qpos, qvel) and the drives (steps, drives) after each step, with a
+        row of signals (steps, n) for each step."""
         mujoco, model, data = self._mujoco, self._model, self._data
-        kind, drives = mujoco.mjtState.mjSTATE_FULLPHYSICS, drives.copy()
-        states = np.empty((len(signals), state.size))
+        if not (self._pulled or self._touches):
+            controls = np.zeros((len(signals), model.nu))  # 0 for anchors and loads
+            controls[:, : self._motors.size] = signals[:, self._motors]
+            (states,), _ = rollout.rollout(model, [data], self._state, controls)
+            return states, np.empty((len(states), 0))
+        drives = self._drives.copy()
+        states = np.empty((len(signals), self._state.size))
         all_drives = np.empty((len(signals), drives.size))
-        mujoco.mj_setState(model, data, state, kind)
+        mujoco.mj_setState(model, data, self._state, self._whole_state)
         for k, row in enumerate(signals):
             mujoco.mj_step1(model, data)
             self._push(data, row, drives, self._step)
             mujoco.mj_step2(model, data)
-            mujoco.mj_getState(model, data, states[k], kind)
+            mujoco.mj_getState(model, data, states[k], self._whole_state)
             all_drives[k] = drives
         return states, all_drives
 
@@ -183,27 +249,13 @@ class _Simulator:
             state = np.concatenate([poses.ravel(), np.hstack([turns, velocity[:, :3]]).ravel()])
             compute_strut_forces(self._parts, state, 0.0, force)
             data.xfrc_applied[1:] = np.roll(force.reshape(-1, 6), 3, axis=1)
-        if not self.pulled:
+        if not self._pulled:
             data.ctrl[: self._motors.size] = signals[self._motors]
             return
         lengths, rates = data.ten_length, data.ten_velocity
         pull_cables(self._parts, lengths, rates, signals, step, drives, data.ctrl[: lengths.size])
 
-    def check(self, states: Array, first: int) -> None:
-        """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
-        step `first` and the following ones."""
-        v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
-        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._speed_limit)
-        if fast.any():
-            raise Diverged.too_fast(time=float(states[fast.argmax(), 0]), limit=self._speed_limit)
-        # An unstable simulation starts again from time 0, or stops.
-        times = self._step * (first + 1.0 + np.arange(len(states)))
-        warned = np.abs(states[:, 0] - times) > 0.5 * self._step
-        if warned.any():
-            reason = "MuJoCo warns of instability"
-            raise Diverged(time=float(times[warned.argmax()]), reason=reason)
-
-    def body_states(self, states: Array) -> Array:
+    def _body_states(self, states: Array) -> Array:
         """States [q; v] (rows, 13 bodies) from MuJoCo's states. MuJoCo's angular velocities are in
         the body's frame."""
         rows, end = len(states), 1 + self._model.nq
@@ -215,124 +267,34 @@ class _Simulator:
         parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
-    def motion(self, times: Array, states: Array, signals: Array, drives: Array) -> Motion:
-        """Motion from MuJoCo's states at `times` (s), with their signals and drives."""
-        data = self._mujoco.MjData(self._model)
-        rows = zip(states, signals, drives, strict=True)
-        ground_forces = np.array([self._ground_forces(data, *row) for row in rows])
+    def _motion(self, times: Array, states: Array, signals: Array, drives: Array) -> Motion:
+        """Motion from MuJoCo's states at `times` (s), with MuJoCo's contact forces."""
+        mujoco, model, data = self._mujoco, self._model, self._mujoco.MjData(self._model)
+        ground, structure = self.driven.robot.ground, self.driven.robot.structure
+        names = [structure.node_names[node] for node in structure.contacts]
+        contact_of_geom = {model.geom(name).id: i for i, name in enumerate(names)}
+        sites, wrench = [model.site(name).id for name in names], np.zeros(6)
+        ground_forces = np.zeros((len(times), len(names), 3))  # along t1, t2 and n
+        for row, state in enumerate(states):
+            mujoco.mj_setState(model, data, state, self._whole_state)
+            mujoco.mj_step1(model, data)
+            self._push(data, signals[row], drives[row].copy(), 0.0)
+            mujoco.mj_forward(model, data)
+            forces = np.zeros((len(names), 3))
+            for i, contact in enumerate(data.contact):
+                mujoco.mj_contactForce(model, data, i, wrench)
+                node = contact_of_geom[contact.geom[1]]  # geom 0 is the floor
+                forces[node] += contact.frame.reshape(3, 3).T @ wrench[:3]
+            axes = ground_axes(data.site_xpos[sites], ground)
+            ground_forces[row] = (axes @ forces[:, :, None])[:, :, 0]
         modes = np.zeros((*ground_forces.shape[:2], MODE_COLUMNS))
         modes[:, :, CONTACT] = ground_forces[:, :, 2] > 0.0
-        return Motion(times, self.body_states(states), signals, modes, drives, ground_forces)
-
-    def _ground_forces(self, data: Any, state: Array, signals: Array, drives: Array) -> Array:
-        """MuJoCo's contact forces on the nodes along t1, t2 and n (contacts, 3), in N."""
-        mujoco, model = self._mujoco, self._model
-        mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        mujoco.mj_step1(model, data)
-        self._push(data, signals, drives.copy(), 0.0)
-        mujoco.mj_forward(model, data)
-        forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
-        for i, contact in enumerate(data.contact):
-            mujoco.mj_contactForce(model, data, i, wrench)
-            node = self._contact_of_geom[contact.geom[1]]  # geom 0 is the floor
-            forces[node] += contact.frame.reshape(3, 3).T @ wrench[:3]
-        nodes = data.site_xpos[self._contacts]
-        axes = ground_axes(nodes, self._robot.ground)
-        return (axes @ forces[:, :, None])[:, :, 0]
-
-
-class _MujocoRobot(LoneRobot):
-    """A robot in MuJoCo, which is simulated in stretches."""
-
-    def __init__(self, driven: DrivenRobot, *, record: bool) -> None:
-        """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
-        long."""
-        self.driven, self._record, robot = driven, record, driven.robot
-        settings, self.step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
-        self.steps = max(1, round(settings.duration / self.step))
-        if self.steps > settings.max_evaluations:
-            reason = f"{self.steps} steps exceed the budget of {settings.max_evaluations}"
-            raise StepBudgetExceeded(time=0.0, reason=reason)
-        self.times = motion_times(settings, record=record)
-        """Times (s) of the samples."""
-        self.signals = np.zeros((len(self.times), robot.structure.signals))
-        """Signals (times, m) in N of the samples."""
-        self._steps_kept = np.rint(self.times / self.step).astype(int)
-        self._simulator, self._observer = _Simulator(driven), Observer(driven)
-        if not is_stable(robot, self.step):
-            reason = f"engine.step, {self.step:g} s, is too long for the robot's springs or dampers"
-            raise Diverged(time=0.0, reason=reason)
-        self._state = self._simulator.start()
-        self._kept = np.tile(self._state, (len(self.times), 1))
-        self._drives = robot.starting_drives()
-        self._drives_kept = np.tile(self._drives, (len(self.times), 1))
-        self._done, self.wall_time = 0, 0.0
-        self._before = self._held = robot.first_signals
-        self._is_held = False
-        self._began = self._paused = 0.0
-
-    def copied(self) -> _MujocoRobot:
-        copy = _MujocoRobot(self.driven, record=self._record)
-        observer = copy._observer
-        observer.follow(self._observer)
-        own = {name: value.copy() for name, value in vars(self).items() if isinstance(value, Array)}
-        copy.__dict__.update(vars(self) | own | {"_observer": observer})
-        return copy
-
-    def hold(self, signals: Array) -> None:
-        self._before, self._held, self._began = self._held, signals.copy(), self._paused
-        self._is_held = True
-
-    def advance_to(self, time: float) -> None:
-        """Simulates the steps that begin before a time (s). Raises Diverged."""
-        last = min(self.steps, math.ceil(time / self.step - 1e-6))
-        self._paused = time
-        self.run(self._signals_at(self.step * np.arange(self._done, last + 1)))
-
-    def _signals_at(self, times: Array) -> Array:
-        """Signals (times, m) in N at times (s) after the latest pause."""
-        if not self._is_held:
-            return self.driven.signals_at(times)
-        change = self.driven.robot.scenario.cpg.listing_step
-        left = 1.0 - np.clip((times - self._began) / change, 0.0, 1.0)[:, np.newaxis]
-        return self._held - left * (self._held - self._before)
-
-    def run(self, signals: Array) -> None:
-        """Simulates steps with signals (steps + 1, m) in N at their beginnings and at the end of
-        the last. Raises Diverged."""
-        from mujoco.rollout import Rollout
-
-        started, simulator = time.perf_counter(), self._simulator
-        if self._done == 0 and len(signals) > 1:
-            self.signals[0] = signals[0]
-            start = simulator.body_states(self._kept[:1])
-            self._observer.add(np.zeros(1), start, signals[:1], self._drives[np.newaxis])
-        with Rollout(nthread=0) as rollout:
-            for first in range(0, len(signals) - 1, _STRETCH):
-                check_time()
-                some, after = signals[first:-1][:_STRETCH], signals[first + 1 :][:_STRETCH]
-                if simulator.stepped:
-                    states, drives = simulator.step_through(self._state, some, self._drives)
-                else:
-                    states = simulator.roll_out(rollout, self._state, some)
-                    drives = np.empty((len(states), 0))
-                self._state, self._drives, done = states[-1], drives[-1], self._done
-                here = (done < self._steps_kept) & (self._steps_kept <= done + len(states))
-                rows = self._steps_kept[here] - done - 1
-                self._kept[here], self.signals[here] = states[rows], after[rows]
-                self._drives_kept[here] = drives[rows]
-                times = self.step * np.arange(done + 1, done + len(states) + 1)
-                self._observer.add(times, simulator.body_states(states), after, drives)
-                simulator.check(states, done)
-                self._done += len(states)
-        self.wall_time += time.perf_counter() - started
+        return Motion(times, self._body_states(states), signals, modes, drives, ground_forces)
 
     def readings(self) -> Readings:
-        now = np.array([self.step * self._done])
+        now = np.array([self._step * self._done])
         signals = self._signals_at(now)
-        moment = self._simulator.motion(
-            now, self._state[np.newaxis], signals, self._drives[np.newaxis]
-        )
+        moment = self._motion(now, self._state[np.newaxis], signals, self._drives[np.newaxis])
         assert moment.ground_forces is not None
         return readings_at(
             self.driven.robot,
@@ -345,18 +307,18 @@ class _MujocoRobot(LoneRobot):
         )
 
     def result(self) -> SimulationResult:
-        robot, signals = self.driven.robot, self.signals
+        signals = self._signals_kept
         if not self._is_held:  # known at the times themselves
-            signals = self.driven.signals_at(self.times)
+            signals = self.driven.signals_at(self._times)
         return make_result(
             self.driven,
-            self._simulator.motion(self.times, self._kept, signals, self._drives_kept),
-            totals=self._observer.totals(),
+            self._motion(self._times, self._states_kept, signals, self._drives_kept),
+            totals=self._observer.tally,
             work=IntegratorWork(
-                scheme=integrator_of(robot, pulled=self._simulator.pulled),
-                accuracy=self.step,
-                steps=self.steps,
-                derivative_evaluations=self.steps,
+                scheme=integrator_of(self.driven.robot, pulled=self._pulled),
+                accuracy=self._step,
+                steps=self._steps,
+                derivative_evaluations=self._steps,
             ),
             wall_time=self.wall_time,
             record=self._record,
@@ -373,7 +335,7 @@ def pull_cables(
     drives: Array,
     tensions: Array,
 ) -> None:
-    """Writes the tensions (cables,) in N, and advances the drives (drives,) by a step (s).
+    """Writes the tensions (cables,) in N. Advances the drives (drives,) by a step (s).
 
     `lengths` (cables,) are in m, their `rates` in m/s, `signals` (n,) in N.
     """

@@ -1,4 +1,7 @@
-"""Observer of a Drake or MuJoCo simulation: computes the tally (see laws.tally) from states."""
+"""Sums over the steps of a Drake or MuJoCo simulation, such as work and lifted time.
+
+See laws.tally for the sums.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tetra_drake.kernels.allocation import write_tables
 from tetra_drake.kernels.compiling import compiled, machine_code
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.kernels.packed import Packed, unpacked
@@ -21,11 +23,11 @@ CLEARED = 16
 """Number of states from one computation of the clearance to the next, of states added at once."""
 
 TallyParts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
-"""A robot, its tally, and the memory for its forces."""
+"""Robot, tally, and memory for the forces."""
 
 
 class Observer:
-    """Observer that computes the tally of a simulation from its states.
+    """Sums over the steps of a simulation, such as work and lifted time, from its states.
 
     States are added in the order of time, beginning at t = 0. Observing does not change the
     simulation.
@@ -34,8 +36,9 @@ class Observer:
     def __init__(self, driven: DrivenRobot) -> None:
         robot = driven.robot
         model, signals = robot.model, robot.structure.signals
-        self._tally = Tally.of(model, signals=signals, begins=driven.steady_start)
-        self._parts = Packed((model, self._tally, Forces.of(model)))
+        self.tally = Tally.of(model, signals=signals, begins=driven.steady_start)
+        """The tally of all added states."""
+        self._parts = Packed((model, self.tally, Forces.of(model)))
         state, drives = robot.structure.initial_state, robot.starting_drives()
         one = np.zeros(1), state[np.newaxis], np.zeros((1, signals)), drives[np.newaxis]
         self._observe = machine_code(observe_states, self._parts, *one)
@@ -46,14 +49,6 @@ class Observer:
         """Adds states (k, 13 bodies), signals (k, m) in N, and drives (k, drives) at times (k,) in
         s."""
         self._observe(self._parts, times, states, signals, drives)
-
-    def follow(self, other: Observer) -> None:
-        """Continues the tally of another observer."""
-        write_tables(self._tally, other._tally)
-
-    def totals(self) -> Tally:
-        """The tally of all added states."""
-        return self._tally
 
 
 @compiled

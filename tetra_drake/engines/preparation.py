@@ -1,4 +1,4 @@
-"""Preparation: all kernels are compiled once, so that nothing later waits for the compiler.
+"""Compilation of all kernels in advance, so that nothing later waits for the compiler.
 
 A kernel is compiled for the types of its arguments. These are the same for all robots, scenarios
 and numbers of robots, so one short use of each kernel compiles it for all.
@@ -30,7 +30,7 @@ _NOWHERE = subprocess.DEVNULL
 
 
 def prepare(tell: Callable[[], None] = lambda: None) -> None:
-    """Compiles all kernels for this processor. Later runs reuse the machine code.
+    """Compiles the package's kernels for this processor. Later runs reuse the machine code.
 
         >>> td.prepare()
 
@@ -83,7 +83,7 @@ def _prepare_engine(name: str, changes: Mapping[str, Any]) -> None:
 
 
 class _Count(event.Listener):
-    """Listener that tells each compilation at its end."""
+    """Listener that calls a function at the end of each compilation."""
 
     def __init__(self, tell: Callable[[], None]) -> None:
         self._tell = tell

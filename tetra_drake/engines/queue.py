@@ -1,4 +1,4 @@
-"""Queue of simulations: several threads work it off, each with a batch that it keeps full."""
+"""Queue of simulations for several threads. Each thread keeps a batch full of them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
@@ -23,7 +23,7 @@ from tetra_drake.scenario.scenario import Scenario
 _GATHERING = 1e-3
 """Time (s) that an idle thread waits for a second simulation before it starts with one."""
 _ROBOTS = 32
-"""Size of the cache of robots."""
+"""Number of robots that are kept for further gaits on their scenarios."""
 
 
 @dataclass(eq=False)
@@ -36,8 +36,11 @@ class _Job:
 
 
 class SimulationQueue:
-    """Queue of gaits and commands. Each thread simulates as many as its engine has lanes. The end
-    of the `with` block cancels unfinished simulations."""
+    """Queue of gaits and commands that several threads simulate.
+
+    Each thread simulates as many side by side as its engine has lanes. The end of the `with` block
+    cancels unfinished simulations.
+    """
 
     def __init__(self, threads: int, *, record: bool = False) -> None:
         """Starts the threads. Raises InputError if `threads` is less than 1."""
@@ -47,7 +50,9 @@ class SimulationQueue:
         self._waiting: deque[_Job] = deque()
         self._changed = threading.Condition()
         self._closing = False
-        self._robots = _Robots()
+        self._robots: dict[int, Robot] = {}
+        """Robots by the id() of their scenario; the last used one is at the end."""
+        self._robots_lock = threading.Lock()
         self._threads = [threading.Thread(target=self._work, daemon=True) for _ in range(threads)]
         for thread in self._threads:
             thread.start()
@@ -80,8 +85,7 @@ class SimulationQueue:
         return [job.future for job in jobs]
 
     def _work(self) -> None:
-        """Main loop of a thread: fills idle places, simulates, sets results."""
-        crew = _Crew(self._robots, record=self._record)
+        crew = _Crew(self._driven, record=self._record)
         while (jobs := self._take(crew)) is not None:
             refused = [job for job in jobs if not crew.begin(job)]
             with self._changed:
@@ -108,62 +112,49 @@ class SimulationQueue:
                 count = min(share, lanes)
             return [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
 
-
-class _Robots:
-    """Cache of robots by scenario, shared by all threads."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._latest: dict[int, Robot] = {}
-        """Robots by the id() of their scenario; the last used one is at the end."""
-
-    def driven(self, job: _Job) -> DrivenRobot:
-        """The robot of a job."""
-        if not isinstance(job.driver, Gait):
-            return driven_robot(job.scenario, job.driver)
-        with self._lock:
-            scenario = job.scenario
-            robot = self._latest.pop(id(scenario), None) or Robot.of(scenario)
-            self._latest[id(scenario)] = robot  # keeps the scenario alive, so its id stays unique
-            if len(self._latest) > _ROBOTS:
-                del self._latest[next(iter(self._latest))]
-        return DrivenByGait.of(robot, job.driver)
+    def _driven(self, job: _Job) -> DrivenRobot:
+        """The robot of a job. Gaits on the same scenario share a robot."""
+        scenario, driver = job.scenario, job.driver
+        if not isinstance(driver, Gait):
+            return driven_robot(scenario, driver)
+        with self._robots_lock:
+            robot = self._robots.pop(id(scenario), None) or Robot.of(scenario)
+            self._robots[id(scenario)] = robot  # keeps the scenario alive, so its id stays unique
+            if len(self._robots) > _ROBOTS:
+                del self._robots[next(iter(self._robots))]
+        return DrivenByGait.of(robot, driver)
 
 
 class _Crew:
-    """Batch of one thread, and the jobs in it."""
+    """Simulations of one thread: a batch, and the jobs in its places."""
 
-    def __init__(self, robots: _Robots, *, record: bool) -> None:
+    def __init__(self, driven: Callable[[_Job], DrivenRobot], *, record: bool) -> None:
+        """`driven` makes the robot of a job."""
         self.jobs: dict[int, _Job] = {}
         """Jobs by place."""
         self.idle: list[int] = []
         """Places without a job."""
-        self._robots, self._record = robots, record
+        self._driven, self._record = driven, record
         self._engine: Engine | None = None
         self._batch: Batch | None = None
 
     def begin(self, job: _Job) -> bool:
         """Puts a job in an idle place. Returns False if it must wait until all places are idle."""
         try:
-            robot, engine = self._robots.driven(job), engine_of(job.scenario)
-            place = self._placed(robot, engine)
+            robot, engine = self._driven(job), engine_of(job.scenario)
+            if self._batch and engine is self._engine and self._batch.begin(self.idle[0], robot):
+                place = self.idle.pop(0)
+            elif self.jobs:
+                return False
+            else:
+                self._batch = engine.start([robot], places=engine.lanes, record=self._record)
+                self._engine, self.idle, place = engine, list(range(1, engine.lanes)), 0
         except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
             return True
-        if place is not None:
-            job.deadline = time.perf_counter() + job.time_budget
-            self.jobs[place] = job
-        return place is not None
-
-    def _placed(self, robot: DrivenRobot, engine: Engine) -> int | None:
-        """The place that a robot takes; None if it does not fit beside the others."""
-        if self._batch and engine is self._engine and self._batch.begin(self.idle[0], robot):
-            return self.idle.pop(0)
-        if self.jobs:
-            return None
-        self._batch = engine.start([robot], places=engine.lanes, record=self._record)
-        self._engine, self.idle = engine, list(range(1, engine.lanes))
-        return 0
+        job.deadline = time.perf_counter() + job.time_budget
+        self.jobs[place] = job
+        return True
 
     def advance(self) -> None:
         """Simulates for a short time, and removes finished jobs."""

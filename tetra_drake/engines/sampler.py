@@ -1,9 +1,8 @@
-"""Sampler of a Drake simulation: samples of its context at given times."""
+"""Sampler of a Drake simulation: motion of a robot's diagram at given times."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
@@ -17,30 +16,11 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Sample(NamedTuple):
-    """Content of a diagram's context at one time (s)."""
-
-    time: float
-    continuous: np.ndarray
-    """Continuous state: [q; v] of the bodies, then other state, such as a live network's."""
-    discrete: tuple[np.ndarray, ...]
-
-    @classmethod
-    def of(cls, context: Context) -> Sample:
-        """A copy of the content of a context."""
-        discrete = context.get_discrete_state()
-        return cls(
-            context.get_time(),
-            context.get_continuous_state_vector().CopyToVector(),
-            tuple(discrete.value(i).copy() for i in range(discrete.num_groups())),
-        )
-
-
 class Sampler:
-    """Takes samples at given times; steps of the simulation may end at other times.
+    """Samples of a simulation at given times, where no step has to end.
 
-    It copies the context and interpolates within a step. Forces and lengths are computed after the
-    simulation. So recording does not change the simulation.
+    States are interpolated within a step; modes are those at its end. Samples are taken in a
+    context of their own. So recording does not change the simulation.
     """
 
     def __init__(self, diagram: Diagram, times: np.ndarray, *, max_step: float) -> None:
@@ -48,76 +28,65 @@ class Sampler:
         self._diagram, self._times = diagram, times
         self._ahead = 2.0 * max_step  # Drake may stretch a step to reach its end
         self._bodies = slice(diagram.GetOutputPort("state").size())
-        self._samples: list[Sample] = []
-        self._latest: Sample | None = None
+        self._context = diagram.CreateDefaultContext()
+        self._samples: list[Motion] = []
+        self._latest: tuple[float, np.ndarray] | None = None
+        """Time (s) and continuous state at the end of the latest step."""
 
     def follow(self, other: Sampler) -> None:
-        """Continues the samples of another sampler."""
+        """Goes on with copies of another sampler's samples."""
         self._samples, self._latest = other._samples.copy(), other._latest
 
     def after_step(self, context: Context) -> None:
         """Takes the samples within the step that has just ended."""
         due = self._times[len(self._samples) :]
-        if due.size == 0 or due[0] > context.get_time() + self._ahead:
+        end = context.get_time()
+        if due.size == 0 or due[0] > end + self._ahead:
             self._latest = None  # no sample needs this state
             return
-        after = Sample.of(context)
-        before, self._latest = self._latest or after, after
-        for time in due:
-            if time > after.time:
-                return
-            self._samples.append(self._between(before, after, float(time)))
+        after = context.get_continuous_state_vector().CopyToVector()
+        start, before = self._latest or (end, after)
+        self._latest = end, after
+        for time in due[due <= end].tolist():
+            state = after
+            if time < end:
+                part, bodies = (time - start) / (end - start), self._bodies
+                state = before + part * (after - before)
+                ends = before[bodies], after[bodies]
+                state[bodies] = interpolate_state(*ends, end - start, part)
+            self._context.SetTimeStateAndParametersFrom(context)
+            self._context.SetTime(time)
+            self._context.SetContinuousState(state)
+            self._samples.append(motion_at(self._diagram, self._context))
 
     def motion(self) -> Motion:
         """The motion up to now, at the times of the samples."""
-        return motion_of(self._diagram, self._samples)
-
-    def _between(self, before: Sample, after: Sample, time: float) -> Sample:
-        """The sample at a time (s) within a step. Its discrete state is from the end of the
-        step."""
-        if time == after.time:
-            return after
-        step, bodies = after.time - before.time, self._bodies
-        part = (time - before.time) / step
-        state = before.continuous + part * (after.continuous - before.continuous)
-        ends = before.continuous[bodies], after.continuous[bodies]
-        state[bodies] = interpolate_state(*ends, step, part)
-        return Sample(time, state, after.discrete)
+        names = "times", "states", "signals", "modes", "drives"
+        columns = ([getattr(sample, name) for sample in self._samples] for name in names)
+        return Motion(*map(np.concatenate, columns))
 
 
-def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
-    """The motion that samples of a robot's diagram contain."""
-    state, signals = diagram.GetOutputPort("state"), diagram.GetOutputPort("signals")
-    context = diagram.CreateDefaultContext()
+def motion_at(diagram: Diagram, context: Context) -> Motion:
+    """Motion at a single time, from a robot's diagram in a context."""
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
-    drives_at = drives_of(diagram)
-    rows = []
-    for sample in samples:
-        context.SetTime(sample.time)
-        context.SetContinuousState(sample.continuous)
-        for group, values in enumerate(sample.discrete):
-            context.SetDiscreteState(group, values)
-        modes = ground.get_discrete_state_vector().CopyToVector().reshape(-1, MODE_COLUMNS)
-        row = {
-            "times": sample.time,
-            "states": state.Eval(context),
-            "signals": signals.Eval(context),
-            "modes": modes,
-            "drives": drives_at(context),
-        }
-        rows.append(row)
-    return Motion(**{name: np.array([row[name] for row in rows]) for name in rows[0]})
+    modes = ground.get_discrete_state_vector().CopyToVector().reshape(-1, MODE_COLUMNS)
+    return Motion(
+        times=np.array([context.get_time()]),
+        states=diagram.GetOutputPort("state").Eval(context)[np.newaxis],
+        signals=diagram.GetOutputPort("signals").Eval(context)[np.newaxis],
+        modes=modes[np.newaxis],
+        drives=drives_at(diagram, context)[np.newaxis],
+    )
 
 
 def frame_of(robot: Robot, diagram: Diagram, context: Context) -> xarray.Dataset:
-    """A trajectory of one sample: a robot's diagram in a context."""
-    return make_dataset(robot, motion_of(diagram, [Sample.of(context)]))
+    """Trajectory of a single sample: a robot's diagram in a context."""
+    return make_dataset(robot, motion_at(diagram, context))
 
 
-def drives_of(diagram: Diagram) -> Callable[[Context], np.ndarray]:
-    """Function that reads the drives (drives,) from a context of a robot's diagram. They are empty
-    without actuators."""
+def drives_at(diagram: Diagram, context: Context) -> np.ndarray:
+    """States of the actuators (drives,) of a robot's diagram in a context; empty without states."""
     if not diagram.HasOutputPort("drives"):
-        return lambda context: np.zeros(0)
-    evaluate: Callable[[Context], np.ndarray] = diagram.GetOutputPort("drives").Eval
-    return evaluate
+        return np.zeros(0)
+    drives: np.ndarray = diagram.GetOutputPort("drives").Eval(context)
+    return drives

@@ -1,14 +1,14 @@
-"""Simulation of gaits on the scenario's engine: `simulate`, `simulate_many`."""
+"""Simulation of gaits, commands and controllers on the engine of a scenario."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Future
 
 from tetra_drake.engines.batch import Viewer
 from tetra_drake.engines.engine import check_can_be_watched, engine_of
 from tetra_drake.engines.queue import SimulationQueue
-from tetra_drake.engines.simulation import Controller, simulate_controlled
+from tetra_drake.engines.simulation import Controller, Simulation
+from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
@@ -33,7 +33,7 @@ def simulate(
     viewer: Viewer | None = None,
     steering: SteeringSignal | float | None = None,
 ) -> SimulationResult:
-    """Simulates a gait, a command for actuators, or a controller, on a scenario.
+    """Simulates a robot that follows a gait, a command for its actuators, or a controller.
 
         >>> scenario = td.load_scenario("quick")
         >>> result = td.simulate(scenario, td.seeded_gait(scenario, 80), record=True)
@@ -68,9 +68,18 @@ def simulate(
     if controller is not None:
         if gait is not None or command is not None or steering is not None:
             raise InputError("simulate", "controller", "excludes a gait, a command, and steering")
-        return simulate_controlled(
-            scenario, controller, control_period=control_period, record=record, viewer=viewer
+        simulation = Simulation(
+            scenario,
+            control_period=control_period,
+            record=record,
+            viewer=viewer,
+            name=getattr(controller, "__name__", "controller"),
         )
+        while not simulation.ended[0]:
+            check_time()
+            readings = simulation.state.rows(0)
+            simulation.step(controller(float(readings.time), readings))
+        return simulation.result()
     if command is not None and (gait is not None or steering is not None):
         raise InputError("simulate", "command", "excludes a gait, and steering")
     given = gait if command is None else command
@@ -125,22 +134,20 @@ def simulate_many(
         threads = 1
     drivers = [_driver(gait, each) for gait, each in zip(gaits, scenarios, strict=True)]
     with SimulationQueue(threads, record=record) as queue:
-        results = queue.submit(zip(scenarios, drivers, strict=True))
-        return [*map(_outcome, results, scenarios, drivers)]
+        futures = queue.submit(zip(scenarios, drivers, strict=True))
+        outcomes: list[Outcome] = []
+        for future, each, driver in zip(futures, scenarios, drivers, strict=True):
+            try:
+                outcomes.append(future.result())
+            except SimulationFailure as failure:
+                failure.scenario, failure.name = each, driver.name
+                failure.gait = None if isinstance(driver, Command) else driver
+                outcomes.append(failure)
+        return outcomes
 
 
 def _driver(given: GivenGait | Command, scenario: Scenario) -> Driver:
     return given if isinstance(given, Command) else given_gait(given, scenario)
-
-
-def _outcome(result: Future[SimulationResult], scenario: Scenario, driver: Driver) -> Outcome:
-    """The result of a simulation, or its failure, which tells what was simulated."""
-    try:
-        return result.result()
-    except SimulationFailure as failure:
-        failure.scenario, failure.name = scenario, driver.name
-        failure.gait = None if isinstance(driver, Command) else driver
-        return failure
 
 
 def check_scenario(scenario: Scenario) -> None:

@@ -1,4 +1,4 @@
-"""Simulation of robots in control periods: `reset`, `step`, and their readings."""
+"""Simulation of robots in control periods: robots are reset, stepped, and read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from tetra_drake.engines.batch import Batch, Viewer, checked_numbers
 from tetra_drake.engines.engine import check_can_be_watched, engine_of
-from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.machine import threads_for
@@ -35,7 +34,7 @@ Controller = Callable[[float, Readings], npt.ArrayLike]
 
 
 class Simulation:
-    """Robots side by side that are advanced by control periods.
+    """Robots side by side that a program controls: it reads them and sets their actuators.
 
         >>> simulation = td.Simulation(td.load_scenario("quick"), count=4)
         >>> driven, readings = simulation.robot.driven, simulation.reset(seed=1)
@@ -67,7 +66,7 @@ class Simulation:
         workers: int | None = None,
         name: str = "controller",
     ) -> None:
-        """Robots at their start; see reset().
+        """Puts robots at their start; see reset().
 
         Args:
             scenario: a scenario, its name or file, or a run.
@@ -113,8 +112,10 @@ class Simulation:
 
     @property
     def failures(self) -> list[SimulationFailure | None]:
-        """Failure of each robot (N,): Diverged or StepBudgetExceeded; None if there is none. Its
-        readings are the last ones, and its actions have no effect, until it is reset."""
+        """Failure of each robot (N,): Diverged or StepBudgetExceeded; None if there is none.
+
+        A robot that has failed keeps its last readings and ignores actions until it is reset.
+        """
         return self._batch.failures
 
     @property
@@ -138,23 +139,41 @@ class Simulation:
         """Puts robots at their start, and returns the readings of all robots.
 
         Args:
-            seed: seed of the scenario's disturbances; each robot has a draw of its own. Or a seed
-                for each of the robots, which then have the draws of lone robots with these seeds.
-                None for robots without disturbances.
+            seed: seed of the scenario's disturbances, which are different for each robot. Or a
+                seed for each robot: it is disturbed like a robot alone with this seed. None for
+                robots without disturbances.
             indices: the robots; all by default.
 
         Raises:
             InputError: if the seed or an index is wrong.
         """
         places = self._places(indices)
-        is_whole = self._is_whole or len(set(places)) == self.count
-        with self._used("reset", is_whole=is_whole):
-            robots = self._drawn(seed, places)
+        given: Sequence[Any] = seed if is_list(seed) else [seed] * len(places)
+        if len(given) != len(places):
+            problem = f"found {len(given)} seeds, expected one, or one for each of {len(places)}"
+            raise InputError("Simulation", "seed", problem)
+        if seed is not None:
+            given = [check_whole("Simulation", "seed", each, least=0) for each in given]
+
+        with self._used("reset", is_whole=self._is_whole or len(set(places)) == self.count):
+            robots = [self.robot] * len(places)
+            if seed is not None and self.scenario.disturbances is not None:
+                numbers_of_robots = [0] * len(places) if is_list(seed) else places
+                seeds = zip(given, numbers_of_robots, strict=True)
+                draws = [draw_disturbances(self.scenario, each) for each in seeds]
+                robots = [controlled_robot(disturbed(self.scenario, draw)) for draw in draws]
             if not self._is_whole:
                 self._batch = self._new_batch()
             self._is_whole = False
             for place, robot in zip(places, robots, strict=True):
-                self._put(place, robot)
+                cables = robot.starting_cables()
+                for values, its in zip(self._law, cables.law, strict=True):
+                    values[place] = its
+                self.rest[place] = robot.scenario.actuation.commands(cables)
+                self._batch.stop(place)
+                self._robots[place], self._steps[place] = robot, 0
+                first = self._first_readings if robot is self.robot else first_readings(robot)
+                self._batch.readings.put(place, first)
             self._is_whole = True
             return self.state
 
@@ -178,18 +197,34 @@ class Simulation:
             goes = np.zeros(self.count, dtype=bool)
             goes[self._places(indices)] = True
             goes &= [failure is None for failure in self.failures]
-            signals = np.where(goes[:, np.newaxis], self._to_signals(actions, goes), 0.0)
-            until = self._ends_of_period(goes)
+            given = checked_actions(actions, self.rest.shape, source="Simulation")
+            if (bad := goes[:, np.newaxis] & ~np.isfinite(given)).any():
+                place, action = np.argwhere(bad)[0].tolist()
+                key = f"actions[{place}], {self.robot.structure.oscillators[action]}"
+                problem = f"found {given[place, action]}, expected a number"
+                raise InputError("Simulation", key, problem)
+            if (late := goes & self.ended).any():
+                end = f"the end at {self.scenario.simulation.duration:g} s"
+                problem = f"robot {late.argmax()} has reached {end}; reset it"
+                raise InputError("Simulation", "step", problem)
+
+            signals = np.asarray(self.scenario.actuation.signals(given, self._law))
+            signals = np.where(goes[:, np.newaxis], signals, 0.0)
             for place in np.flatnonzero(goes & (self._steps == 0)).tolist():
-                self._begin(place, signals[place].copy())
+                first_signals = signals[place].copy()
+                robot = dataclasses.replace(self._robots[place], first_signals=first_signals)
+                if not self._batch.begin(place, self._driven(robot)):
+                    has = "other kinds of laws, or more heights of its terrain"
+                    problem = f"a disturbed robot has {has}"
+                    raise InputError(self.scenario.name, "disturbances", problem)
             self._is_whole = False
-            self._batch.advance(until, signals)
+            self._batch.advance(np.where(goes, self._time_after(self._steps + 1), 0.0), signals)
             self._steps[goes] += 1
             self._is_whole = True
             return self.state
 
     def result(self, place: int = 0) -> SimulationResult:
-        """The result of a robot that has reached the end. Raises its failure if it failed, and
+        """Result of a robot that has reached the end. Raises its failure if it failed, and
         InputError if it has not ended."""
         (place,) = self._places([place])
         if not self.ended[place]:
@@ -205,8 +240,8 @@ class Simulation:
 
     @contextlib.contextmanager
     def _used(self, method: str, *, is_whole: bool | None = None) -> Iterator[None]:
-        """A block for which this thread alone uses the robots. Raises InputError, naming `method`,
-        if another one does, or if the robots are not whole."""
+        """Context manager: this thread alone uses the robots. Raises InputError, which names
+        `method`, if another thread does, or if a step of them was interrupted."""
         if not self._owner.acquire(blocking=False):
             problem = "another thread uses these robots; give each thread its own Simulation"
             raise InputError("Simulation", method, problem)
@@ -219,7 +254,6 @@ class Simulation:
             self._owner.release()
 
     def _new_batch(self) -> Batch:
-        """A batch of the scenario's engine for all robots."""
         first, engine = self._driven(self.robot), engine_of(self.scenario)
         return engine.start(
             [first],
@@ -233,66 +267,14 @@ class Simulation:
         samples = robot.first_signals[np.newaxis]
         return DrivenRobot(robot=robot, name=self._name, samples=samples)
 
-    def _begin(self, place: int, signals: np.ndarray) -> None:
-        """Lets a robot start with the signals (m,) in N of its first action."""
-        robot = dataclasses.replace(self._robots[place], first_signals=signals)
-        if not self._batch.begin(place, self._driven(robot)):
-            problem = "a disturbed robot has other kinds of laws, or more heights of its terrain"
-            raise InputError(self.scenario.name, "disturbances", problem)
-
-    def _drawn(self, seed: int | Sequence[int] | None, places: list[int]) -> list[Robot]:
-        """Some robots, with draws of the scenario's disturbances if there is a seed."""
-        given = seed if is_list(seed) else [seed] * len(places)
-        if len(given) != len(places):
-            problem = f"found {len(given)} seeds, expected one, or one for each of {len(places)}"
-            raise InputError("Simulation", "seed", problem)
-        if seed is not None:
-            given = [check_whole("Simulation", "seed", each, least=0) for each in given]
-        if seed is None or self.scenario.disturbances is None:
-            return [self.robot] * len(places)
-        numbers_of_robots = [0] * len(places) if is_list(seed) else places
-        seeds = zip(given, numbers_of_robots, strict=True)
-        draws = [draw_disturbances(self.scenario, each) for each in seeds]
-        return [controlled_robot(disturbed(self.scenario, draw)) for draw in draws]
-
-    def _put(self, place: int, robot: Robot) -> None:
-        """Puts a robot at its start."""
-        cables = robot.starting_cables()
-        for values, given in zip(self._law, cables.law, strict=True):
-            values[place] = given
-        self.rest[place] = robot.scenario.actuation.commands(cables)
-        self._batch.stop(place)
-        self._robots[place], self._steps[place] = robot, 0
-        first = self._first_readings if robot is self.robot else first_readings(robot)
-        self._batch.readings.put(place, first)
-
-    def _to_signals(self, actions: npt.ArrayLike, goes: np.ndarray) -> np.ndarray:
-        """Signals (N, m) in N of actions. Actions of robots that do not go may be anything."""
-        given = checked_actions(actions, self.rest.shape, source="Simulation")
-        bad = goes[:, np.newaxis] & ~np.isfinite(given)
-        if bad.any():
-            robot, action = np.argwhere(bad)[0].tolist()
-            key = f"actions[{robot}], {self.robot.structure.oscillators[action]}"
-            raise InputError("Simulation", key, f"found {given[robot, action]}, expected a number")
-        return np.asarray(self.scenario.actuation.signals(given, self._law))
-
     def _time_after(self, steps: np.ndarray) -> np.ndarray:
         """Time (N,) in s after a number of control periods (N,), at most the duration."""
         step, duration = self.scenario.cpg.listing_step, self.scenario.simulation.duration
         times = (step * (self._listing_steps * steps)).round(MARK_DECIMALS)
         return np.where(times > duration - 0.5 * step, duration, times)
 
-    def _ends_of_period(self, goes: np.ndarray) -> np.ndarray:
-        """Times (N,) in s at which the next control period ends; 0 for robots that do not go.
-        Raises InputError if a robot that goes has reached the end."""
-        duration = self.scenario.simulation.duration
-        if (late := goes & (self._time_after(self._steps) >= duration)).any():
-            problem = f"robot {late.argmax()} has reached the end at {duration:g} s"
-            raise InputError("Simulation", "step", f"{problem}; reset it")
-        return np.where(goes, self._time_after(self._steps + 1), 0.0)
-
     def _places(self, indices: Sequence[int] | np.ndarray | None) -> list[int]:
-        """The places of robots. Raises InputError for an index that is none."""
+        """Checked indices of robots. Raises InputError for an index without a robot."""
         if indices is None:
             return list(range(self.count))
         places = np.asarray(indices)
@@ -304,29 +286,15 @@ class Simulation:
 
 
 def is_list(values: object) -> TypeGuard[Sequence[Any]]:
-    """True for a list, a tuple, or an array of one dimension."""
+    """Whether a value is a list, a tuple, or an array of one dimension."""
     return isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim == 1)
 
 
 def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
-    """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, naming
-    `source`, if they have another shape, or are not real numbers."""
+    """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, which
+    names `source`, if they have another shape, or are not real numbers."""
     least = shape[1:] if shape[0] == 1 else shape
     return checked_numbers(actions, least, shape, source=source, key="actions").reshape(shape)
-
-
-def simulate_controlled(
-    scenario: Scenario, controller: Controller, **options: Any
-) -> SimulationResult:
-    """Simulates a robot that follows a controller, with options of Simulation. Raises the same
-    errors as simulate()."""
-    name = getattr(controller, "__name__", "controller")
-    simulation = Simulation(scenario, name=name, **options)
-    while not simulation.ended[0]:
-        check_time()
-        readings = simulation.state.rows(0)
-        simulation.step(controller(float(readings.time), readings))
-    return simulation.result()
 
 
 def _listing_steps(period: float | None, scenario: Scenario) -> int:

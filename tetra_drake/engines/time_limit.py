@@ -1,4 +1,4 @@
-"""Limit for the wall time of simulations, for engines without lanes; each thread has its own."""
+"""Limit for the wall time of simulations. Each thread has its own."""
 
 from __future__ import annotations
 

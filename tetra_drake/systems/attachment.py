@@ -1,4 +1,4 @@
-"""Attachment of forces to the bodies of a MultibodyPlant, whatever joins them.
+"""Attachment of forces to the bodies of a MultibodyPlant with any joints.
 
 Attached systems, such as CableNetwork, take the state of all bodies as if these were free, and give
 a torque and a force on each. If the bodies are free, these are the plant's own state and
@@ -27,9 +27,7 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     DiagramBuilder,
-    InputPort,
     LeafSystem,
-    OutputPort,
     System,
 )
 from pydrake.systems.primitives import Adder
@@ -39,7 +37,7 @@ from tetra_drake.laws.model import WORLD
 
 
 class Nodes(NamedTuple):
-    """Nodes at the origins of a plant's frames, in the form of the kernels."""
+    """Nodes at the origins of a plant's frames, in tables that kernels read."""
 
     p_BN: np.ndarray
     """Positions (nodes, 3) in the frames of the bodies, in the order of the bodies; then positions
@@ -55,9 +53,13 @@ class Nodes(NamedTuple):
     @classmethod
     def of(cls, plant: MultibodyPlant, frames: Iterable[Frame]) -> Self:
         """The nodes at frames of a finalized plant; a frame may occur several times."""
-        by_index = {frame.index(): frame for frame in frames}
-        ordered = sorted(by_index.values(), key=_place)
-        carriers = np.array([_number(frame.body()) for frame in ordered], dtype=np.int64)
+        # The world is a plant's first body, and its nodes are the last ones.
+        places = {}
+        for frame in frames:
+            body = int(frame.body().index()) + WORLD
+            places[body == WORLD, body, int(frame.index())] = frame
+        ordered = [places[place] for place in sorted(places)]
+        carriers = np.array([body for _, body, _ in sorted(places)], dtype=np.int64)
         counts = np.bincount(carriers[carriers != WORLD], minlength=plant.num_bodies() - 1)
         p_BN = [frame.GetFixedPoseInBodyFrame().translation() for frame in ordered]
         return cls(
@@ -66,17 +68,6 @@ class Nodes(NamedTuple):
             carriers=carriers,
             of_frame={frame.index(): node for node, frame in enumerate(ordered)},
         )
-
-
-def _place(frame: Frame) -> tuple[bool, int, int]:
-    """Place of a frame's node: by body, the world last, then by frame."""
-    body = _number(frame.body())
-    return body == WORLD, body, int(frame.index())
-
-
-def _number(body: RigidBody) -> int:
-    """Index of a body without the world; WORLD for the world, which is a plant's first body."""
-    return int(body.index()) + WORLD
 
 
 class BodyStates(LeafSystem):
@@ -107,7 +98,7 @@ class BodyStates(LeafSystem):
 
 
 class BodyForces(LeafSystem):
-    """Forces on the bodies of a plant, as the plant takes them. The system has no state.
+    """Forces on the bodies of a plant, as a list that the plant reads. The system has no state.
 
     | port              | shape  | unit   | meaning                                           |
     |-------------------|--------|--------|---------------------------------------------------|
@@ -127,23 +118,20 @@ class BodyForces(LeafSystem):
         )
 
     def _calc_forces(self, context: Context, output: AbstractValue) -> None:
-        forces = self._force.Eval(context).reshape(-1, 6)
-        acting = np.flatnonzero(forces.any(axis=1)).tolist()
-        output.set_value([_on_body(body, forces[body]) for body in acting])
-
-
-def _on_body(body: int, force: np.ndarray) -> ExternallyAppliedSpatialForce:
-    """A torque and a force (6,) on a body at its origin."""
-    applied = ExternallyAppliedSpatialForce()
-    applied.body_index, applied.F_Bq_W = BodyIndex(body - WORLD), SpatialForce(force)
-    return applied
+        forces, acting = self._force.Eval(context).reshape(-1, 6), []
+        for body in np.flatnonzero(forces.any(axis=1)).tolist():
+            applied = ExternallyAppliedSpatialForce()  # at the body's origin
+            applied.body_index = BodyIndex(body - WORLD)
+            applied.F_Bq_W = SpatialForce(forces[body])
+            acting.append(applied)
+        output.set_value(acting)
 
 
 def checked_numbers(
     source: str, key: str, given: npt.ArrayLike, *, count: int, least: float = -math.inf
 ) -> np.ndarray:
-    """Numbers (count,) from a number for all, or a number for each. Raises InputError that names
-    `source` and `key` unless they are finite and at least `least`."""
+    """Numbers (count,) from a number for all, or a number for each. Raises InputError, which names
+    `source` and `key`, unless they are finite and at least `least`."""
     found = np.full(count, np.nan)
     with contextlib.suppress(TypeError, ValueError):
         found[:] = given
@@ -155,8 +143,8 @@ def checked_numbers(
 
 
 def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None:
-    """Raises InputError that names `source` and `key` unless the constants of a law are numbers
-    that it can have: finite and not negative."""
+    """Raises InputError, which names `source` and `key`, unless the constants of a law are finite
+    numbers of 0 or more."""
     for name, value in constants.items():
         if not (isinstance(value, numbers.Real) and 0.0 <= float(value) < math.inf):
             problem = f"found {value!r:.60}, expected a number of 0 or more"
@@ -164,8 +152,8 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
 
 
 def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:
-    """Raises InputError that names `source` unless a system called `name` can be attached to a
-    plant: a finalized one of the builder, with a mass matrix that can be inverted."""
+    """Raises InputError, which names `source`, unless a system called `name` can be attached to a
+    plant of the builder: it must be finalized and have a mass matrix that can be inverted."""
     check_type(source, "builder", builder, DiagramBuilder)
     check_type(source, "name", name, str)
     if builder.already_built():
@@ -187,15 +175,15 @@ def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, n
 def check_part(
     source: str, key: str, builder: DiagramBuilder, system: System, kind: type[System]
 ) -> None:
-    """Raises InputError that names `source` and `key` unless a system is of a kind, and one of the
-    builder's."""
+    """Raises InputError, which names `source` and `key`, unless a system is of a class and in the
+    builder."""
     check_type(source, key, system, kind)
     if not any(part is system for part in builder.GetSystems()):
         raise InputError(source, key, "is no system of the builder; add it first")
 
 
 def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> None:
-    """Raises InputError that names `source` and `key` unless a frame is one of the plant's."""
+    """Raises InputError, which names `source` and `key`, unless a frame is in the plant."""
     check_type(source, key, frame, Frame)
     if frame.GetParentPlant() is not plant:
         raise InputError(source, key, f"found frame '{frame.name()}' of another plant")
@@ -204,55 +192,36 @@ def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> N
 
 
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:
-    """Connects a system with the ports `state` and `generalized_force` to a plant.
+    """Connects a system that exerts forces to a plant: its ports `state` and `generalized_force`.
 
     Its force is added to all forces that are connected to the plant before. The plant must be
     finalized.
     """
-    name, force = system.get_name(), system.GetOutputPort("generalized_force")
-    builder.Connect(BodyStatePort(builder, plant), system.GetInputPort("state"))
-    if _has_free_bodies(plant):
-        port = plant.get_applied_generalized_force_input_port()
-        _Add(builder, force, port, Adder(2, force.size()), name)
-        return
-    forces = builder.AddNamedSystem(f"forces_of_{name}", BodyForces(plant))
-    builder.Connect(force, forces.get_input_port())
-    port = plant.get_applied_spatial_force_input_port()
-    _Add(builder, forces.get_output_port(), port, ExternallyAppliedSpatialForceMultiplexer(2), name)
-
-
-def BodyStatePort(builder: DiagramBuilder, plant: MultibodyPlant) -> OutputPort:
-    """Port with the state [q; v] (13 n,) of the n bodies of a plant as if they were free."""
-    if _has_free_bodies(plant):
-        return plant.get_state_output_port()
-    name = f"bodies_of_{plant.get_name()}"
-    if builder.HasSubsystemNamed(name):
-        return builder.GetSubsystemByName(name).get_output_port()
-    states = builder.AddNamedSystem(name, BodyStates(plant))
-    builder.Connect(plant.get_body_poses_output_port(), states.get_input_port(0))
-    builder.Connect(plant.get_body_spatial_velocities_output_port(), states.get_input_port(1))
-    return states.get_output_port()
-
-
-def _has_free_bodies(plant: MultibodyPlant) -> bool:
-    """True if all bodies of a plant are free, and its state has them in their order."""
-    return all(
+    name, source = system.get_name(), system.GetOutputPort("generalized_force")
+    has_free_bodies = all(
         body.is_floating_base_body()
         and body.has_quaternion_dofs()
         and body.floating_positions_start() == 7 * number
         for number, body in enumerate(_bodies(plant))
     )
+    adder: System
+    if has_free_bodies:  # in the order of the state
+        state = plant.get_state_output_port()
+        port, adder = plant.get_applied_generalized_force_input_port(), Adder(2, source.size())
+    else:
+        bodies = f"bodies_of_{plant.get_name()}"
+        if not builder.HasSubsystemNamed(bodies):
+            states = builder.AddNamedSystem(bodies, BodyStates(plant))
+            builder.Connect(plant.get_body_poses_output_port(), states.get_input_port(0))
+            velocities = plant.get_body_spatial_velocities_output_port()
+            builder.Connect(velocities, states.get_input_port(1))
+        state = builder.GetSubsystemByName(bodies).get_output_port()
+        forces = builder.AddNamedSystem(f"forces_of_{name}", BodyForces(plant))
+        builder.Connect(source, forces.get_input_port())
+        source, port = forces.get_output_port(), plant.get_applied_spatial_force_input_port()
+        adder = ExternallyAppliedSpatialForceMultiplexer(2)
+    builder.Connect(state, system.GetInputPort("state"))
 
-
-def _bodies(plant: MultibodyPlant) -> list[RigidBody]:
-    """The bodies of a plant without the world."""
-    return [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]
-
-
-def _Add(
-    builder: DiagramBuilder, source: OutputPort, port: InputPort, adder: System, name: str
-) -> None:
-    """Adds a source to what is connected to a port."""
     earlier = builder.connection_map().get((port.get_system(), port.get_index()))
     if earlier is not None:
         before = earlier[0].get_output_port(earlier[1])
@@ -263,3 +232,7 @@ def _Add(
         builder.Connect(source, adder.get_input_port(1))
         source = adder.get_output_port()
     builder.Connect(source, port)
+
+
+def _bodies(plant: MultibodyPlant) -> list[RigidBody]:
+    return [plant.get_body(BodyIndex(i)) for i in range(1, plant.num_bodies())]

@@ -1,4 +1,4 @@
-"""Cables in a SceneGraph."""
+"""Display of cables in a SceneGraph."""
 
 from __future__ import annotations
 

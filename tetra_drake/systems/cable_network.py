@@ -1,4 +1,4 @@
-"""Cables between bodies of a plant as a LeafSystem."""
+"""Cables between bodies of a plant, as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _LEAST_LENGTH = 1e-9
 
 
 class CableNetwork(LeafSystem):
-    """Cables between the bodies (thesis Eq. 6). The system has no state.
+    """Cables between bodies (thesis Eq. 6). The system has no state.
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
@@ -93,20 +93,19 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
         self.DeclareVectorOutputPort("ends", 6 * count, self._calc_ends, motion)
 
-    def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
-        """The table `cable_forces`. Writes the generalized force to `force`, if given."""
-        if self._drives is not None:
+    def _table(
+        self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
+    ) -> np.ndarray:
+        """The table `cable_forces`. Writes the generalized force to `force`, if given.
+
+        With `moves_only`, the inputs other than the state are not read: only lengths and rates are
+        valid. Raises SimulationFailure if a number of a cable is not finite although the state is.
+        """
+        signals, force = self._no_signals, self._force if force is None else force
+        if self._drives is not None and not moves_only:
             self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
-        signals = self._no_signals if self._signals is None else self._signals.Eval(context)
-        return self._filled(context, signals, self._force if force is None else force)
-
-    def _moved(self, context: Context) -> np.ndarray:
-        """The table `cable_forces`; only lengths and rates are valid."""
-        return self._filled(context, self._no_signals, self._force)
-
-    def _filled(self, context: Context, signals: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """The table `cable_forces`. Writes the generalized force to `force`. Raises
-        SimulationFailure if a number of a cable is not finite although the state is."""
+        if self._signals is not None and not moves_only:
+            signals = self._signals.Eval(context)
         state, table = self._state.Eval(context), self._forces.cable_forces
         total = self._compute_forces(self._parts, state, signals, force)
         if math.isfinite(total) or not np.isfinite(state).all():
@@ -122,16 +121,16 @@ class CableNetwork(LeafSystem):
         output.SetFromVector(self._table(context)[:, cable.TENSION])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._moved(context)[:, cable.LENGTH])
+        output.SetFromVector(self._table(context, moves_only=True)[:, cable.LENGTH])
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._moved(context)[:, cable.RATE])
+        output.SetFromVector(self._table(context, moves_only=True)[:, cable.RATE])
 
     def _calc_table(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._table(context).ravel())
 
     def _calc_ends(self, context: Context, output: BasicVector) -> None:
-        self._moved(context)
+        self._table(context, moves_only=True)
         p_WN = self._forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
         output.SetFromVector(p_WN[self._ends].ravel())
 
@@ -240,7 +239,7 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
 def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
-    """Records of the cables, of dtype CABLE."""
+    """Records of the cables (cables,), of dtype CABLE. Raises InputError for a wrong `actuated`."""
     places = {one.name: place for place, one in enumerate(cables)}
     table = np.zeros(len(cables), dtype=cable.CABLE)
     table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]

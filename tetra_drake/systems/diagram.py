@@ -1,4 +1,4 @@
-"""Wiring of the robot as one Drake diagram, after the thesis's Simulink model (appendix C)."""
+"""Drake diagram of a robot, after the thesis's Simulink model (appendix C)."""
 
 from __future__ import annotations
 
@@ -89,11 +89,9 @@ def MakeTensegrityDiagram(
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    if controller is not None:
-        signals = _AddController(builder, controller, size=structure.signals)
-    elif gait is not None:
-        signals = _AddSignals(builder, robot, gait, steering).get_output_port()
-    else:
+    if gait is not None and controller is None:
+        signals = _AddSignals(builder, robot, gait, steering)
+    elif controller is None:
         raise InputError("MakeTensegrityDiagram", "gait", "is needed, or a controller")
     cables = AddCables(
         builder,
@@ -121,14 +119,15 @@ def MakeTensegrityDiagram(
         Attach(builder, plant, builder.AddNamedSystem("state_forces", StateForces(robot)))
 
     state = plant.get_state_output_port()
+    if controller is not None:
+        sources, size = (cables, ground), structure.signals
+        signals = _AddController(builder, controller, state, sources, size=size)
     if structure.signals:
         builder.Connect(signals, cables.GetInputPort("signals"))
     if builder.HasSubsystemNamed("cables_actuators"):
         actuators = builder.GetSubsystemByName("cables_actuators")
         builder.ExportOutput(actuators.get_output_port(), "drives")
-    if controller is not None:
-        _ConnectController(builder, controller, state, (cables, ground))
-    elif structure.signals and scenario.cpg.feedback:
+    if controller is None and structure.signals and scenario.cpg.feedback:
         assert gait is not None
         gains = [gain for _, gain in gait.gains]
         feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))
@@ -161,8 +160,16 @@ def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
     ]
 
 
-def _AddController(builder: DiagramBuilder, controller: System, *, size: int) -> OutputPort:
-    """Adds `controller`. Returns its port `signals`, and raises InputError if there is none."""
+def _AddController(
+    builder: DiagramBuilder,
+    controller: System,
+    state: OutputPort,
+    sources: Sequence[System],
+    *,
+    size: int,
+) -> OutputPort:
+    """Adds `controller`, with `state` and the ports of `sources` at its input ports of the same
+    names. Returns its port `signals`. Raises InputError for a port of another name or size."""
     if not controller.HasOutputPort("signals"):
         ports = map(controller.get_output_port, range(controller.num_output_ports()))
         found = ", ".join(port.get_name() for port in ports) or "no output ports"
@@ -171,28 +178,21 @@ def _AddController(builder: DiagramBuilder, controller: System, *, size: int) ->
     signals = controller.GetOutputPort("signals")
     _check_size(signals, size)
     builder.AddNamedSystem("controller", controller)
-    return signals
-
-
-def _ConnectController(
-    builder: DiagramBuilder, controller: System, state: OutputPort, sources: tuple[System, ...]
-) -> None:
-    """Connects the input ports of a controller to the output ports of the same names. Raises
-    InputError if there is none."""
     for i in range(controller.num_input_ports()):
         port = controller.get_input_port(i)
         name = port.get_name()
-        having = [source for source in sources if source.HasOutputPort(name)]
-        if name != "state" and not having:
+        given = [source.GetOutputPort(name) for source in sources if source.HasOutputPort(name)]
+        if name == "state":
+            given = [state]
+        if not given:
             problem = f"found the input port '{name}', expected a port of cables or ground"
             raise InputError("MakeTensegrityDiagram", "controller", problem)
-        given = state if name == "state" else having[0].GetOutputPort(name)
-        _check_size(port, given.size())
-        builder.Connect(given, port)
+        _check_size(port, given[0].size())
+        builder.Connect(given[0], port)
+    return signals
 
 
 def _check_size(port: InputPort | OutputPort, size: int) -> None:
-    """Raises InputError unless a port of a controller has a size."""
     if port.size() != size:
         problem = f"found size {port.size()} of port '{port.get_name()}', expected {size}"
         raise InputError("MakeTensegrityDiagram", "controller", problem)
@@ -200,39 +200,34 @@ def _check_size(port: InputPort | OutputPort, size: int) -> None:
 
 def _AddSignals(
     builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
-) -> System:
-    """Adds `start_up` and the systems before it. Its output port has the signals of the cables."""
-    size = robot.structure.signals
+) -> OutputPort:
+    """Adds `cpg`, and `start_up` behind it. Returns the port with the signals of the cables.
+
+    `cpg` is a live network with its `steering`, or a source of signals that were computed
+    beforehand.
+    """
+    cpg, size = robot.scenario.cpg, robot.structure.signals
     if not size:
-        return builder.AddNamedSystem("start_up", ConstantVectorSource(np.zeros(0)))
-    cpg = _AddCpg(builder, robot, gait, steering)
-    gate = StartUpGate(size, start_up=robot.scenario.cpg.start_up)
-    start_up = builder.AddNamedSystem("start_up", gate)
-    builder.Connect(cpg.get_output_port(0), start_up.get_input_port())
-    return start_up
-
-
-def _AddCpg(
-    builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
-) -> System:
-    """Adds `cpg`: a live network with its `steering`, or a source of signals that were computed
-    beforehand. Its first output port has the signals."""
-    cpg = robot.scenario.cpg
-    if cpg.signals != "live":
+        none = builder.AddNamedSystem("start_up", ConstantVectorSource(np.zeros(0)))
+        return none.get_output_port()
+    if cpg.signals == "live":
+        robot.turns(gait, steering)  # raises InputError for a wrong turn
+        network = MatsuokaCpg(
+            robot.network(gait),
+            tonic=cpg.external_input,
+            initial_state=initial_neurons(cpg, size),
+            gain=cpg.gain,
+        )
+        oscillators = builder.AddNamedSystem("cpg", network)
+        turn = gait.turn if steering is None else steering
+        steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))
+        builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
+        builder.ExportInput(steers.GetInputPort("turn"), "turn")
+    else:
         samples = signal_samples(robot, gait, steering)
         times = cpg.listing_step * np.arange(len(samples))
         source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
-        return builder.AddNamedSystem("cpg", source)
-    robot.turns(gait, steering)  # raises InputError for a wrong turn
-    neurons = MatsuokaCpg(
-        robot.network(gait),
-        tonic=cpg.external_input,
-        initial_state=initial_neurons(cpg, robot.structure.signals),
-        gain=cpg.gain,
-    )
-    oscillators = builder.AddNamedSystem("cpg", neurons)
-    turn = gait.turn if steering is None else steering
-    steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))
-    builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
-    builder.ExportInput(steers.GetInputPort("turn"), "turn")
-    return oscillators
+        oscillators = builder.AddNamedSystem("cpg", source)
+    start_up = builder.AddNamedSystem("start_up", StartUpGate(size, start_up=cpg.start_up))
+    builder.Connect(oscillators.get_output_port(0), start_up.get_input_port())
+    return start_up.get_output_port()

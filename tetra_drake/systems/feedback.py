@@ -1,4 +1,4 @@
-"""Feedback to the oscillators as a LeafSystem."""
+"""Feedback from the robot to its oscillators, as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from tetra_drake.robot.robot import Robot
 
 
 class Feedback(LeafSystem):
-    """Feedback from all that acts on a robot to its oscillators (see laws.feedback). It has no
-    state.
+    """Feedback from a robot's motion and contacts to its oscillators (see laws.feedback).
+
+    The system has no state.
 
     | port       | shape          | unit   | meaning                                           |
     |------------|----------------|--------|---------------------------------------------------|

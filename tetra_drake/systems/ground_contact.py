@@ -1,4 +1,4 @@
-"""Ground under bodies of a plant as a LeafSystem: normal forces and friction."""
+"""Ground under bodies of a plant, as a LeafSystem: normal forces and friction."""
 
 from __future__ import annotations
 
@@ -83,7 +83,13 @@ class GroundContact(LeafSystem):
         # The witness function has no event: it only ends the step, and the per-step update follows.
         # A bound method in place of the lambda would keep the system alive for ever.
         this, falls = weakref.proxy(self), WitnessFunctionDirection.kPositiveThenNonPositive
-        margin = self.MakeWitnessFunction("mode margin", falls, lambda c: this._margin(c))
+        margin = self.MakeWitnessFunction(
+            "mode margin",
+            falls,
+            lambda context: mode_margin(
+                this._parts, this._state.Eval(context), this._modes(context)
+            ),
+        )
         self._witnesses = [margin] if witness else []
         sources = {self._state.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
@@ -98,8 +104,9 @@ class GroundContact(LeafSystem):
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
     ) -> tuple[bool, float]:
-        """Predicts mode changes: True if a mode changes when a step ends here, and the time (s) to
-        the next change after that, at most `horizon` (s).
+        """Whether a mode changes if a step ends here, and the time (s) to the next change.
+
+        The time is at most `horizon` (s).
 
         `acceleration` (6 n,) is dv/dt of the bodies. The prediction assumes that the acceleration
         of each node is constant.
@@ -108,7 +115,7 @@ class GroundContact(LeafSystem):
         return self._next_change(self._parts, state, acceleration, modes, horizon)
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
-        """The witness function; none without `witness`."""
+        """Witness functions of the system: one with `witness`, otherwise none."""
         return self._witnesses
 
     def _modes(self, context: Context) -> np.ndarray:
@@ -126,9 +133,6 @@ class GroundContact(LeafSystem):
         if changed or (self._is_round and modes[:, contact.CONTACT].any()):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
-
-    def _margin(self, context: Context) -> float:
-        return mode_margin(self._parts, self._state.Eval(context), self._modes(context))
 
     def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
         """The table `ground_forces`. Writes the generalized force to `force`, if given."""
@@ -165,7 +169,7 @@ def AddGroundContact(
     witness: bool = False,
     name: str = "ground",
 ) -> GroundContact:
-    """Adds a ground that touches spheres about the origins of frames of a plant's bodies.
+    """Adds a ground under spheres at the origins of frames of a plant's bodies.
 
     The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is the
     radius of all spheres, or of each; the ground touches the origins themselves if it is 0.

@@ -1,4 +1,4 @@
-"""Controllers of a robot with signals that are held, as LeafSystems."""
+"""Controllers in discrete time, as LeafSystems: the signals are held between updates."""
 
 from __future__ import annotations
 
@@ -28,9 +28,6 @@ class HeldSignals(LeafSystem):
 
     | port          | shape         | unit | meaning                                               |
     |---------------|---------------|------|-------------------------------------------------------|
-    | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
-    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables      |
-    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground    |
     | signals       | (m,)          | N    | signals of the cables                                 |
 
     The signals change as the actions of engines.simulation.Simulation do: linearly, within one
@@ -42,29 +39,13 @@ class HeldSignals(LeafSystem):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
-        self._structure = structure = robot.structure
-        signals = structure.signals
-        cables, contacts = len(structure.cables), len(structure.contacts)
-        self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
-        self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
-        self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
-        self._change = robot.scenario.cpg.listing_step
+        self._size, self._change = robot.structure.signals, robot.scenario.cpg.listing_step
         self.DeclareDiscreteState(np.concatenate([robot.first_signals, robot.first_signals, [0.0]]))
         tickets = {self.xd_ticket(), self.time_ticket()}
-        self.DeclareVectorOutputPort("signals", signals, self._calc_signals, tickets)
-
-    def Read(self, context: Context) -> Readings:
-        """The readings of the robot."""
-        return Readings.of(
-            self._structure,
-            time=context.get_time(),
-            state=self._state.Eval(context),
-            cable_forces=self._cables.Eval(context).reshape(-1, CABLE_FORCE_COLUMNS),
-            ground_forces=self._ground.Eval(context).reshape(-1, GROUND_FORCE_COLUMNS),
-        )
+        self.DeclareVectorOutputPort("signals", self._size, self._calc_signals, tickets)
 
     def Hold(self, context: Context, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N, from now on."""
+        """Sets the signals (m,) in N from now on."""
         context.SetDiscreteState(self._state_from_now(context, signals))
 
     def _state_from_now(self, context: Context, signals: np.ndarray) -> np.ndarray:
@@ -74,9 +55,8 @@ class HeldSignals(LeafSystem):
         return np.concatenate([before, signals, [now]])
 
     def _signals(self, context: Context) -> np.ndarray:
-        """The signals (m,) in N now."""
-        state, signals = context.get_discrete_state_vector().value(), self._structure.signals
-        before, after = state[:signals], state[signals:-1]
+        state = context.get_discrete_state_vector().value()
+        before, after = state[: self._size], state[self._size : -1]
         left = 1.0 - (context.get_time() - state[-1]) / self._change
         return after - left * (after - before) if left > 0.0 else after
 
@@ -87,18 +67,36 @@ class HeldSignals(LeafSystem):
 class SampledController(HeldSignals):
     """Controller of a robot: a function that sets the held signals in each control period.
 
-    It has the ports of HeldSignals. The state is updated at multiples of the period, from t = 0 on.
-    Steps of the simulation also end where a change of the signals ends.
+    | port          | shape         | unit | meaning                                               |
+    |---------------|---------------|------|-------------------------------------------------------|
+    | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
+    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables      |
+    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground    |
+    | signals       | (m,)          | N    | signals of the cables; see HeldSignals                |
+
+    The state is updated at multiples of the period, from t = 0 on. Steps of the simulation also end
+    where a change of the signals ends.
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
         """`period` is in s."""
         super().__init__(robot)
-        self._law = law
+        self._law, self._structure = law, robot.structure
+        cables, contacts = len(robot.structure.cables), len(robot.structure.contacts)
+        self._state = self.DeclareVectorInputPort("state", 13 * len(robot.structure.bodies))
+        self._cables = self.DeclareVectorInputPort("cable_forces", CABLE_FORCE_COLUMNS * cables)
+        self._ground = self.DeclareVectorInputPort("ground_forces", GROUND_FORCE_COLUMNS * contacts)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
         self.DeclarePeriodicPublishEvent(period, self._change, lambda _: None)  # ends a step
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
-        signals = self._law(context.get_time(), self.Read(context))
-        values.set_value(self._state_from_now(context, np.asarray(signals, dtype=float)))
+        readings = Readings.of(
+            self._structure,
+            time=context.get_time(),
+            state=self._state.Eval(context),
+            cable_forces=self._cables.Eval(context).reshape(-1, CABLE_FORCE_COLUMNS),
+            ground_forces=self._ground.Eval(context).reshape(-1, GROUND_FORCE_COLUMNS),
+        )
+        signals = np.asarray(self._law(context.get_time(), readings), dtype=float)
+        values.set_value(self._state_from_now(context, signals))
         return EventStatus.Succeeded()

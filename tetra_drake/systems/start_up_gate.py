@@ -1,4 +1,4 @@
-"""Gate that keeps the actuation off until the start-up time, as a Diagram."""
+"""Switch that keeps the actuation off until the start-up time, as a Diagram."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LONGER_THAN_ANY_SIMULATION = 1e9  # s; the period of an event that happens once
 
 
 class StartUpGate(Diagram):
-    """Gate with zeros as output before the start-up time, and signals after it (listing B.1).
+    """Switch whose output is zero before the start-up time, and its input after it (listing B.1).
 
     | port    | shape | unit | meaning                       |
     |---------|-------|------|-------------------------------|

@@ -12,7 +12,7 @@ from tetra_drake.robot.robot import Robot
 
 
 class StateForces(LeafSystem):
-    """Forces between struts that touch, of anchors, and of constant loads. The system has no state.
+    """Forces of struts that touch, anchors, and constant loads. The system has no state.
 
     | port              | shape   | unit   | meaning                                 |
     |-------------------|---------|--------|-----------------------------------------|

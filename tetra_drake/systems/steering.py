@@ -1,4 +1,4 @@
-"""Steering as a LeafSystem."""
+"""Steering of the oscillators, as a LeafSystem."""
 
 from __future__ import annotations
 

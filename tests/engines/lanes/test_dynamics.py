@@ -46,6 +46,12 @@ def implicit_matrix_of(
     return stepper.matrix(modes, time)
 
 
+def stiffness_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> np.ndarray:
+    """The stiffness K (6 n, 6 n) in the implicit matrix M + t D + t² K."""
+    matrices = [implicit_matrix_of(robot, state, modes, time) for time in (0.0, 1.0, 2.0)]
+    return (matrices[2] - 2.0 * matrices[1] + matrices[0]) / 2.0
+
+
 def disturbed_robot(scenario: Scenario) -> tuple[Model, np.ndarray, np.ndarray]:
     """The robot, its state in motion with some nodes in the ground, and their modes."""
     whole = Robot.of(scenario)
@@ -153,10 +159,7 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
 
     columns = [forces_moved(m) - forces_moved(-m) for m in 1e-7 * np.eye(30)]
     jacobian = np.array(columns).T / 2e-7
-    # M + t D + t^2 K, at t = 0, 1, 2 s: the second difference is 2 K.
-    matrices = [implicit_matrix_of(robot, state, modes, time) for time in (0.0, 1.0, 2.0)]
-    stiffness = (matrices[2] - 2.0 * matrices[1] + matrices[0]) / 2.0
-    k = scenario.ground.stiffness
+    stiffness, k = stiffness_of(robot, state, modes), scenario.ground.stiffness
     assert stiffness.max() == pytest.approx(2.0 * k, rel=1e-6), "both feet of a body press"
     for body in range(5):
         place = slice(BLOCK * body, BLOCK * body + BLOCK)
@@ -167,9 +170,8 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
 
 def test_the_implicit_matrix_has_the_stiffness_of_anchors():
     robot, state, modes = held_robot()
-    matrices = [implicit_matrix_of(robot, state, modes, time) for time in (0.0, 1.0, 2.0)]
-    stiffness = (matrices[2] - 2.0 * matrices[1] + matrices[0]) / 2.0
-    damping = matrices[1] - matrices[0] - stiffness
+    stiffness = stiffness_of(robot, state, modes)
+    damping = damping_matrix_of(robot, state, modes)
     # The damping of an anchor is 1 ms times its stiffness; ropes have damping alone.
     anchors = robot.anchors._replace(stiffness=0.0 * robot.anchors.stiffness)
     without = robot._replace(anchors=anchors._replace(damping=anchors.stiffness))

@@ -13,7 +13,8 @@ import xarray
 from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.engines.lanes.batch import LaneBatch, processor_lanes
-from tetra_drake.engines.lanes.prepared import Prepared
+from tetra_drake.engines.lanes.dynamics import Solver
+from tetra_drake.engines.lanes.tables import shared
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
@@ -195,17 +196,14 @@ def test_robots_that_differ_in_numbers_alone_share_a_batch(short):
 
 def test_a_table_of_indices_that_somebody_adds_is_part_of_the_kind(short):
     """Else a kernel would take a robot whose indices lead elsewhere in its tables."""
-    walk = Prepared.of(walk_of(Robot.of(short)), record=False)
+    solver = Solver.of(Robot.of(short).model)
 
     class Added(NamedTuple):
         solver: object
         table: np.ndarray
 
-    def kind_with(index: int) -> object:
-        solver = Added(walk.constants.solver, np.array([index]))
-        return dataclasses.replace(walk, constants=walk.constants._replace(solver=solver)).kind
-
-    assert kind_with(1) == kind_with(1) != kind_with(2)
+    one, same, other = (shared(Added(solver, np.array([index]))) for index in (1, 1, 2))
+    assert one == same != other
 
 
 def test_scenarios_and_gaits_have_to_fit(short):

@@ -1,4 +1,8 @@
-"""Engine `compiled`: the same equations without Drake, with several robots in lanes."""
+"""Engine `compiled`: several robots side by side in the registers of each core, without Drake.
+
+A core of the processor simulates 4 or 8 robots at once, each in a lane. A batch may have more
+robots than there are lanes: each robot has a place in tables, and they take turns in the lanes.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from numba.core import registry
@@ -25,7 +30,6 @@ from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.lanes import FieldArray
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.actuator import DRIVE
-from tetra_drake.laws.oscillator import Network
 from tetra_drake.laws.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
@@ -40,85 +44,70 @@ FIRST = SurfaceGrid._fields.index("first")
 """Column of Ground.grid with the index of the first height. It differs between robots, because one
 table has the heights of all robots."""
 
+_SPARE_MARKS = 4
+"""Number of marks that a robot may have more than the first one in the same lanes."""
+
 _BODY_STEPS = 25_000
 """Iterations times bodies per call of the kernel, about 30 ms. Between calls Python handles signals
 of the operating system, and limits of time."""
 
 
 class LaneBatch(Batch):
-    """Robots in places. Threads take them into their lanes, and put them back when they pause."""
+    """Batch of the compiled engine. Threads simulate its robots in their lanes."""
 
     def __init__(
-        self, robots: Sequence[DrivenRobot], *, places: int, record: bool, threads: int
+        self,
+        robots: Sequence[DrivenRobot],
+        *,
+        places: int | None = None,
+        record: bool = False,
+        threads: int = 1,
     ) -> None:
-        """Robots in the first of the places. Compiles the kernel if necessary."""
+        """See Engine.start(). Compiles the kernel if necessary."""
+        places = places or len(robots)
         first = self._first = Prepared.of(robots[0], record=record)
-        self.readings = Readings.empty(first.robot.structure, places)
-        self.failures, self.signals = [None] * places, first.robot.structure.signals
+        super().__init__(first.driven.robot.structure, places)
         self._prepared: list[Prepared | None] = [None] * places
         self._ends, self._wall_times, self._tried = np.zeros((3, places))
         self._controlled = np.zeros(places, dtype=bool)
-        self._heights = np.zeros((places, first.robot.ground.heights.size))
         state, constants = numbered(first.start), numbered(first.constants)
         self._tally = int(state.tally.begins[0])
         self._first_height = int(constants.robot.ground.grid[FIRST])
-        sizes = first.log_sizes | {
+        self._sizes = first.sizes | {"marks": first.sizes["marks"] + _SPARE_MARKS}
+        sizes = self._sizes | {
             "places": places,
             "lanes": processor_lanes(),
             "numbers": int(state.step.end[0]),
             "constants": numbers_of(first.constants).size,
         }
         self._log, self._places = allocate(loop.Log, sizes), allocate(Places, sizes)
+        self._status = self._places.states[:, loop.STATUS]
+        self._times = self._places.states[:, loop.TIME]
+        self._heights = np.zeros((places, sizes["heights"]))
         tables = self._log, self._places, self._heights, self.readings
         self._threads = [LaneThread(first, *tables) for _ in range(min(threads, places))]
-        self._start_pool()
+        self._process: int | None = None
+        """The process that has started the pool of threads. A fork needs a pool of its own."""
         self._begin_all(robots)
 
-    def _start_pool(self) -> None:
-        """Starts a pool of threads for this process: a fork has none of its parent's."""
-        self._pool, self._process = ThreadPoolExecutor(len(self._threads)), os.getpid()
-
-    @property
-    def _status(self) -> np.ndarray:
-        """Status of the robot in each place; see loop."""
-        return self._places.states[:, loop.STATUS]
-
-    @property
-    def _times(self) -> np.ndarray:
-        """Time (s) of the robot in each place."""
-        return self._places.states[:, loop.TIME]
-
     def begin(self, place: int, robot: DrivenRobot) -> bool:
-        prepared = self._first if robot is self._first.driven else self._first.like(robot)
-        if not self._accepts(prepared):
+        first, log = self._first, self._log
+        prepared = first if robot is first.driven else first.like(robot)
+        fits = all(prepared.sizes[name] <= size for name, size in self._sizes.items())
+        if not fits or prepared.kind != first.kind:
             return False
-        self._load(place, prepared)
-        return True
-
-    def _accepts(self, prepared: Prepared) -> bool:
-        """True if a robot fits these tables: the same structure and kinds of laws as the first
-        robot, and no more samples, marks, turns or heights."""
-        log = self._log
-        return (
-            self._first.fits(prepared)
-            and len(prepared.times) < log.times.shape[1]
-            and len(prepared.driven.marks) < log.marks.shape[1]
-            and prepared.recent_signals <= log.recent.shape[1]
-            and len(prepared.turns) <= log.turns.shape[1]
-            and prepared.robot.ground.heights.size <= self._heights.shape[1]
-        )
-
-    def _load(self, place: int, prepared: Prepared) -> None:
-        """Puts a robot at its start."""
         self.stop(place)
-        log, start, heights = self._log, prepared.start, prepared.robot.ground.heights
+        start, heights = prepared.start, robot.robot.ground.heights
         constants, state = self._places.constants[place], self._places.states[place]
         constants[:] = numbers_of(prepared.constants)
         constants[self._first_height] = place * self._heights.shape[1]
         self._heights[place, : heights.size] = heights
-        for thread in self._threads:
-            thread.widen(prepared.constants.network)
-        marks, turns, samples = prepared.driven.marks, prepared.turns, prepared.driven.samples
+        network = prepared.constants.network
+        for thread in self._threads:  # one range of inhibiting neurons, the widest, for all lanes
+            thread.first[:] = np.minimum(thread.first, network.first)
+            thread.beyond[:] = np.maximum(thread.beyond, network.beyond)
+
+        marks, turns, samples = robot.marks, prepared.turns, robot.samples
         log.times[place] = log.marks[place] = math.inf
         log.times[place, : len(prepared.times)] = prepared.times
         log.marks[place, : len(marks)] = marks
@@ -128,16 +117,14 @@ class LaneBatch(Batch):
         log.recent[place, : len(samples)] = samples
         log.drives[place, 0] = start.drives[:, DRIVE]
         log.kept[place], log.passed[place], log.change_ends[place] = 1, 0, 0.0
+
         state[:] = numbers_of(start)[: state.size]
-        engine = prepared.robot.scenario.settings_of(Compiled)
-        state[loop.STATUS], state[loop.SAMPLES] = loop.DONE, len(samples)
-        state[loop.PLANNED] = min(engine.look_ahead, engine.max_step)
-        state[loop.DUE] = log.times[place, 1]
         self._places.signals[place], self._places.holds[place] = start.signals, 0
         self._prepared[place], self._ends[place] = prepared, marks[-1]
         self.readings.time[place] = 0.0
         self._wall_times[place] = self._tried[place] = 0.0
-        self._controlled[place] = prepared.driven.is_controlled
+        self._controlled[place] = robot.is_controlled
+        return True
 
     def stop(self, place: int) -> float:
         for thread in self._threads:
@@ -175,17 +162,13 @@ class LaneBatch(Batch):
         work = places.states[:, loop.TRIED] - self._tried
         self._tried += work
         longest_first = np.argsort(-work, kind="stable")  # so that the lanes end together
-        self._simulate(longest_first[goes[longest_first]], briefly=briefly)
-        for place in np.flatnonzero(self._status > loop.DONE).tolist():
-            self.failures[place] = self.failures[place] or self._failure(place)
+        waiting = longest_first[goes[longest_first]]
 
-    def _simulate(self, places: np.ndarray, *, briefly: bool) -> None:
-        """Lets robots go on, and simulates in all threads."""
         if self._process != os.getpid():
-            self._start_pool()
+            self._pool, self._process = ThreadPoolExecutor(len(self._threads)), os.getpid()
         first, *others = self._threads
         for i, thread in enumerate(self._threads):
-            thread.take(places[i :: len(self._threads)])
+            thread.waiting = [*thread.waiting, *waiting[i :: len(self._threads)]]
         simulate = functools.partial(
             LaneThread.simulate, wall_times=self._wall_times, briefly=briefly
         )
@@ -193,6 +176,8 @@ class LaneBatch(Batch):
         simulate(first)
         for other in started:
             other.result()
+        for place in np.flatnonzero(self._status > loop.DONE).tolist():
+            self.failures[place] = self.failures[place] or self._failure(place)
 
     def ended(self, place: int) -> bool:
         if self._status[place] == loop.DONE:
@@ -208,7 +193,7 @@ class LaneBatch(Batch):
             totals=views(prepared.start.tally, state[self._tally :]),
             work=IntegratorWork(
                 scheme="ros2",
-                accuracy=prepared.robot.scenario.settings_of(Compiled).tolerance,
+                accuracy=prepared.driven.robot.scenario.settings_of(Compiled).tolerance,
                 steps=int(state[loop.TAKEN]),
                 derivative_evaluations=loop.EVALUATIONS * int(state[loop.TRIED]),
             ),
@@ -217,24 +202,17 @@ class LaneBatch(Batch):
         )
 
     def motion(self, place: int) -> Motion:
-        """Samples of the latest simulation in a place, up to now."""
-        log = self._log
-        kept = slice(log.kept[place])
-        return Motion(
-            times=log.times[place, kept].copy(),
-            states=log.states[place, kept].copy(),
-            signals=log.signals[place, kept].copy(),
-            modes=log.modes[place, kept].copy(),
-            drives=log.drives[place, kept].copy(),
-        )
+        """Samples of the robot in a place, up to now."""
+        log, kept = self._log, slice(self._log.kept[place])
+        tables = log.times, log.states, log.signals, log.modes, log.drives
+        return Motion(*(table[place, kept].copy() for table in tables))
 
     def _failure(self, place: int) -> SimulationFailure:
-        """The failure of the robot in a place, by its status."""
         prepared, time = self._prepared[place], float(self._times[place])
         assert prepared is not None
         failure: SimulationFailure
         if self._status[place] == loop.TOO_MANY_EVALUATIONS:
-            budget = prepared.robot.scenario.simulation.max_evaluations
+            budget = prepared.driven.robot.scenario.simulation.max_evaluations
             reason = f"force evaluations exceed the budget of {budget}"
             failure = StepBudgetExceeded(time=time, reason=reason)
         elif self._status[place] == loop.TOO_FAST:
@@ -247,7 +225,7 @@ class LaneBatch(Batch):
 
 
 class LaneThread:
-    """Lanes of one thread, and its queue of robots that wait for a lane."""
+    """Lanes of one thread, and the queue of the robots that wait for one of them."""
 
     def __init__(
         self,
@@ -257,45 +235,55 @@ class LaneThread:
         heights: np.ndarray,
         readings: Readings,
     ) -> None:
-        """Lanes for robots like `first`. All threads share the tables of the places."""
+        """Makes lanes for robots like `first`. All threads share the tables of the places."""
+        width = processor_lanes()
         self._lane_places = np.zeros_like(log.place)
         self._queue, self._waiting = np.zeros_like(places.queue), np.zeros_like(places.waiting)
-        self._constants, constants = _constants_in_lanes(first.constants, heights)
-        lanes, states = in_lanes(first.start, processor_lanes())
+        constants, constant_numbers = in_lanes(first.constants, width)
+        network, robot = constants.network, constants.robot
+        self.first, self.beyond = network.first.array, network.beyond.array
+        # A field of any size: one compiled kernel serves robots of any size.
+        inhibition = FieldArray(network.inhibition.array, width, any_size=True)
+        ground = robot.ground._replace(heights=FieldArray(heights.ravel()))
+        constants = constants._replace(
+            robot=robot._replace(ground=ground), network=network._replace(inhibition=inhibition)
+        )
+        lanes, states = in_lanes(first.start, width)
         self._status = lanes.clock.array[loop.STATUS]
         self._status[:] = loop.IDLE
         parts = (
-            self._constants,
+            constants,
             lanes,
             log._replace(place=self._lane_places),
-            Memory(states, constants),
+            Memory(states, constant_numbers),
             places._replace(queue=self._queue, waiting=self._waiting),
             readings,
             first.driven.is_live,
         )
         self._parts = Packed(parts)
         self._advance = machine_code(advance, self._parts, 0)
-        self._rounds = max(1, _BODY_STEPS // (ROUND * len(first.robot.structure.bodies)))
+        self._rounds = max(1, _BODY_STEPS // (ROUND * len(first.driven.robot.structure.bodies)))
 
-    def widen(self, network: Network) -> None:
-        """Widens the range of inhibiting neurons, which is one for all lanes, for a network."""
-        own = self._constants.network
-        own.first.array[:] = np.minimum(own.first.array, network.first)
-        own.beyond.array[:] = np.maximum(own.beyond.array, network.beyond)
+    @property
+    def waiting(self) -> list[int]:
+        """The places of the robots that wait for a lane, in their order."""
+        waiting: list[int] = self._waiting[self._queue[NEXT] : self._queue[LAST]].tolist()
+        return waiting
 
-    def take(self, places: Sequence[int] | np.ndarray) -> None:
-        """Appends places to those whose robots wait."""
-        self._set_waiting([*self._left(), *places])
+    @waiting.setter
+    def waiting(self, places: Sequence[int]) -> None:
+        self._waiting[: len(places)] = places
+        self._queue[NEXT], self._queue[LAST] = 0, len(places)
 
     def leave(self, place: int) -> None:
         """Takes the robot of a place out of its lane, or out of the queue."""
-        self._set_waiting([other for other in self._left() if other != place])
+        self.waiting = [other for other in self.waiting if other != place]
         self._status[self._lane_places == place] = loop.IDLE
 
     def simulate(self, wall_times: np.ndarray, *, briefly: bool) -> None:
         """Simulates until all robots have ended; or `briefly`, see Batch.advance(). Adds the time
         (s) that it takes to the wall times of the robots."""
-        while robots := self._robots():
+        while robots := [*self._lane_places[self._status == loop.RUNNING], *self.waiting]:
             started = time.perf_counter()
             self._advance(self._parts, self._rounds)
             wall_times[robots] += (time.perf_counter() - started) / len(robots)
@@ -303,50 +291,20 @@ class LaneThread:
                 return
             check_time()
 
-    def _robots(self) -> list[int]:
-        """The places of the robots in the lanes and in the queue."""
-        return [*self._lane_places[self._status == loop.RUNNING].tolist(), *self._left()]
-
-    def _left(self) -> list[int]:
-        """The places in the queue."""
-        left: list[int] = self._waiting[self._queue[NEXT] : self._queue[LAST]].tolist()
-        return left
-
-    def _set_waiting(self, places: Sequence[int]) -> None:
-        self._waiting[: len(places)] = places
-        self._queue[NEXT], self._queue[LAST] = 0, len(places)
-
 
 def processor_lanes() -> int:
-    """Number of lanes on this processor, for any number of robots, so that one kernel is compiled.
+    """Number of robots that a core of this processor simulates at once.
 
-    The results do not depend on it. Eight doubles fill a register of AVX-512. With narrower
+    It is the same for any number of robots, so that one kernel is compiled. The results do not
+    depend on it. Eight doubles fill a register of AVX-512. With narrower
     registers, eight lanes would need more registers than there are, so four are faster.
     """
-    return 8 if "+avx512f" in processor_features() else 4
-
-
-def processor_features() -> str:
-    """Instruction sets that numba compiles for, such as "+avx2": from its settings or the
-    machine."""
-    return registry.cpu_target.target_context.codegen().magic_tuple()[2]
-
-
-def _constants_in_lanes(
-    constants: loop.Constants, heights: np.ndarray
-) -> tuple[loop.Constants, np.ndarray]:
-    """Tables in lanes for constants like the given ones, and their memory (numbers, lanes)."""
-    width = processor_lanes()
-    lanes, memory = in_lanes(constants, width)
-    # A field of any size: one compiled kernel serves robots of any size.
-    inhibition = FieldArray(lanes.network.inhibition.array, width, any_size=True)
-    ground = lanes.robot.ground._replace(heights=FieldArray(heights.ravel()))
-    robot, network = lanes.robot._replace(ground=ground), lanes.network
-    return lanes._replace(robot=robot, network=network._replace(inhibition=inhibition)), memory
+    features = registry.cpu_target.target_context.codegen().magic_tuple()[2]  # such as "+avx2"
+    return 8 if "+avx512f" in features else 4
 
 
 class CompiledEngine(Engine):
-    """Engine that simulates in compiled kernels. Other Python threads run meanwhile."""
+    """Engine `compiled`: simulates in compiled kernels. Other Python threads run meanwhile."""
 
     lanes = processor_lanes()
 
@@ -354,15 +312,9 @@ class CompiledEngine(Engine):
         self.start([driven_robot(scenario, seeded_gait(scenario))])
 
     def start(
-        self,
-        robots: Sequence[DrivenRobot],
-        *,
-        places: int | None = None,
-        record: bool = False,
-        viewer: Viewer | None = None,
-        threads: int = 1,
+        self, robots: Sequence[DrivenRobot], *, viewer: Viewer | None = None, **options: Any
     ) -> LaneBatch:
-        return LaneBatch(robots, places=places or len(robots), record=record, threads=threads)
+        return LaneBatch(robots, **options)
 
 
 ENGINE = CompiledEngine()

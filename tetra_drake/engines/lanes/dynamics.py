@@ -19,7 +19,6 @@ from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
 from tetra_drake.laws.model import Model
-from tetra_drake.laws.node_forces import AnchorSprings
 from tetra_drake.laws.terrain import to_world
 from tetra_drake.laws.vectors import cross, put_vector, vector_at
 
@@ -32,7 +31,7 @@ times time."""
 
 
 class Solver(NamedTuple):
-    """Positions of the blocks of the implicit matrix, and the schedule of its elimination."""
+    """Positions of the blocks of the implicit matrix, and the order of its elimination."""
 
     schedule: Schedule
     coupled: Table
@@ -42,14 +41,13 @@ class Solver(NamedTuple):
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """The solver for a robot."""
+        """The solver for the coupled bodies of a robot."""
         first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
         return cls._of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
 
     @classmethod
     @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
     def _of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
-        """The solver for a number of bodies and the coupled pairs among them."""
         schedule = Schedule.of(bodies, pairs)
         blocks = schedule.blocks
         coupled = np.array([blocks.pop(pair) for pair in pairs], dtype=np.int64)
@@ -77,7 +75,7 @@ def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table
 
 @inlined
 def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tuple[Real, ...]:
-    """Momentum of a body: its mass matrix times its part of a vector over bodies.
+    """Momentum of a body: its mass matrix times its velocity, part of `velocity` (6 bodies,).
 
     `inertia_W` is Forces.inertia.
     """
@@ -133,14 +131,24 @@ def implicit_matrix(
         first, last = couplings.first_cable[pair], couplings.first_cable[pair + 1]
         for cable in range(first, last, CABLES_AT_ONCE):
             add_cables(robot, solver, forces, time, pair, cable, lines, blocks)
-    for i in range(couplings.held.size):
-        add_held_cable(robot, forces, i, time, blocks)
+    for i in range(couplings.held.size):  # cables from fixed nodes
+        node, body = robot.cables.node_b[i], couplings.held[i]
+        damping = time * forces.cable_forces[i, TENSION_PER_RATE]
+        x, y, z = vector_at(forces.cable_forces, i, DIRECTION)
+        diagonal = damping * x * x, damping * y * y, damping * z * z
+        add_diagonal(forces.nodes, node, body, diagonal, blocks)
+        across = damping * x * y, damping * x * z, damping * y * z
+        add_off_diagonal(forces.nodes, node, body, across, blocks)
     add_masses(robot, forces.inertia, blocks)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, contact.CONTACT] != 0.0):
             add_contact(state, modes, forces, robot.ground, i, time, blocks)
-    for i in range(robot.anchors.nodes.size):
-        add_anchor(robot.anchors, forces.nodes, i, time, blocks)
+    anchors = robot.anchors
+    for i in range(anchors.nodes.size):
+        k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
+        c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
+        k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
+        add_diagonal(forces.nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
 
 
 @inlined
@@ -181,7 +189,21 @@ def add_cables(
     With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and
     w = p_b x d. The sum over cables is a product of two columns of `lines`.
     """
-    write_lines(robot, forces, time, pair, first, lines)
+    last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
+    for j in range(CABLES_AT_ONCE):
+        i = first + j
+        if i >= last:  # there is no further cable
+            for c in range(LINE_COLUMNS):
+                lines[j, c] = 0.0
+            continue
+        direction = vector_at(cable_forces, i, DIRECTION)
+        p_a = vector_at(forces.nodes, robot.cables.node_a[i], P_BN_W)
+        p_b = vector_at(forces.nodes, robot.cables.node_b[i], P_BN_W)
+        put_vector(cross(direction, p_a), j, U, lines)
+        put_vector(cross(p_b, direction), j, W, lines)
+        put_vector(direction, j, D, lines)
+        lines[j, WEIGHT] = time * cable_forces[i, TENSION_PER_RATE]
+
     rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
     adds = first > robot.couplings.first_cable[pair]  # the block has a sum already
     block = solver.coupled[pair]
@@ -210,30 +232,8 @@ def add_cables(
 
 
 @inlined
-def write_lines(
-    robot: Model, forces: Forces, time: Real, pair: int, first: int, lines: Table
-) -> None:
-    """Writes the table `lines` (CABLES_AT_ONCE, LINE_COLUMNS) for add_cables(). Rows after the last
-    cable of the pair are zero."""
-    last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
-    for j in range(CABLES_AT_ONCE):
-        i = first + j
-        if i >= last:
-            for c in range(LINE_COLUMNS):
-                lines[j, c] = 0.0
-            continue
-        direction = vector_at(cable_forces, i, DIRECTION)
-        p_a = vector_at(forces.nodes, robot.cables.node_a[i], P_BN_W)
-        p_b = vector_at(forces.nodes, robot.cables.node_b[i], P_BN_W)
-        put_vector(cross(direction, p_a), j, U, lines)
-        put_vector(cross(p_b, direction), j, W, lines)
-        put_vector(direction, j, D, lines)
-        lines[j, WEIGHT] = time * cable_forces[i, TENSION_PER_RATE]
-
-
-@inlined
 def put(value: Real, adds: bool, block: int, r: int, c: int, blocks: Table) -> None:
-    """Writes a value to a block, or adds it if `adds`.
+    """Writes a number to a block, or adds it if `adds`.
 
     If all blocks were set to zero first, a step would take 2 to 5 % longer.
     """
@@ -297,27 +297,6 @@ def add_contact(
     xy, xz, yz = x[1], x[2], y[2]
     if any_lane((xy != 0.0) | (xz != 0.0) | (yz != 0.0)):
         add_off_diagonal(nodes, node, body, (xy, xz, yz), blocks)
-
-
-@inlined
-def add_held_cable(robot: Model, forces: Forces, i: int, time: Real, blocks: Table) -> None:
-    """Adds time * damping of cable i, which runs from a fixed node."""
-    node, body = robot.cables.node_b[i], robot.couplings.held[i]
-    damping = time * forces.cable_forces[i, TENSION_PER_RATE]
-    x, y, z = vector_at(forces.cable_forces, i, DIRECTION)
-    diagonal = damping * x * x, damping * y * y, damping * z * z
-    add_diagonal(forces.nodes, node, body, diagonal, blocks)
-    across = damping * x * y, damping * x * z, damping * y * z
-    add_off_diagonal(forces.nodes, node, body, across, blocks)
-
-
-@inlined
-def add_anchor(anchors: AnchorSprings, nodes: Table, i: int, time: Real, blocks: Table) -> None:
-    """Adds time * damping + time² * stiffness of an anchor."""
-    k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
-    c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
-    k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
-    add_diagonal(nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
 
 
 @inlined

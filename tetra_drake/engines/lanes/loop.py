@@ -1,4 +1,4 @@
-"""Simulation loop of several simulations in lanes; each has its own time, step and modes.
+"""Simulation loop: several simulations in lanes, each with its own time, step and modes.
 
 All lanes do the same iteration: forces, prediction of the next mode change, signals, one step. If
 the step of a lane is rejected, the lane repeats it with a shorter step in the next iteration.
@@ -71,7 +71,7 @@ SCRATCH_ROWS = 3
 
 
 class Constants(NamedTuple):
-    """Constants of the simulations in lanes; SI units. Tables without a shape have one number."""
+    """Constants of the simulations in SI units. Tables without a shape have one number."""
 
     robot: Model
     solver: Solver
@@ -100,7 +100,7 @@ class Constants(NamedTuple):
 
 
 class LaneState(NamedTuple):
-    """State of the simulations, in lanes, with scratch memory.
+    """State of the simulations, with scratch memory.
 
     The numbers before `step.end` are the state of a simulation; see places.Places.
     """
@@ -131,7 +131,7 @@ class LaneState(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Schedule and recorded samples of each simulation; a row per place."""
+    """Times at which each simulation stops or is sampled, and its samples; a row per robot."""
 
     place: Annotated[Table, "lanes", int]
     """Place of the simulation in each lane."""
@@ -175,18 +175,15 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
     foresee_signals(constants, lanes, log, live)
-    foresee_drives(lanes)
-    error = take_step(
-        constants.robot,
-        constants.solver,
-        lanes.step,
-        lanes.modes,
-        lanes.forces,
-        lanes.end_signals,
-        step,
-        live,
-    )
-    correct_drives(lanes)
+    drives, at_end = lanes.drives, lanes.forces.drives
+    for i in range(drives.shape[0]):  # predicted, for the forces at the end of the step
+        drives[i, actuator.RATE] = at_end[i, actuator.RATE]
+        at_end[i, actuator.DRIVE] = drives[i, actuator.DRIVE] + step * drives[i, actuator.RATE]
+    robot, solver, signals = constants.robot, constants.solver, lanes.end_signals
+    error = take_step(robot, solver, lanes.step, lanes.modes, lanes.forces, signals, step, live)
+    for i in range(drives.shape[0]):  # corrected, with the mean of the rates at both ends
+        rate = 0.5 * (drives[i, actuator.RATE] + at_end[i, actuator.RATE])
+        lanes.end_drives[i] = drives[i, actuator.DRIVE] + step * rate
 
     accepted = is_running & (error <= constants.tolerance[0])
     if live:
@@ -197,9 +194,12 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
         lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
         keep_samples(constants, lanes, log, live)
     move_on(lanes, is_running, accepted)
-    planned = next_step(error, step, constants.tolerance[0], constants.max_step[0])
-    clock[PLANNED] = select(is_running, planned, clock[PLANNED])
 
+    factor = SAFETY * math.sqrt(constants.tolerance[0] / maximum(error, 1e-12))
+    factor = minimum(GROW, maximum(SHRINK, factor))
+    factor = select(error == error, factor, SHRINK)  # error is NaN
+    planned = minimum(constants.max_step[0], step * factor)
+    clock[PLANNED] = select(is_running, planned, clock[PLANNED])
     status = select(is_running, fate(constants, lanes), clock[STATUS])
     ended |= any_lane(status != clock[STATUS])
     clock[STATUS] = status
@@ -208,7 +208,7 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
 
 @inlined
 def arrive(constants: Constants, lanes: LaneState) -> None:
-    """Updates the modes for the state, computes the forces, and adds them to the tally."""
+    """Computes modes and forces at the beginning of the step, and adds them to the tally."""
     robot, forces, state = constants.robot, lanes.forces, lanes.step.state
     move_robot(robot, state, forces)
     for i in range(lanes.drives.shape[0]):
@@ -231,25 +231,6 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
     for lane in range(log.place.size):
         end = by_lane(clock)[END, lane]
         interpolate(constants, lanes, log, lane, end, by_lane(lanes.end_signals))
-
-
-@inlined
-def foresee_drives(lanes: LaneState) -> None:
-    """Stores the rates of the drives at the state, and predicts the drives at the end of the
-    step."""
-    drives = lanes.forces.drives
-    for i in range(drives.shape[0]):
-        rate = drives[i, actuator.RATE]
-        lanes.drives[i, actuator.RATE] = rate
-        drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE] + lanes.clock[STEP] * rate
-
-
-@inlined
-def correct_drives(lanes: LaneState) -> None:
-    """Writes the drives at the end of the step, with the mean of the rates at both ends."""
-    for i in range(lanes.drives.shape[0]):
-        rate = 0.5 * (lanes.drives[i, actuator.RATE] + lanes.forces.drives[i, actuator.RATE])
-        lanes.end_drives[i] = lanes.drives[i, actuator.DRIVE] + lanes.clock[STEP] * rate
 
 
 @inlined
@@ -288,17 +269,8 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
 
 
 @inlined
-def next_step(error: Real, step: Real, tolerance: Real, max_step: Real) -> Real:
-    """Length (s) of the next step of a method of order 2, after a step with this error."""
-    factor = SAFETY * math.sqrt(tolerance / maximum(error, 1e-12))
-    factor = minimum(GROW, maximum(SHRINK, factor))
-    factor = select(error == error, factor, SHRINK)  # error is NaN
-    return minimum(max_step, step * factor)
-
-
-@inlined
 def fate(constants: Constants, lanes: LaneState) -> Real:
-    """Status of each lane after a step, computed as if all lanes were running."""
+    """Status of each lane after a step. Lanes that do not run have one, too."""
     state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):
@@ -328,27 +300,20 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
         oscillator.euler_step(constants.network, lanes.tonic, step, lanes.neurons)
         oscillator.oscillator_output(lanes.neurons, lanes.output)
         lanes.scratch[NETWORK_STEPS] = select(takes_step, 1.0, 0.0)
-        keep_outputs(constants, lanes, log)
+        samples, steps = by_lane(clock), by_lane(lanes.scratch)
+        gain, output = by_lane(constants.gain), by_lane(lanes.output)
+        for lane in range(log.place.size):
+            if steps[NETWORK_STEPS, lane] != 0.0:
+                place, row = log.place[lane], row_of(int(samples[SAMPLES, lane]), log)
+                for k in range(lanes.output.size):
+                    log.recent[place, row, k] = gain[0, lane] * output[k, lane]
         clock[SAMPLES] += lanes.scratch[NETWORK_STEPS]
         is_unfinished = is_running & (clock[SAMPLES] < constants.samples[0])
 
 
 @inlined
-def keep_outputs(constants: Constants, lanes: LaneState, log: Log) -> None:
-    """Writes the next sample of the signals, N, in each lane whose network took a step."""
-    clock, scratch = by_lane(lanes.clock), by_lane(lanes.scratch)
-    gain, output = by_lane(constants.gain), by_lane(lanes.output)
-    for lane in range(log.place.size):
-        if scratch[NETWORK_STEPS, lane] != 0.0:
-            place = log.place[lane]
-            row = row_of(int(clock[SAMPLES, lane]), log)
-            for k in range(lanes.output.size):
-                log.recent[place, row, k] = gain[0, lane] * output[k, lane]
-
-
-@inlined
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
-    """Writes the inputs of a live network at a time (s), from a state and its forces."""
+    """Writes the inputs of a live network at a time (s): the tonic input and the feedback."""
     steer(constants, lanes, log, time / constants.period[0])
     sense(constants.senses, constants.gains, state, lanes.modes, lanes.forces, lanes.inputs)
     for i in range(lanes.inputs.size):
@@ -438,7 +403,7 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
 
 @inlined
 def next_mark(log: Log, place: int, time: float) -> float:
-    """Time (s) of the next mark of a simulation at a time (s): a pause is one, too."""
+    """Next time (s), after a time (s), at which a step of a simulation must end."""
     mark = min(log.marks[place, log.passed[place]], log.until[place])
     if log.change_ends[place] > time:
         mark = min(mark, log.change_ends[place])

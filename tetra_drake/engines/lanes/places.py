@@ -1,7 +1,8 @@
-"""Robots in places: they take turns in the lanes of the simulation loop.
+"""Tables of robots that take turns in the lanes of the simulation loop.
 
-A lane simulates a robot until its pause, or its failure. Then the robot goes back to its place, its
-readings are written, and the lane takes the next one that waits. So no lane waits for the slowest.
+A place is a row of the tables. A lane simulates a robot until its pause, or its failure. Then the
+robot goes back to its place, its readings are written, and the lane takes the next one that waits.
+So no lane waits for the slowest.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ NEXT, LAST = range(2)
 
 
 class Places(NamedTuple):
-    """Robots in places; a row per place."""
+    """State and constants of each robot, and the queue of waiting robots; a row per robot."""
 
     states: Annotated[Table, "places", "numbers"]
     """The numbers of LaneState before `step.end`."""
@@ -45,7 +46,7 @@ class Places(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The numbers (numbers, lanes) of tables in lanes."""
+    """Numbers of the robots in the lanes, in the order of a row of `Places`."""
 
     states: Table
     constants: Table
@@ -102,6 +103,7 @@ def exchange(parts: LaneParts) -> None:
     """Puts robots that have ended back to their places, and robots that wait in idle lanes."""
     constants, lanes, log, memory, places, _, _ = unpacked(parts)
     clock, queue = by_lane(lanes.clock), places.queue
+    searched = by_lane(lanes.forces.near_struts.p_WN)
     for lane in range(log.place.size):
         if clock[loop.STATUS, lane] == loop.RUNNING:
             continue
@@ -112,24 +114,17 @@ def exchange(parts: LaneParts) -> None:
         if queue[NEXT] < queue[LAST]:
             place = places.waiting[queue[NEXT]]
             queue[NEXT] += 1
-            take(lanes, log, memory, places, lane, place)
+            log.place[lane] = place
+            for i in range(places.states.shape[1]):
+                memory.states[i, lane] = places.states[place, i]
+            for i in range(places.constants.shape[1]):
+                memory.constants[i, lane] = places.constants[place, i]
+            clock[loop.MARK, lane] = loop.next_mark(log, place, clock[loop.TIME, lane])
+            clock[loop.STATUS, lane] = loop.RUNNING
+            for node in range(searched.shape[0]):
+                searched[node, 0, lane] = math.inf  # so that near struts are searched
             if places.holds[place] == 1:
                 hold(constants, lanes, log, lane, places)
-
-
-@inlined
-def take(lanes: LaneState, log: Log, memory: Memory, places: Places, lane: int, place: int) -> None:
-    """Copies a robot from its place to a lane, and lets it go on."""
-    clock, searched = by_lane(lanes.clock), by_lane(lanes.forces.near_struts.p_WN)
-    log.place[lane] = place
-    for i in range(places.states.shape[1]):
-        memory.states[i, lane] = places.states[place, i]
-    for i in range(places.constants.shape[1]):
-        memory.constants[i, lane] = places.constants[place, i]
-    clock[loop.MARK, lane] = loop.next_mark(log, place, clock[loop.TIME, lane])
-    clock[loop.STATUS, lane] = loop.RUNNING
-    for node in range(searched.shape[0]):
-        searched[node, 0, lane] = math.inf  # so that near struts are searched
 
 
 @inlined
@@ -151,32 +146,31 @@ def hold(constants: Constants, lanes: LaneState, log: Log, lane: int, places: Pl
 
 @inlined
 def read_paused(lanes: LaneState, log: Log, to: Readings) -> None:
-    """Writes the readings of robots that have reached their pause, before the clearance of another
-    lane moves the nodes: its last digits differ."""
-    for lane in range(log.place.size):
-        if by_lane(lanes.clock)[loop.STATUS, lane] == loop.DONE:
-            read(lanes, lane, log.place[lane], to)
+    """Writes the readings of robots that have reached their pause to the rows of their places.
 
-
-@inlined
-def read(lanes: LaneState, lane: int, place: int, to: Readings) -> None:
-    """Writes the readings of the robot in a lane to the row of its place."""
+    Call it before measure_clearance(), which moves the nodes of all lanes: last digits differ.
+    """
+    clock = by_lane(lanes.clock)
     state, nodes = by_lane(lanes.step.state), by_lane(lanes.forces.nodes)
     cables, loads = by_lane(lanes.forces.cable_forces), by_lane(lanes.forces.ground_forces)
     bodies = to.q_WB.shape[1]
-    to.time[place] = by_lane(lanes.clock)[loop.TIME, lane]
-    for i in range(to.lengths.shape[1]):
-        to.lengths[place, i] = cables[i, cable.LENGTH, lane]
-        to.rates[place, i] = cables[i, cable.RATE, lane]
-        to.tensions[place, i] = cables[i, cable.TENSION, lane]
-    for i in range(to.normal_forces.shape[1]):
-        to.normal_forces[place, i] = loads[i, contact.NORMAL, lane]
-    for body in range(bodies):
-        for k in range(4):
-            to.q_WB[place, body, k] = state[7 * body + k, lane]
-        for k in range(3):
-            to.w_WB[place, body, k] = state[7 * bodies + 6 * body + k, lane]
-    for node in range(to.p_WN.shape[1]):
-        for k in range(3):
-            to.p_WN[place, node, k] = nodes[node, kinematics.P_WN + k, lane]
-            to.v_WN[place, node, k] = nodes[node, kinematics.V_WN + k, lane]
+    for lane in range(log.place.size):
+        if clock[loop.STATUS, lane] != loop.DONE:
+            continue
+        place = log.place[lane]
+        to.time[place] = clock[loop.TIME, lane]
+        for i in range(to.lengths.shape[1]):
+            to.lengths[place, i] = cables[i, cable.LENGTH, lane]
+            to.rates[place, i] = cables[i, cable.RATE, lane]
+            to.tensions[place, i] = cables[i, cable.TENSION, lane]
+        for i in range(to.normal_forces.shape[1]):
+            to.normal_forces[place, i] = loads[i, contact.NORMAL, lane]
+        for body in range(bodies):
+            for k in range(4):
+                to.q_WB[place, body, k] = state[7 * body + k, lane]
+            for k in range(3):
+                to.w_WB[place, body, k] = state[7 * bodies + 6 * body + k, lane]
+        for node in range(to.p_WN.shape[1]):
+            for k in range(3):
+                to.p_WN[place, node, k] = nodes[node, kinematics.P_WN + k, lane]
+                to.v_WN[place, node, k] = nodes[node, kinematics.V_WN + k, lane]

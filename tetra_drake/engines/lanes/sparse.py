@@ -22,7 +22,7 @@ BLOCK = 6
 
 
 class Schedule(NamedTuple):
-    """Positions of the blocks of a system, for elimination and fill-in."""
+    """Positions of the blocks of a sparse matrix, in the order of elimination."""
 
     first: Table
     """Index of the first block of each body with a later body (bodies + 1,); the last number is the
@@ -69,25 +69,19 @@ def factorise(blocks: Table, schedule: Schedule) -> None:
     """
     product = 0
     for i in range(schedule.first.size - 1):
-        factorise_block(blocks, i)
+        for r in range(BLOCK):  # the body's own block
+            inverse = 1.0 / blocks[i, r, r]
+            blocks[i, r, r] = inverse
+            for t in range(r + 1, BLOCK):
+                factor = blocks[i, r, t] * inverse
+                for c in range(t, BLOCK):
+                    blocks[i, t, c] -= factor * blocks[i, r, c]
         end = schedule.first[i + 1]
         for a in range(schedule.first[i], end):
             reduce_block(blocks, i, a)
         for a in range(schedule.first[i], end):
             eliminate(blocks, schedule, i, a, product)
             product += end - a - 1
-
-
-@inlined
-def factorise_block(blocks: Table, i: int) -> None:
-    """Factorises body i's own block."""
-    for r in range(BLOCK):
-        inverse = 1.0 / blocks[i, r, r]
-        blocks[i, r, r] = inverse
-        for t in range(r + 1, BLOCK):
-            factor = blocks[i, r, t] * inverse
-            for c in range(t, BLOCK):
-                blocks[i, t, c] -= factor * blocks[i, r, c]
 
 
 @inlined

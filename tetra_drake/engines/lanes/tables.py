@@ -1,8 +1,7 @@
-"""Tables in lanes: the numbers of NamedTuples in one table, with a column per lane."""
+"""Conversion of NamedTuples of arrays to tables in lanes, which have a column per robot."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,23 +10,28 @@ from tetra_drake.kernels.lanes import FieldArray, lane_table
 
 
 def numbers_of(values: Any) -> np.ndarray:
-    """The real numbers of NamedTuples of arrays, in a row."""
-    return np.concatenate([np.zeros(0), *(array.ravel() for array in _arrays(values))])
+    """All real numbers of NamedTuples of arrays, in one row."""
+    if isinstance(values, tuple):
+        return np.concatenate([np.zeros(0), *map(numbers_of, values)])
+    return values.ravel() if _is_real(values) else np.zeros(0)
 
 
 def shared(values: Any) -> Any:
-    """Everything of NamedTuples of arrays that lanes share: indices, truths, and the shapes of the
-    tables of real numbers."""
+    """Parts of NamedTuples of arrays that are the same in all lanes: indices, truths, and the
+    shapes of the tables of real numbers."""
     if isinstance(values, tuple):
-        return tuple(shared(value) for value in values)
+        return tuple(map(shared, values))
     if not isinstance(values, np.ndarray):
         return values
     return (values.shape, None if _is_real(values) else values.tobytes())
 
 
-def views(values: Any, numbers: np.ndarray) -> Any:
-    """NamedTuples like `values`, with views of `numbers` (numbers, ...) in place of the arrays of
-    real numbers. Other values stay as they are."""
+def views(values: Any, numbers: np.ndarray, *, lanes: bool = False) -> Any:
+    """NamedTuples like `values` whose arrays of real numbers are views of `numbers`.
+
+    The first axis of `numbers` is in the order of numbers_of(). With `lanes`, its second axis is
+    the lanes: all arrays become fields of kernels, and arrays of indices are copied.
+    """
     first = 0
 
     def view(value: Any) -> Any:
@@ -35,16 +39,17 @@ def views(values: Any, numbers: np.ndarray) -> Any:
         if isinstance(value, tuple):
             return type(value)(*map(view, value))
         if not _is_real(value):
-            return value
-        rows = numbers[first : first + value.size]
+            is_field = lanes and isinstance(value, np.ndarray)
+            return FieldArray(value.copy()) if is_field else value
+        rows = numbers[first : first + value.size].reshape(*value.shape, *numbers.shape[1:])
         first += value.size
-        return rows.reshape(*value.shape, *numbers.shape[1:])
+        return FieldArray(rows, numbers.shape[1]) if lanes else rows
 
     return view(values)
 
 
 def numbered(values: Any) -> Any:
-    """NamedTuples like `values`, with the index of each number in numbers_of() in its place."""
+    """NamedTuples like `values` with the indices of the numbers in numbers_of()."""
     return views(values, np.arange(numbers_of(values).size, dtype=float))
 
 
@@ -54,23 +59,7 @@ def in_lanes(values: Any, width: int) -> tuple[Any, np.ndarray]:
     numbers = numbers_of(values)
     memory = lane_table(numbers.shape, width).array
     memory[:] = numbers[:, np.newaxis]
-    return _fields(views(values, memory), width), memory
-
-
-def _fields(values: Any, width: int) -> Any:
-    if isinstance(values, tuple):
-        return type(values)(*(_fields(value, width) for value in values))
-    if not isinstance(values, np.ndarray):
-        return values
-    return FieldArray(values, width) if _is_real(values) else FieldArray(values.copy())
-
-
-def _arrays(values: Any) -> Iterator[np.ndarray]:
-    if isinstance(values, tuple):
-        for value in values:
-            yield from _arrays(value)
-    elif _is_real(values):
-        yield values
+    return views(values, memory, lanes=True), memory
 
 
 def _is_real(value: Any) -> bool:

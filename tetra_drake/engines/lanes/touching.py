@@ -1,4 +1,4 @@
-"""Implicit part of the forces between struts that touch.
+"""Contacts of struts in the implicit matrix of a step.
 
 A contact pushes both bodies along g, the derivative of the struts' distance. In the implicit matrix
 it counts as w g gᵀ with w = time * damping + time² * stiffness. The pair of bodies may have no
@@ -25,7 +25,7 @@ from tetra_drake.laws.vectors import put_vector
 
 
 class Touching(NamedTuple):
-    """Contacts of struts in the implicit matrix; further ones are explicit if these are full."""
+    """Contacts of struts that are part of the implicit matrix; further ones are explicit."""
 
     along: Annotated[Table, "6 * touches * bodies"]
     """The vectors g, one after the other."""
