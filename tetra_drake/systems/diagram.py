@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer
+from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
@@ -78,12 +78,7 @@ def MakeTensegrityDiagram(
     scenario, structure = robot.scenario, robot.structure
     builder = DiagramBuilder()
 
-    plant, scene_graph = MultibodyPlant(time_step=0.0), None
-    if meshcat is None:
-        builder.AddNamedSystem("plant", plant)
-    else:
-        _, scene_graph = AddMultibodyPlantSceneGraph(builder, plant)
-        MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    plant, scene_graph = _AddPlant(builder, meshcat)
     nodes = AddNodes(plant, structure, AddBodies(plant, structure))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
@@ -129,15 +124,8 @@ def MakeTensegrityDiagram(
         builder.ExportOutput(actuators.get_output_port(), "drives")
     if controller is None and structure.signals and scenario.cpg.feedback:
         assert gait is not None
-        gains = [gain for _, gain in gait.gains]
-        feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))
-        builder.Connect(state, feedback.GetInputPort("state"))
-        builder.Connect(signals, feedback.GetInputPort("signals"))
-        builder.Connect(ground.GetOutputPort("mode_table"), feedback.GetInputPort("mode_table"))
-        if feedback.HasInputPort("drives"):
-            builder.Connect(actuators.get_output_port(), feedback.GetInputPort("drives"))
-        cpg = builder.GetSubsystemByName("cpg")
-        builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
+        feedback = Feedback(robot, gains=[gain for _, gain in gait.gains])
+        _AddFeedback(builder, feedback, state, signals, ground)
 
     builder.ExportOutput(state, "state")
     builder.ExportOutput(signals, "signals")
@@ -150,6 +138,17 @@ def MakeTensegrityDiagram(
     return diagram
 
 
+def _AddPlant(
+    builder: DiagramBuilder, meshcat: Meshcat | None
+) -> tuple[MultibodyPlant, SceneGraph | None]:
+    """Adds `plant`, with a SceneGraph if it is shown in Meshcat."""
+    if meshcat is None:
+        return builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0)), None
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    return plant, scene_graph
+
+
 def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
     """The cables of a structure between the frames of its nodes."""
     return [
@@ -158,6 +157,25 @@ def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
             structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True
         )
     ]
+
+
+def _AddFeedback(
+    builder: DiagramBuilder,
+    feedback: Feedback,
+    state: OutputPort,
+    signals: OutputPort,
+    ground: System,
+) -> None:
+    """Adds `feedback`, from the robot to its network."""
+    builder.AddNamedSystem("feedback", feedback)
+    builder.Connect(state, feedback.GetInputPort("state"))
+    builder.Connect(signals, feedback.GetInputPort("signals"))
+    builder.Connect(ground.GetOutputPort("mode_table"), feedback.GetInputPort("mode_table"))
+    if feedback.HasInputPort("drives"):
+        actuators = builder.GetSubsystemByName("cables_actuators")
+        builder.Connect(actuators.get_output_port(), feedback.GetInputPort("drives"))
+    cpg = builder.GetSubsystemByName("cpg")
+    builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
 
 
 def _AddController(
