@@ -49,9 +49,6 @@ def quantity(unit: str, **words: float) -> tuple[Any, ...]:
             raise ValueError(f"found {described(value)} without a unit, {expected}")
         return value
 
-    def write(number: float) -> Any:
-        return Quantity(number, unit)
-
     schema: dict[str, Any] = {
         "type": ["string", "number"],
         "pattern": f"^({'|'.join((*words, PATTERN))})$",
@@ -60,7 +57,8 @@ def quantity(unit: str, **words: float) -> tuple[Any, ...]:
         "then": {"const": 0, "errorMessage": expected},
         "unit": unit,
     }
-    return BeforeValidator(read), PlainSerializer(write), Field(json_schema_extra=schema)
+    write = PlainSerializer(lambda number: Quantity(number, unit))
+    return BeforeValidator(read), write, Field(json_schema_extra=schema)
 
 
 Length = Annotated[float, *quantity("m")]
@@ -118,3 +116,8 @@ class ByName:
         strict = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
         table = core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=strict)
         return core_schema.no_info_wrap_validator_function(in_order, table)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: pydantic.GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return handler(schema) | EMPTY

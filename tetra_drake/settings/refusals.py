@@ -37,9 +37,16 @@ def input_error(
     error: ValidationError, section: type[BaseModel], tree: Any, source: object, key: str = ""
 ) -> InputError:
     """The error of a tree as a section at `key`, as an InputError that names `source`."""
-    first = max(error.errors(include_url=False), key=_telling)
+    from pydantic.json_schema import GenerateJsonSchema
+
+    # An unknown key tells why another is missing. A value that fits no member of a union has an
+    # error per member: the innermost tells most, then one that is not about the type.
+    first = max(
+        error.errors(include_url=False),
+        key=lambda one: (one["type"] in _UNKNOWN, len(one["loc"]), "_type" not in one["type"]),
+    )
     is_unknown, name = first["type"] in _UNKNOWN, str(first["loc"][-1]) if first["loc"] else ""
-    schema = section.model_json_schema()
+    schema = section.model_json_schema(schema_generator=GenerateJsonSchema)  # without texts
     members = kinds = [schema]
     # The place also contains tags and names of union members, which are no keys.
     for part in first["loc"][:-1] if is_unknown else first["loc"]:
@@ -62,13 +69,6 @@ def input_error(
 
 _UNKNOWN = "extra_forbidden", "invalid_key"
 """Types of pydantic's errors of keys that a section does not have."""
-
-
-def _telling(error: ErrorDetails) -> tuple[bool, int, bool]:
-    """How much an error tells. An unknown key tells why another is missing. A value that fits no
-    member of a union has an error per member: the innermost tells most, then one that is not about
-    the type."""
-    return error["type"] in _UNKNOWN, len(error["loc"]), "_type" not in error["type"]
 
 
 def members_of(node: Tree, schema: Tree) -> list[Tree]:

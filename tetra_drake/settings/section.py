@@ -1,4 +1,4 @@
-"""Sections of settings as pydantic models: tagged kinds, trees, and errors of one line.
+"""Sections of settings as pydantic models, with tagged kinds and errors of one line.
 
 A *tree* is the content of a YAML file: mappings, lists, numbers and texts. Quantities are texts
 with units. A tagged kind, written `!Name {...}` as in Drake's YAML, is a mapping with its tag under
@@ -15,14 +15,15 @@ import os
 import re
 import sys
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self, Union
 
 import pydantic
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.errors import InputError
 from tetra_drake.settings.quantities import EMPTY, Quantity
@@ -37,10 +38,6 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
     """Changes pydantic's JSON Schema of a section to what files may contain."""
     schema |= EMPTY
     schema.pop("required", None)  # a base may have the keys
-    texts = attribute_docstrings(section)
-    for name, field in section.model_fields.items():
-        if name in texts:
-            schema["properties"][field.alias or name]["description"] = texts[name]
     for key, text in section.keys_of_files.items():
         schema["properties"][key] = {"type": "string", "default": None, "description": text}
     for node in parts_in(schema):
@@ -60,9 +57,25 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
             node["default"] = plainest(default, node["unit"])
 
 
+class SchemaWithTexts(GenerateJsonSchema):
+    """JSON Schema in which the docstrings of attributes describe the keys.
+
+    They are read from the source only here: pydantic's own option reads them at every import, which
+    takes 0.15 s.
+    """
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> Tree:
+        """The schema of a section."""
+        section: Any = schema["cls"]
+        made, texts = super().model_schema(schema), attribute_docstrings(section)
+        for name, field in section.model_fields.items():
+            if name in texts:
+                made["properties"][field.alias or name]["description"] = texts[name]
+        return made
+
+
 def attribute_docstrings(owner: type) -> dict[str, str]:
-    """The docstrings of the attributes of a class and its bases, by name. (pydantic would read them
-    whenever the class is imported.)"""
+    """Docstrings of the attributes of a class and of its bases, by name."""
     texts = {}
     for base in reversed(owner.__mro__):
         if not base.__module__.startswith("tetra_drake"):
@@ -155,6 +168,12 @@ class Section(BaseModel):
         return tuple(float(number) for number in numbers if number.unit == "m")
 
     @classmethod
+    def model_json_schema(cls, *arguments: Any, **options: Any) -> Tree:
+        """JSON Schema of what files may contain, with the texts of the keys."""
+        options.setdefault("schema_generator", SchemaWithTexts)
+        return super().model_json_schema(*arguments, **options)
+
+    @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
         """The section of a tree at `key`. Raises InputError that names `source` and key."""
         tree = tree_value(tree)
@@ -182,14 +201,10 @@ class Kinds:
                 return str((value or {}).get(TAG, kinds[0].tag))
             return value.tag if isinstance(value, Section) else None
 
-        def write(section: Section, dump: pydantic.SerializerFunctionWrapHandler) -> Any:
-            return {TAG: section.tag} | dump(section)
-
         tagged = [Annotated[kind, Tag(kind.tag), Field(title=f"!{kind.tag}")] for kind in kinds]
         union: Any = Union[tuple(tagged)]  # noqa: UP007
-        return handler.generate_schema(
-            Annotated[union, Discriminator(tag_of), pydantic.WrapSerializer(write)]
-        )
+        write = pydantic.WrapSerializer(lambda kind, dump: {TAG: kind.tag} | dump(kind))
+        return handler.generate_schema(Annotated[union, Discriminator(tag_of), write])
 
 
 def _hashable(value: Any) -> Any:
@@ -277,6 +292,19 @@ def written(value: Any, show: Show = "{!r} {}".format) -> Any:
         return show(float(part), part.unit) if part.unit else float(part)
 
     return mapped(value, write)
+
+
+def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
+    """Settings in brackets after a blank, such as " (slope 5 deg)"; empty if there are none.
+
+    Numbers have the unit that needs the fewest digits. Defaults are left out, except the settings
+    named in `always`.
+    """
+    given = written(kind.model_dump(exclude_defaults=True), plainest)
+    settings = {name: getattr(kind, name) for name in always} | given
+    lists = {name: " ".join(value) for name, value in settings.items() if isinstance(value, list)}
+    texts = [f"{name} {value}" for name, value in (settings | lists).items()]
+    return f" ({', '.join(texts)})" if texts else ""
 
 
 def parts_in(value: Any) -> Iterator[Any]:
