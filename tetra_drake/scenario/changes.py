@@ -38,23 +38,18 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
     if not isinstance(changes, dict):
         return changes
     if isinstance(base, list) and isinstance(changes, Part):
-        return _with_items(base, changes, key)
+        items = list(base)
+        for index, value in changes.items():
+            inner = joined(key, f"[{index}]" if isinstance(index, int) else index)
+            if not isinstance(index, int) or index >= len(items):
+                raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
+            items[index] = merged(items[index], value, inner)
+        return items
     is_whole = TAG in changes or (key in REPLACED and not isinstance(changes, Part))
     tree = dict(base) if isinstance(base, dict) and not is_whole else {}
     for name, value in changes.items():
         tree[name] = merged(tree.get(name), value, joined(key, str(name)))
     return tree
-
-
-def _with_items(base: list[Any], changes: Part, key: str) -> list[Any]:
-    """A list with other items, by their indices. Raises InputError for an index that is none."""
-    items = list(base)
-    for index, value in changes.items():
-        inner = joined(key, f"[{index}]" if isinstance(index, int) else index)
-        if not isinstance(index, int) or index >= len(items):
-            raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
-        items[index] = merged(items[index], value, inner)
-    return items
 
 
 def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, Any]:
@@ -79,11 +74,7 @@ def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
                 place = place.setdefault(section, Part())
         if not isinstance(place, dict) or name in place:
             raise InputError(source, key, "is given twice")
-        place[name] = mapped(tree_value(changes[key]), _parsed)
+        place[name] = mapped(  # a text with a tag becomes its kind
+            tree_value(changes[key]), lambda x: parse_yaml(x, x) if str(x).startswith("!") else x
+        )
     return tree
-
-
-def _parsed(value: Any) -> Any:
-    """A text with the tag of a kind as the kind; other values as they are."""
-    is_kind = isinstance(value, str) and value.startswith("!")
-    return parse_yaml(value, value) if is_kind else value

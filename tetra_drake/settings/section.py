@@ -58,10 +58,10 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
 
 
 class SchemaWithTexts(GenerateJsonSchema):
-    """JSON Schema in which the docstrings of attributes describe the keys.
+    """JSON Schema whose keys are described by the docstrings of attributes.
 
-    They are read from the source only here: pydantic's own option reads them at every import, which
-    takes 0.15 s.
+    The docstrings are read from the source only here. pydantic's own option reads them at every
+    import, which takes 0.15 s.
     """
 
     def model_schema(self, schema: core_schema.ModelSchema) -> Tree:
