@@ -629,7 +629,7 @@ def _prepare() -> None:
 
 
 def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
-    """Print of figures with a width (m) and letters of a size (points)."""
+    """Size, fonts and files of printed figures. The width is in m, the font size in points."""
     from tetra_drake.figures.style import FILE_KINDS, Look, Print
 
     look = Look(width_in=width / INCH, font_size=font, title=title)

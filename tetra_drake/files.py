@@ -81,8 +81,8 @@ def _remove_stale(path: Path) -> None:
 
 
 def given_path(path: str | Path, source: str, what: str) -> Path:
-    """An argument as a Path. Raises InputError, naming function `source` and argument `what`, if it
-    is neither a text nor a Path."""
+    """Converts an argument to a Path. Raises InputError, naming function `source` and argument
+    `what`, if it is neither a text nor a Path."""
     if not isinstance(path, (str, Path)):
         raise InputError(source, what, f"found {path!r:.60}, expected a path")
     return Path(path)

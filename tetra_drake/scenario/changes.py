@@ -14,19 +14,19 @@ REPLACED = ("objective", "require", "robot.actuated")
 """Mappings that a file replaces as a whole."""
 
 REMOVABLE = ("disturbances",)
-"""Sections that are absent if nothing is given for them."""
+"""Sections that an empty key removes, as in `disturbances:`."""
 
 
 class Part(Tree):
-    """A mapping made from dotted keys. It changes a part of a mapping, or items of a list by their
-    indices."""
+    """Mapping made from dotted keys. It changes single keys of a mapping, or single items of a
+    list, by their indices."""
 
 
 def merged(base: Any, changes: Any, key: str = "") -> Any:
-    """The tree of a scenario, or the part of it at `key`, with changes. The rules are:
+    """Merges changes into the tree of a scenario, or into its part at `key`. The rules are:
 
-    - A mapping changes the keys that it names; the others stay. Nothing, as in `friction:`, is an
-      empty mapping, but removes `disturbances`.
+    - A mapping changes the keys that it names; the others stay. An empty key, as in `friction:`,
+      changes nothing; `disturbances:` removes the section.
     - A kind with its tag replaces the base's kind and all its keys. Without a tag it changes keys.
     - `objective`, `require` and `robot.actuated` are replaced as a whole. Only dotted keys from
       Python, such as "objective.speed", change a part of them.
@@ -53,8 +53,8 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
 
 
 def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, Any]:
-    """An argument as changes by dotted keys. Raises InputError, naming `source`, for anything
-    else."""
+    """Checks an argument that gives changes by dotted keys. Raises InputError, naming `source`, for
+    anything else."""
     if isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes):
         return changes
     problem = f"found {changes!r:.60}, expected values by dotted keys, such as {{'cpg.gain': ...}}"

@@ -42,7 +42,7 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
 
 
 class HasScenario(Protocol):
-    """A run, or the result of a simulation."""
+    """Object with a scenario: a run, or the result of a simulation."""
 
     @property
     def scenario(self) -> Scenario: ...
@@ -53,8 +53,8 @@ GivenScenario = Scenario | HasScenario | str | Path
 
 
 def given_scenario(scenario: GivenScenario) -> Scenario:
-    """The scenario of an argument: a scenario, its name or file, or a run. Raises InputError for
-    anything else."""
+    """The scenario that an argument gives: a scenario, its name or file, or a run. Raises
+    InputError for anything else."""
     if isinstance(scenario, (str, Path)):
         in_folder = Path(scenario) / SCENARIO
         is_folder = str(scenario) not in shipped_scenarios() and os.path.isfile(in_folder)

@@ -173,7 +173,7 @@ class Scenario(Section):
 
     @property
     def lacking(self) -> tuple[str, ...]:
-        """What some metrics need and the robot does not have; see scenario.metrics."""
+        """Properties that some metrics need and this robot does not have; see scenario.metrics."""
         return *self.robot.lacking, *self.actuation.lacking
 
     @property

@@ -1,4 +1,4 @@
-"""Quantities: numbers in SI; their type gives the unit. In files they are texts with units.
+"""Types of quantities: SI numbers that files give as texts with units.
 
 A field `stiffness: Stiffness = Field(gt=0)` reads "25 lbf/in" as a number in N/m. Items of lists
 and mappings may have such types, too.
@@ -19,7 +19,7 @@ from tetra_drake.settings.units import PATTERN, plainest, quantity_to_si
 
 
 class Quantity(float):
-    """A number in the tree of a scenario, with its SI unit."""
+    """SI number with its unit, as the tree of a scenario holds it."""
 
     unit: str
 
@@ -33,10 +33,10 @@ class Quantity(float):
 
 
 def quantity(unit: str, **words: float) -> tuple[Any, ...]:
-    """Annotations of a type of numbers with an SI unit. In a file, each of `words` stands for a
-    number.
+    """Annotations that make `float` the type of a quantity in an SI unit.
 
-    In a validation with a context (of a file), numbers without a unit are refused, except 0.
+    In a file, each of `words` stands for a number. In a validation with a context (of a file),
+    numbers without a unit are refused, except 0.
     """
     expected = f"expected a quantity that converts to {unit}"
 
@@ -89,12 +89,12 @@ Keyed = Annotated[
     BeforeValidator(lambda given: {} if given is None else given),
     Field(json_schema_extra=EMPTY),
 ]
-"""A mapping with names of the user's choice. Nothing is an empty mapping."""
+"""Mapping whose keys the user chooses. In a file it may be left empty."""
 
 
 @dataclass(frozen=True)
 class ByName:
-    """Annotation of a type of mappings with a number, or several, by each name."""
+    """Annotation of a mapping from given names, such as metrics, to numbers with units."""
 
     units: Mapping[str, str]
     """SI units by name; "" for a number without a unit."""

@@ -90,7 +90,7 @@ def attribute_docstrings(owner: type) -> dict[str, str]:
 
 @functools.cache
 def _classes_in(module: str) -> dict[str, ast.ClassDef]:
-    """Sources of the classes of a module, by name. inspect would parse the module for each."""
+    """Syntax trees of a module's classes, by name. inspect would parse the module for each."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
 
@@ -117,10 +117,10 @@ class Section(BaseModel):
     )
 
     keys_of_files: ClassVar[dict[str, str]] = {}
-    """Keys that only files have, and what they are."""
+    """Keys that only files have, with their descriptions."""
 
     tag: ClassVar[str] = ""
-    """Name of the kind in files; the name of the class if not given."""
+    """Tag in files, without "!"; by default the name of the class."""
 
     def __init__(self, **values: Any) -> None:
         values = tree_value(values)
@@ -145,7 +145,7 @@ class Section(BaseModel):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _without_tag(cls, tree: Any) -> Any:
-        """The keys of a mapping. Nothing is a section of defaults."""
+        """Removes the tag of a mapping. An empty section has the defaults."""
         if not isinstance(tree, dict) or tree.get(TAG) != cls.tag:
             return {} if tree is None else tree
         return {name: value for name, value in tree.items() if name != TAG}
@@ -163,7 +163,7 @@ class Section(BaseModel):
 
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
-        """All lengths in m. A copy with disturbed numbers keeps them."""
+        """All lengths (m) in the section. A copy with disturbed numbers keeps them."""
         numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
 
@@ -175,7 +175,8 @@ class Section(BaseModel):
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
-        """The section of a tree at `key`. Raises InputError that names `source` and key."""
+        """Makes the section from a tree that stands at `key`. Raises InputError that names `source`
+        and key."""
         tree = tree_value(tree)
         try:
             return cls.model_validate(tree, context=IN_FILE)
@@ -184,12 +185,13 @@ class Section(BaseModel):
 
 
 IN_FILE = "in a file"
-"""Context of a validation where quantities need units. Without it, numbers are SI."""
+"""Context of pydantic's validation of files, where quantities need units. Without it, numbers are
+SI."""
 
 
 class Kinds:
-    """Annotation of a union of sections as tagged kinds. A mapping without a tag is of the first
-    kind."""
+    """Annotation of a union of sections that a tag tells apart, such as `!Coulomb`. A mapping
+    without a tag is of the first kind."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
@@ -228,7 +230,7 @@ class Varied:
 
 
 def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
-    """Keys of the numbers in a section that are marked as Varied, with the names of the marks."""
+    """Keys of the numbers in a section with the annotation Varied, and the names that it gives."""
     for name, field in type(section).model_fields.items():
         value, inner = getattr(section, name), joined(key, name)
         yield from ((inner, mark.name) for mark in field.metadata if isinstance(mark, Varied))
@@ -239,7 +241,7 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """A tree's value with change(x) in place of each x that is no list and no mapping."""
+    """Copy of a tree with change(x) in place of each x that is no list and no mapping."""
     if isinstance(value, Mapping):
         return {name: mapped(item, change) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -248,7 +250,7 @@ def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def tree_value(value: Any) -> Any:
-    """Converts sections, tuples, arrays and numbers of numpy, and paths to what trees hold."""
+    """Converts a value from Python, such as a section, a tuple, an array or a path, to a tree."""
 
     def convert(part: Any) -> Any:
         if isinstance(part, Section):
@@ -284,7 +286,7 @@ def value_at(tree: Any, key: str) -> Any:
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
-    """A tree's value for a file. `show` makes the texts of quantities."""
+    """Copy of a tree for a file: `show` makes texts of the quantities."""
 
     def write(part: Any) -> Any:
         if not isinstance(part, Quantity):
@@ -308,7 +310,7 @@ def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
 
 
 def parts_in(value: Any) -> Iterator[Any]:
-    """A tree's value and all values in it."""
+    """A tree and all values in it."""
     yield value
     if isinstance(value, (dict, list)):
         for item in value.values() if isinstance(value, dict) else value:
