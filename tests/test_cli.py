@@ -53,8 +53,30 @@ def unchanged(work):
     assert contents() == before
 
 
-def refusal(command, capsys):
-    """The line by which a command is refused."""
+# A name that no file can have. Messages have no control characters.
+NUL = ["simulate", "simulate --scenario short.yaml --out", "export --scenario short.yaml --out"]
+NUL += ["evolve --scenario quick --out", "fit", "structure"]
+
+REFUSED = [
+    ("", "", "COMMAND"),
+    ("simulate --seed 1 good.json", " simulate", "FILE|RUN --seed"),
+    ("cpg good.json --gait good.json --out a", " cpg", "--gait FILE|RUN"),
+    ("simulate --sceanrio thesis", " simulate", "--sceanrio '--scenario'?"),
+    ("figures a --width 3.4", " figures", "--width '3.4' '3.4 in'"),
+    ("video a --out a.mp4 --fps 1e9", " video", "'1e9' 240"),
+    ("video a --out a.mp4 --size 9998x64", " video", "'9998x64' 4096"),
+    ("simulate --scenario key.yaml", ": key.yaml", "robot.tetrahedron tetrahedra"),
+    ("simulate --engine compiled --meshcat", ": scenario thesis", "engine compiled"),
+    ("simulate --scenario short.yaml --out good.json", ": good.json", ""),
+    ("simulate --scenario columb", ": columb", "'coulomb'?"),
+    ("simulate --scenario scenarios/coulom", ": scenarios/coulom", "'coulomb'?"),
+    ("structure six_baer", ": six_baer", "'six_bar'?"),
+    *((f"{command} b\0", r": b\x00", "") for command in NUL),
+]
+
+
+@pytest.mark.parametrize(("command", "source", "values"), REFUSED)
+def test_wrong_options_and_files_are_refused_in_a_line(command, source, values, unchanged, capsys):
     try:
         status = main(command.split())
     except SystemExit as ended:
@@ -62,45 +84,8 @@ def refusal(command, capsys):
     captured = capsys.readouterr()
     assert (status, captured.out) == (2, "")
     (line,) = captured.err.splitlines()
-    return line
-
-
-@pytest.mark.parametrize(
-    ("command", "source", "values"),
-    [
-        ("", "", "COMMAND"),
-        ("simulate --seed 1 good.json", " simulate", "FILE|RUN --seed"),
-        ("cpg good.json --gait good.json --out a", " cpg", "--gait FILE|RUN"),
-        ("simulate --sceanrio thesis", " simulate", "--sceanrio '--scenario'?"),
-        ("figures a --width 3.4", " figures", "--width '3.4' '3.4 in'"),
-        ("video a --out a.mp4 --fps 1e9", " video", "'1e9' 240"),
-        ("video a --out a.mp4 --size 9998x64", " video", "'9998x64' 4096"),
-        ("simulate --scenario key.yaml", ": key.yaml", "robot.tetrahedron tetrahedra"),
-        ("simulate --engine compiled --meshcat", ": scenario thesis", "engine compiled"),
-        ("simulate --scenario short.yaml --out good.json", ": good.json", ""),
-        ("structure six_baer", ": six_baer", "'six_bar'?"),
-    ],
-)
-def test_wrong_options_and_files_are_refused_in_a_line(command, source, values, unchanged, capsys):
-    line = refusal(command, capsys)
     assert line.startswith(f"tetra-drake{source}: ")
     assert all(value in line for value in values.split()), line
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "simulate --scenario short.yaml --out",
-        "simulate",
-        "export --scenario short.yaml --out",
-        "evolve --scenario quick --out",
-        "fit",
-        "structure",
-    ],
-)
-def test_a_name_that_no_file_can_have_is_refused_in_one_line(command, unchanged, capsys):
-    # Messages have no control characters.
-    assert refusal(f"{command} b\0", capsys).startswith(r"tetra-drake: b\x00: ")
 
 
 @pytest.mark.slow

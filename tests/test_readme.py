@@ -145,17 +145,8 @@ def test_winches_wind_a_structure_to_its_rest(work: Path, monkeypatch: pytest.Mo
     assert np.abs(trajectory.length[0] - rest.lengths).max() > 0.01
 
 
-def test_the_scenario_loads(work: Path) -> None:
-    (snippet,) = snippets("yaml")
-    (work / "stiff.yaml").write_text(snippet)
-    scenario = td.load_scenario("stiff.yaml")
-    assert scenario.robot.tetrahedra == 7
-    assert scenario.robot.cables.outer_stiffness == 45.0
-    assert scenario.robot.spacing != td.load_scenario("thesis").robot.spacing, "balanced"
-
-
-def test_the_scenarios_and_the_gait_of_their_page_load(work: Path) -> None:
-    for file in snippets("yaml", SCENARIOS):
+def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
+    for file in snippets("yaml") + snippets("yaml", SCENARIOS):
         if "base:" in file:
             (name,) = re.findall(r"^name: (.*)$", file, re.M)
             (work / f"{name}.yaml").write_text(file)

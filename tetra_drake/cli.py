@@ -602,19 +602,20 @@ def _structure(
     print(text)
 
 
-def _schema() -> None:
+def _schema(*, structure: bool = False) -> None:
     """Print the JSON Schema of scenario files.
 
     Editors and other tools read it: each key with its text, limits and default, each kind with its
     tag as title, each quantity as a text with a pattern, with its SI unit beside it.
 
     Args:
+        structure: of structure files instead
 
     Example: tetra-drake schema
     """
     from tetra_drake.scenario.keys import schema_text
 
-    print(schema_text(), end="")
+    print(schema_text(structure=structure), end="")
 
 
 def _prepare() -> None:
@@ -637,7 +638,7 @@ def _prepare() -> None:
 
 
 def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
-    """Print of figures with a width (m) and letters of a size (points)."""
+    """Size, fonts and files of printed figures. The width is in m, the font size in points."""
     from tetra_drake.figures.style import FILE_KINDS, Look, Print
 
     look = Look(width_in=width / INCH, font_size=font, title=title)

@@ -99,6 +99,7 @@ def evolve(
     if resume and overwrite:
         raise InputError("evolve", "overwrite", "excludes resume")
     out, progress = given_path(out, "evolve", "out"), progress or Progress()
+
     given = None if scenario is None else given_scenario(scenario)
     scenario = read_manifest(out).scenario if resume else given
     if scenario is None:
@@ -108,6 +109,7 @@ def evolve(
     if optimizer is None and isinstance(kind, SteadyState) and evaluations < kind.population:
         expected = f"expected at least the population, {kind.population}"
         raise InputError(scenario.name, "evolution.evaluations", f"found {evaluations}, {expected}")
+
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
@@ -122,17 +124,13 @@ def evolve(
         )
     with record, progress:
         count = getattr(make_executor, "workers", workers or available_cores())
-        progress.say(_introduction(out, record.manifest, count, report=report))
-        _warn_of_versions(record.manifest, progress)
-        if not resume:
-            robot = Robot.of(scenario)
-            remarks = robot.start_up_remark(), robot.gain_remark(), robot.sinking_remark()
-            for remark in filter(None, remarks):
-                progress.warn(remark)
+        drawing = f"tetra-drake figures {shlex.quote(str(out))}"
+        progress.say(_introduction(out, record.manifest, count, drawing=drawing if report else ""))
+        for warning in _warnings(record.manifest, is_new=not resume):
+            progress.warn(warning)
         trials = open_trials(record, optimizer=optimizer)
         progress.show([trial.status for trial in trials])
-        unfinished = any(trial.unevaluated for trial in trials)
-        if unfinished or (resume and objective is not None):
+        if any(trial.unevaluated for trial in trials) or (resume and objective is not None):
             evaluate = GaitEvaluation(scenario, objective)
             with evaluator_of(
                 evaluate, workers=workers, executor=make_executor, warn=progress.warn
@@ -143,7 +141,7 @@ def evolve(
         if record.manifest.reevaluate if reevaluate is None else reevaluate:
             _simulate_again(record, objective, workers, make_executor, progress)
         if report:
-            _report(out, progress)
+            _report(out, progress, drawing=drawing)
     return load_run(out)
 
 
@@ -241,36 +239,36 @@ def _completing(progress: Progress, failing: str) -> Iterator[None]:
         progress.warn(f"{failing}: {cause}")
 
 
-def _introduction(directory: Path, manifest: Manifest, workers: object, *, report: bool) -> str:
-    """Introduction to a run: method, scenario, and the files to come."""
+def _introduction(directory: Path, manifest: Manifest, workers: object, *, drawing: str) -> str:
+    """Introduction to a run: method, scenario, and the files to come. `drawing` is the command that
+    draws them; empty for none."""
     text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
     text += str(manifest.scenario)
-    if report:
+    if drawing:
         text += (
             f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "
-            f"{directory / 'report.html'}; at any time before: {_draw_again(directory)}"
+            f"{directory / 'report.html'}; at any time before: {drawing}"
         )
     return text
 
 
-def _draw_again(directory: Path) -> str:
-    """The command that draws the figures and the report of a run."""
-    return f"tetra-drake figures {shlex.quote(str(directory))}"
-
-
-def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
+def _warnings(manifest: Manifest, *, is_new: bool) -> Iterator[str]:
+    """Warnings before a search: other versions, and what in the robot hardly works."""
     if others := manifest.other_versions:
-        progress.warn(
+        yield (
             f"the run was begun with {', '.join(others)}; with other versions its record may "
             "differ from the record of an uninterrupted run"
         )
+    if is_new:
+        robot = Robot.of(manifest.scenario)
+        remarks = robot.start_up_remark(), robot.gain_remark(), robot.sinking_remark()
+        yield from filter(None, remarks)
 
 
-def _report(directory: Path, progress: Progress) -> None:
-    """Writes the report of a run."""
+def _report(directory: Path, progress: Progress, *, drawing: str) -> None:
+    """Writes the report of a run. `drawing` is the command that does so again."""
     from tetra_drake.report.run_page import write_report
 
-    problem = f"the report was not written; try again with: {_draw_again(directory)}"
-    with _completing(progress, problem):
+    with _completing(progress, f"the report was not written; try again with: {drawing}"):
         progress.say("drawing figures and the report")
         write_report(directory)

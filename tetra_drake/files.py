@@ -71,23 +71,18 @@ def writing(path: str | Path) -> Iterator[None]:
 def _remove_stale(path: Path) -> None:
     """Removes temporary files for `path` that belong to processes that have ended."""
     ours = re.compile(rf"\.{re.escape(path.stem)}\.(\d+)\.\w{{8}}{re.escape(path.suffix)}")
-    for name in os.listdir(path.parent):
-        match = ours.fullmatch(name)
-        if match and not _is_alive(int(match[1])):
-            (path.parent / name).unlink(missing_ok=True)
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (OSError, OverflowError) as error:
-        return isinstance(error, PermissionError)  # the process of another user
-    return True
+    for match in filter(None, map(ours.fullmatch, os.listdir(path.parent))):
+        try:
+            os.kill(int(match[1]), 0)
+        except PermissionError:
+            pass  # a process of another user
+        except (OSError, OverflowError):
+            (path.parent / match[0]).unlink(missing_ok=True)
 
 
 def given_path(path: str | Path, source: str, what: str) -> Path:
-    """An argument as a Path. Raises InputError, naming function `source` and argument `what`, if it
-    is neither a text nor a Path."""
+    """Converts an argument to a Path. Raises InputError, naming function `source` and argument
+    `what`, if it is neither a text nor a Path."""
     if not isinstance(path, (str, Path)):
         raise InputError(source, what, f"found {path!r:.60}, expected a path")
     return Path(path)

@@ -20,6 +20,9 @@ import typing
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
+from tetra_drake.settings.refusals import hint
+from tetra_drake.settings.units import quantity_to_si
+
 BAD_INPUT = 2  # exit status
 
 
@@ -78,8 +81,6 @@ class Parser(argparse.ArgumentParser):
         named = {name: values.pop(name) for name in [*values] if name.startswith("--")}
         values |= {name.removeprefix("--"): value for name, value in named.items() if value}
         if unknown:
-            from tetra_drake.settings.refusals import hint
-
             names = re.findall(r"--[\w-]+", parser.format_usage())
             parser.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
         return function, values
@@ -150,8 +151,6 @@ def quantity(unit: str, example: str, *, least: str, most: str) -> Callable[[str
     `example`, or its unit."""
 
     def read(text: str) -> float:
-        from tetra_drake.settings.units import quantity_to_si
-
         if re.fullmatch(r"[\d.]+", text):
             advice = f"did you mean '{text} {example.split()[1]}'?"
             raise argparse.ArgumentTypeError(f"found '{text}' without a unit; {advice}")

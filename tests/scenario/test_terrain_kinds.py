@@ -117,13 +117,6 @@ def write_heights(file: Path, heights: np.ndarray) -> None:
         np.savetxt(file, heights, delimiter=", " if file.suffix == ".csv" else " ", header="x, y")
 
 
-def scenario_file(folder: Path, terrain: str, base: str = "thesis") -> Path:
-    file = folder / "scenario.yaml"
-    folder.mkdir(exist_ok=True)
-    file.write_text(f"base: {base}\n{terrain}\n")
-    return file
-
-
 def on_field(file: Path) -> Scenario:
     return load_scenario("thesis").with_changes({"terrain": HeightField(file=str(file), cell=0.5)})
 
@@ -145,11 +138,10 @@ NO_HEIGHTS += [(HEIGHTS[None], "1 x 3 x 4"), (np.zeros((2000, 2001), dtype=np.in
 
 
 @pytest.mark.parametrize(("heights", "found"), NO_HEIGHTS)
-def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
+def test_what_are_no_heights_is_refused(load_text, tmp_path, heights, found, refused):
     np.save(tmp_path / "heights.npy", heights, allow_pickle=True)
-    file = scenario_file(tmp_path, "terrain: !HeightField {file: heights.npy, cell: 1 m}")
-    with refused(file, "terrain.file", found):
-        load_scenario(file)
+    with refused(tmp_path / "mine.yaml", "terrain.file", found):
+        load_text("terrain: !HeightField {file: heights.npy, cell: 1 m}")
 
 
 OPEN_HEADER = b"\x93NUMPY\x01\x00\x06\x00{'a':{"
@@ -158,22 +150,23 @@ OPEN_HEADER = b"\x93NUMPY\x01\x00\x06\x00{'a':{"
 @pytest.mark.parametrize("content", [b"", b"one two", b"1 2 3\n4 5\n", OPEN_HEADER])
 @pytest.mark.parametrize("name", ["heights.npy", "heights.txt"])
 @pytest.mark.filterwarnings("error")
-def test_what_is_no_height_file_is_refused(tmp_path, name, content, refused):
+def test_what_is_no_height_file_is_refused(load_text, tmp_path, name, content, refused):
     (tmp_path / name).write_bytes(content)
-    file = scenario_file(tmp_path, f"terrain: !HeightField {{file: {name}, cell: 1 m}}")
-    with refused(file, "terrain.file", name):
-        load_scenario(file)
+    with refused(tmp_path / "mine.yaml", "terrain.file", name):
+        load_text(f"terrain: !HeightField {{file: {name}, cell: 1 m}}")
 
 
 def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "hills").mkdir()
-    write_heights(tmp_path / "hills" / "heights.csv", HEIGHTS)
-    file = scenario_file(tmp_path / "hills", "terrain: !HeightField {file: heights.csv, cell: 5 m}")
-    absolute = HeightField(file=str(tmp_path / "hills" / "heights.csv"), cell=5.0)
-    assert load_scenario(file.relative_to(tmp_path)).terrain == absolute
-    based = scenario_file(tmp_path / "mine", "terrain: {cell: 1 m}", base=str(file))
-    assert load_scenario(based).terrain == HeightField(file=absolute.file, cell=1.0)
+    write_heights(tmp_path / "heights.csv", HEIGHTS)
+    Path("hilly.yaml").write_text(
+        "base: thesis\nterrain: !HeightField {file: heights.csv, cell: 5 m}"
+    )
+    absolute = HeightField(file=str(tmp_path / "heights.csv"), cell=5.0)
+    assert load_scenario("hilly.yaml").terrain == absolute
+    Path("mine").mkdir()
+    Path("mine/fine.yaml").write_text("base: ../hilly.yaml\nterrain: {cell: 1 m}")
+    assert load_scenario("mine/fine.yaml").terrain == HeightField(file=absolute.file, cell=1.0)
 
 
 def test_fields_are_equal_if_their_heights_are_wherever_they_were_read(tmp_path):
@@ -187,7 +180,8 @@ def test_fields_are_equal_if_their_heights_are_wherever_they_were_read(tmp_path)
         assert one != other
         [(key, text)], [(_, other_text)] = one.differences(other), other.differences(one)
         assert key == "terrain.file" and text != other_text
-    assert load_scenario(scenario_file(tmp_path, one.to_yaml(), base="thesis")) == one
+    (tmp_path / "whole.yaml").write_text(one.to_yaml())
+    assert load_scenario(tmp_path / "whole.yaml") == one
 
 
 @pytest.mark.parametrize("damage", ["gone", "changed"])

@@ -57,7 +57,6 @@ from tetra_drake.kernels.lanes import (
     not_,
     select,
 )
-from tetra_drake.settings.kind_text import settings_text
 from tetra_drake.settings.quantities import (
     Damping,
     DampingPerLength,
@@ -66,7 +65,7 @@ from tetra_drake.settings.quantities import (
     Stiffness,
 )
 from tetra_drake.settings.refusals import refuse
-from tetra_drake.settings.section import Kinds, Section, Varied
+from tetra_drake.settings.section import Kinds, Section, Varied, settings_text
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
 STICK = 0.0

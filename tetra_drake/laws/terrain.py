@@ -38,9 +38,8 @@ from tetra_drake.kernels.lanes import (
 from tetra_drake.laws.height_files import HeightPath
 from tetra_drake.laws.kinematics import P_WN
 from tetra_drake.laws.vectors import Vector3, put_vector
-from tetra_drake.settings.kind_text import settings_text
 from tetra_drake.settings.quantities import Angle, Length
-from tetra_drake.settings.section import Kinds, Section
+from tetra_drake.settings.section import Kinds, Section, settings_text
 from tetra_drake.settings.units import INCH
 
 GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)

@@ -14,19 +14,19 @@ REPLACED = ("objective", "require", "robot.actuated")
 """Mappings that a file replaces as a whole."""
 
 REMOVABLE = ("disturbances",)
-"""Sections that are absent if nothing is given for them."""
+"""Sections that an empty key removes, as in `disturbances:`."""
 
 
 class Part(Tree):
-    """A mapping made from dotted keys. It changes a part of a mapping, or items of a list by their
-    indices."""
+    """Mapping made from dotted keys. It changes single keys of a mapping, or single items of a
+    list, by their indices."""
 
 
 def merged(base: Any, changes: Any, key: str = "") -> Any:
-    """The tree of a scenario, or the part of it at `key`, with changes. The rules are:
+    """Merges changes into the tree of a scenario, or into its part at `key`. The rules are:
 
-    - A mapping changes the keys that it names; the others stay. Nothing, as in `friction:`, is an
-      empty mapping, but removes `disturbances`.
+    - A mapping changes the keys that it names; the others stay. An empty key, as in `friction:`,
+      changes nothing; `disturbances:` removes the section.
     - A kind with its tag replaces the base's kind and all its keys. Without a tag it changes keys.
     - `objective`, `require` and `robot.actuated` are replaced as a whole. Only dotted keys from
       Python, such as "objective.speed", change a part of them.
@@ -38,7 +38,13 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
     if not isinstance(changes, dict):
         return changes
     if isinstance(base, list) and isinstance(changes, Part):
-        return _with_items(base, changes, key)
+        items = list(base)
+        for index, value in changes.items():
+            inner = joined(key, f"[{index}]" if isinstance(index, int) else index)
+            if not isinstance(index, int) or index >= len(items):
+                raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
+            items[index] = merged(items[index], value, inner)
+        return items
     is_whole = TAG in changes or (key in REPLACED and not isinstance(changes, Part))
     tree = dict(base) if isinstance(base, dict) and not is_whole else {}
     for name, value in changes.items():
@@ -46,20 +52,9 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
     return tree
 
 
-def _with_items(base: list[Any], changes: Part, key: str) -> list[Any]:
-    """A list with other items, by their indices. Raises InputError for an index that is none."""
-    items = list(base)
-    for index, value in changes.items():
-        inner = joined(key, f"[{index}]" if isinstance(index, int) else index)
-        if not isinstance(index, int) or index >= len(items):
-            raise InputError("changes", inner, f"found no such item in a list of {len(items)}")
-        items[index] = merged(items[index], value, inner)
-    return items
-
-
 def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, Any]:
-    """An argument as changes by dotted keys. Raises InputError, naming `source`, for anything
-    else."""
+    """Checks an argument that gives changes by dotted keys. Raises InputError, naming `source`, for
+    anything else."""
     if isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes):
         return changes
     problem = f"found {changes!r:.60}, expected values by dotted keys, such as {{'cpg.gain': ...}}"
@@ -79,11 +74,7 @@ def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
                 place = place.setdefault(section, Part())
         if not isinstance(place, dict) or name in place:
             raise InputError(source, key, "is given twice")
-        place[name] = mapped(tree_value(changes[key]), _parsed)
+        place[name] = mapped(  # a text with a tag becomes its kind
+            tree_value(changes[key]), lambda x: parse_yaml(x, x) if str(x).startswith("!") else x
+        )
     return tree
-
-
-def _parsed(value: Any) -> Any:
-    """A text with the tag of a kind as the kind; other values as they are."""
-    is_kind = isinstance(value, str) and value.startswith("!")
-    return parse_yaml(value, value) if is_kind else value

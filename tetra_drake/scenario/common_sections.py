@@ -105,7 +105,7 @@ def repeated(all_joined: Iterable[str]) -> str:
 
 
 def different_keys(by_joined: dict[str, Value]) -> dict[str, Value]:
-    """Validates values by joined keys: a scenario key may be given once."""
+    """Validator of values by joined keys, such as "a.b, c.d": each key may be given once."""
     if key := repeated(by_joined):
         refuse("", f"'{key}' is given twice")
     return by_joined

@@ -50,7 +50,7 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
 
 
 def _stream(seed: Sequence[int], *names: str) -> np.random.Generator:
-    """Random numbers for the settings with these names. They do not depend on the other
+    """Random generator for the settings with these names. It does not depend on the other
     disturbances."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")

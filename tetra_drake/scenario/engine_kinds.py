@@ -18,7 +18,7 @@ class EngineSettings(Section):
     """Base class of the kinds of engines."""
 
     module: ClassVar[str]
-    """Module with the ENGINE that simulates; see engines.interface."""
+    """Module whose ENGINE simulates; see engines.engine."""
     packages: ClassVar[tuple[str, ...]] = ()
     """Packages that only this engine needs."""
 

@@ -1,22 +1,23 @@
-"""JSON Schema of scenario files, and KEYS.md, the page of all keys, which is made from it.
+"""JSON Schemas of scenario files and structure files, and the page of all keys made from them.
 
-`python -m tetra_drake.scenario.keys` writes both.
+`python -m tetra_drake.scenario.keys` writes all three.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 
 from tetra_drake.formatting import TextTable
 from tetra_drake.scenario.metrics import METRICS, Metrics
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.shipped import SCENARIOS, STRUCTURES
 from tetra_drake.settings.refusals import Tree, keys_in, members_of
 from tetra_drake.settings.section import attribute_docstrings
 from tetra_drake.settings.units import plainest
 
-PAGE, SCHEMA = (Path(__file__).parent / name for name in ("KEYS.md", "schema.json"))
+PAGE = SCENARIOS / "KEYS.md"
 
 _INTRODUCTION = """\
 # Keys of a scenario
@@ -37,12 +38,14 @@ _LIMITS = {
 _LENGTHS = {"minItems": "≥ {} items", "maxItems": "≤ {} items"}
 
 
-def schema_text() -> str:
-    """The JSON Schema of scenario files, for editors and other tools.
+def schema_text(*, structure: bool = False) -> str:
+    """JSON Schema of scenario files, or of structure files, for editors and other tools.
 
     A quantity is a text with a pattern; `unit` is its SI unit. The title of a kind is its tag.
     """
-    return json.dumps(Scenario.model_json_schema(), indent=1, ensure_ascii=False) + "\n"
+    schema = (StructureFile if structure else Scenario).model_json_schema()
+    schema["properties"].pop("file", None)  # a scenario's key, which names the structure's file
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
 def keys_page() -> str:
@@ -58,34 +61,31 @@ def keys_page() -> str:
             parts += [_table_of_keys(rows)] if rows else []
         others += [] if sections else [(key, node)]
     parts += ["## Other keys", _table_of_keys(others)]
-    parts += ["## Metrics", _line(Metrics.__doc__ or ""), _table_of_metrics()]
+    metrics, texts = [], attribute_docstrings(Metrics)
+    for name, metric in METRICS.items():
+        limit = "at most" if metric.is_cost else "at least"
+        metrics.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", texts[name]))
+    parts += ["## Metrics", _line(Metrics.__doc__ or "")]
+    parts.append(_table("metric", "unit", "`require`", "robots", rows=metrics))
     return "\n\n".join(parts) + "\n"
 
 
 def _table_of_keys(rows: Iterable[tuple[str, Tree]]) -> str:
-    cells = [
-        (f"`{key}`", _value(node), _default(node), _line(node["description"])) for key, node in rows
-    ]
-    return TextTable(["key", "value", "default", "what it is"], cells, range(4)).markdown()
+    cells = []
+    for key, node in rows:
+        default = json.dumps(node["default"]).strip('"') if "default" in node else ""
+        if default in ("null", "[]", "{}"):
+            default = "none"
+        elif default and "unit" not in node:
+            default = f"`{default}`"
+        cells.append((f"`{key}`", _value(node), default, node["description"]))
+    return _table("key", "value", "default", rows=cells)
 
 
-def _table_of_metrics() -> str:
-    rows, texts = [], attribute_docstrings(Metrics)
-    for name, metric in METRICS.items():
-        limit, text = "at most" if metric.is_cost else "at least", _line(texts[name])
-        rows.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", text))
-    headings = ["metric", "unit", "`require`", "robots", "what it is"]
-    return TextTable(headings, rows, range(5)).markdown()
-
-
-def _default(node: Tree) -> str:
-    """The default as text of a file; empty if there is none."""
-    if "default" not in node:
-        return ""
-    text = json.dumps(node["default"]).strip('"')
-    if text in ("null", "[]", "{}"):
-        return "none"
-    return text if "unit" in node else f"`{text}`"
+def _table(*headings: str, rows: Iterable[Sequence[str]]) -> str:
+    """A table of texts in Markdown, whose last column says what something is."""
+    lines = [[*cells, _line(text)] for *cells, text in rows]
+    return TextTable([*headings, "what it is"], lines, range(len(headings) + 1)).markdown()
 
 
 def _value(node: Tree) -> str:
@@ -116,4 +116,6 @@ def _line(text: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(keys_page(), encoding="utf-8")
-    SCHEMA.write_text(schema_text(), encoding="utf-8")
+    for folder in (SCENARIOS, STRUCTURES):
+        text = schema_text(structure=folder == STRUCTURES)
+        (folder / "schema.json").write_text(text, encoding="utf-8")

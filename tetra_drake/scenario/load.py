@@ -13,7 +13,7 @@ from tetra_drake.scenario.shipped import SCENARIOS, shipped_scenarios
 from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 from tetra_drake.settings.refusals import no_such
-from tetra_drake.settings.section import Tree, keys_of, written
+from tetra_drake.settings.section import keys_of, written
 
 SCENARIO = "scenario.yaml"
 """The scenario's file in the folder of a command."""
@@ -42,7 +42,7 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
 
 
 class HasScenario(Protocol):
-    """A run, or the result of a simulation."""
+    """Object with a scenario: a run, or the result of a simulation."""
 
     @property
     def scenario(self) -> Scenario: ...
@@ -53,8 +53,8 @@ GivenScenario = Scenario | HasScenario | str | Path
 
 
 def given_scenario(scenario: GivenScenario) -> Scenario:
-    """The scenario of an argument: a scenario, its name or file, or a run. Raises InputError for
-    anything else."""
+    """The scenario that an argument gives: a scenario, its name or file, or a run. Raises
+    InputError for anything else."""
     if isinstance(scenario, (str, Path)):
         in_folder = Path(scenario) / SCENARIO
         is_folder = str(scenario) not in shipped_scenarios() and os.path.isfile(in_folder)
@@ -92,7 +92,13 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     given = read_mapping(file, "scenario file", keys=keys)
     if file.resolve() in seen:
         raise InputError(file, "base", "the scenario is based on itself")
-    _resolve_files(given, file)
+
+    terrain, robot = given.get("terrain"), given.get("robot")
+    if isinstance(terrain, dict) and isinstance(terrain.get("file"), str):
+        terrain["file"] = os.path.abspath(file.parent / terrain["file"])
+    if isinstance(robot, dict) and isinstance(robot.get("file"), str):
+        robot["file"] = os.path.abspath(structure_file(robot["file"], file.parent))
+
     base = given.pop("base", None)
     if base is None:
         return Scenario.from_tree(given, file)
@@ -103,13 +109,3 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
         problem = no_such("scenario file", base, shipped_scenarios())
         raise InputError(file, "base", f"'{base}': {problem}")
     return _load(base_file, (*seen, file.resolve())).with_file(given, file)
-
-
-def _resolve_files(given: Tree, file: Path) -> None:
-    """Makes the paths of height and structure files absolute; they are relative to the scenario
-    file."""
-    terrain, robot = given.get("terrain"), given.get("robot")
-    if isinstance(terrain, dict) and isinstance(terrain.get("file"), str):
-        terrain["file"] = os.path.abspath(file.parent / terrain["file"])
-    if isinstance(robot, dict) and isinstance(robot.get("file"), str):
-        robot["file"] = os.path.abspath(structure_file(robot["file"], file.parent))

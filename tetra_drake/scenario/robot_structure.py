@@ -68,6 +68,9 @@ Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
     pydantic.BeforeValidator(lambda axes: "".join(sorted(axes)) if isinstance(axes, str) else axes),
+    pydantic.WithJsonSchema(
+        {"type": "string", "pattern": r"^(?!.*(.).*\1)[xyz]{1,3}$", "format": "some of x, y, z"}
+    ),
 ]
 Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 

@@ -173,7 +173,7 @@ class Scenario(Section):
 
     @property
     def lacking(self) -> tuple[str, ...]:
-        """What some metrics need and the robot does not have; see scenario.metrics."""
+        """Properties that some metrics need and this robot does not have; see scenario.metrics."""
         return *self.robot.lacking, *self.actuation.lacking
 
     @property
@@ -230,49 +230,36 @@ class Scenario(Section):
         return {key: value for key, value in flattened(tree).items() if isinstance(value, float)}
 
     @model_validator(mode="after")
-    def _check(self) -> Scenario:
-        """Refuses combinations of settings from different sections."""
-        step, duration = self.cpg.listing_step, self.simulation.duration
-        if step > duration:
-            problem = f"found {step} s, expected at most the duration, {duration} s"
-            refuse("cpg.listing_step", problem)
+    def _check_combinations(self) -> Self:
+        """Refuses settings from different sections that do not go together."""
+        simulation, step = self.simulation, self.cpg.listing_step
+        if step > simulation.duration:
+            expected = f"expected at most the duration, {simulation.duration} s"
+            refuse("cpg.listing_step", f"found {step} s, {expected}")
         if "load" in self.cpg.feedback and self.robot.gravity == 0.0:
             refuse("robot.gravity", "found 0 m/s^2, expected a weight, for feedback of the load")
-        self._check_metrics()
-        self._check_memory()
-        self._check_sides()
-        self._check_disturbances()
-        return self
 
-    def _check_metrics(self) -> None:
-        """Refuses a metric that the robot does not have."""
         measures = getattr(self.optimizer, "measures", {})
         named = {"objective": self.objective, "require": self.require}
         for key, metrics in {**named, "optimizer.measures": measures}.items():
-            for name in metrics:
-                for section in (self.robot, self.actuation):
-                    if METRICS[name].needs in section.lacking:
-                        problem = f"does not have this metric; give `{key}` without it"
-                        refuse(f"{key}.{name}", f"!{section.tag} {problem}")
+            for name, section in itertools.product(metrics, (self.robot, self.actuation)):
+                if METRICS[name].needs in section.lacking:
+                    problem = f"does not have this metric; give `{key}` without it"
+                    refuse(f"{key}.{name}", f"!{section.tag} {problem}")
 
-    def _check_memory(self) -> None:
-        """Refuses simulations that do not fit in memory."""
-        simulation, is_drake = self.simulation, isinstance(self.engine, Drake)
+        is_drake = isinstance(self.engine, Drake)
         most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
         least_step = simulation.duration * self.oscillators / most_signals
         least_sample = simulation.duration * self.robot.body_count / MOST_SAMPLES
-        periods = {
-            "cpg.listing_step": (self.cpg.listing_step, least_step),
-            "simulation.sample_period": (simulation.sample_period, least_sample),
-            "engine.step": (getattr(self.engine, "step", math.inf), least_step),
-        }
-        for key, (period, least) in periods.items():
+        for key, period, least in (
+            ("cpg.listing_step", step, least_step),
+            ("simulation.sample_period", simulation.sample_period, least_sample),
+            ("engine.step", getattr(self.engine, "step", math.inf), least_step),
+        ):
             if period < least:
                 problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
                 refuse(key, f"{problem}, for this duration and robot")
 
-    def _check_sides(self) -> None:
-        """Refuses turning or mirrored gaits for robots whose cables are not left or right."""
         blueprint, bounds = self.robot.blueprint(), self.gait_bounds
         if bounds.turn != 0.0 and not blueprint.sides.any():
             expected = "expected 0, as no group is on one side"
@@ -281,11 +268,13 @@ class Scenario(Section):
             oscillator = blueprint.oscillators[blueprint.images.index(None)]
             expected = f"expected false, as '{oscillator}' has no mirror image"
             refuse("gait_bounds.mirrored", f"found true, {expected}")
+        return self
 
-    def _check_disturbances(self) -> None:
+    @model_validator(mode="after")
+    def _check_disturbances(self) -> Self:
         """Refuses disturbances that make a number invalid."""
         if self.disturbances is None:
-            return
+            return self
         undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
         for joined, spread in self.disturbances.spreads.items():
             place, keys = f"disturbances.spreads.{joined}", separate(joined)
@@ -299,6 +288,7 @@ class Scenario(Section):
                 except InputError as error:
                     problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
                     refuse(place, problem)
+        return self
 
 
 @functools.cache

@@ -1,1 +1,1 @@
-"""Settings: sections with units, tagged kinds, and errors of one line."""
+"""Settings as pydantic models: numbers with units, tagged kinds, errors of one line."""

@@ -1,4 +1,4 @@
-"""Quantities: numbers in SI; their type gives the unit. In files they are texts with units.
+"""Types of quantities: SI numbers that files give as texts with units.
 
 A field `stiffness: Stiffness = Field(gt=0)` reads "25 lbf/in" as a number in N/m. Items of lists
 and mappings may have such types, too.
@@ -19,7 +19,7 @@ from tetra_drake.settings.units import PATTERN, plainest, quantity_to_si
 
 
 class Quantity(float):
-    """A number in the tree of a scenario, with its SI unit."""
+    """SI number with its unit, as the tree of a scenario holds it."""
 
     unit: str
 
@@ -33,10 +33,10 @@ class Quantity(float):
 
 
 def quantity(unit: str, **words: float) -> tuple[Any, ...]:
-    """Annotations of a type of numbers with an SI unit. In a file, each of `words` stands for a
-    number.
+    """Annotations that make `float` the type of a quantity in an SI unit.
 
-    In a validation with a context (of a file), numbers without a unit are refused, except 0.
+    In a file, each of `words` stands for a number. In a validation with a context (of a file),
+    numbers without a unit are refused, except 0.
     """
     expected = f"expected a quantity that converts to {unit}"
 
@@ -49,9 +49,6 @@ def quantity(unit: str, **words: float) -> tuple[Any, ...]:
             raise ValueError(f"found {described(value)} without a unit, {expected}")
         return value
 
-    def write(number: float) -> Any:
-        return Quantity(number, unit)
-
     schema: dict[str, Any] = {
         "type": ["string", "number"],
         "pattern": f"^({'|'.join((*words, PATTERN))})$",
@@ -60,7 +57,8 @@ def quantity(unit: str, **words: float) -> tuple[Any, ...]:
         "then": {"const": 0, "errorMessage": expected},
         "unit": unit,
     }
-    return BeforeValidator(read), PlainSerializer(write), Field(json_schema_extra=schema)
+    write = PlainSerializer(lambda number: Quantity(number, unit))
+    return BeforeValidator(read), write, Field(json_schema_extra=schema)
 
 
 Length = Annotated[float, *quantity("m")]
@@ -91,12 +89,12 @@ Keyed = Annotated[
     BeforeValidator(lambda given: {} if given is None else given),
     Field(json_schema_extra=EMPTY),
 ]
-"""A mapping with names of the user's choice. Nothing is an empty mapping."""
+"""Mapping whose keys the user chooses. In a file it may be left empty."""
 
 
 @dataclass(frozen=True)
 class ByName:
-    """Annotation of a type of mappings with a number, or several, by each name."""
+    """Annotation of a mapping from given names, such as metrics, to numbers with units."""
 
     units: Mapping[str, str]
     """SI units by name; "" for a number without a unit."""
@@ -118,3 +116,8 @@ class ByName:
         strict = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
         table = core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=strict)
         return core_schema.no_info_wrap_validator_function(in_order, table)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: pydantic.GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return handler(schema) | EMPTY

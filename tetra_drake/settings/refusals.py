@@ -1,4 +1,4 @@
-"""Error messages about the values of a tree."""
+"""One-line error messages about wrong settings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Tree = dict[str, Any]
 
 TAG = "_tag"
-"""Key of a mapping in a tree that holds the tag of its kind."""
+"""Key under which a tree keeps the tag of a kind, such as "Coulomb" of `!Coulomb`."""
 
 _LONGEST_LIST = 200
 """Characters of a list of names."""
@@ -29,17 +29,27 @@ _MOST_NAMES, _LONGEST_NAME = 2000, 100
 
 
 def refuse(key: str, problem: str) -> NoReturn:
-    """Ends a validation with a problem. `key` is relative to the validated value."""
+    """Raises the InputError of a validator. `key` is relative to the section."""
     raise InputError("", key, problem)
 
 
 def input_error(
     error: ValidationError, section: type[BaseModel], tree: Any, source: object, key: str = ""
 ) -> InputError:
-    """The error of a tree as a section at `key`, as an InputError that names `source`."""
-    first = max(error.errors(include_url=False), key=_telling)
+    """Converts pydantic's error to an InputError that names `source` and key.
+
+    `tree` is the content of the section, which stands at `key`.
+    """
+    from pydantic.json_schema import GenerateJsonSchema
+
+    # An unknown key tells why another is missing. A value that fits no member of a union has an
+    # error per member: the innermost tells most, then one that is not about the type.
+    first = max(
+        error.errors(include_url=False),
+        key=lambda one: (one["type"] in _UNKNOWN, len(one["loc"]), "_type" not in one["type"]),
+    )
     is_unknown, name = first["type"] in _UNKNOWN, str(first["loc"][-1]) if first["loc"] else ""
-    schema = section.model_json_schema()
+    schema = section.model_json_schema(schema_generator=GenerateJsonSchema)  # without texts
     members = kinds = [schema]
     # The place also contains tags and names of union members, which are no keys.
     for part in first["loc"][:-1] if is_unknown else first["loc"]:
@@ -61,18 +71,11 @@ def input_error(
 
 
 _UNKNOWN = "extra_forbidden", "invalid_key"
-"""Types of pydantic's errors of keys that a section does not have."""
-
-
-def _telling(error: ErrorDetails) -> tuple[bool, int, bool]:
-    """How much an error tells. An unknown key tells why another is missing. A value that fits no
-    member of a union has an error per member: the innermost tells most, then one that is not about
-    the type."""
-    return error["type"] in _UNKNOWN, len(error["loc"]), "_type" not in error["type"]
+"""Types of pydantic's errors about unknown keys."""
 
 
 def members_of(node: Tree, schema: Tree) -> list[Tree]:
-    """Members of a union in a JSON Schema, or a type that is no union. Sections are resolved."""
+    """Types in a union of a JSON Schema, or the only type. References to sections are resolved."""
     sections = {"": {}} | schema.get("$defs", {})
     members = node.get("anyOf", [node])
     return [sections[one.get("$ref", "").rpartition("/")[2]] | one for one in members]
@@ -90,8 +93,8 @@ def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, T
 
 
 def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
-    """The types of a part of the types `members`: of a kind, or of an item. Other parts have the
-    same types."""
+    """Types of a value's part, which pydantic names by key, index or tag. `members` are the types
+    of the value, which also stand for any other name."""
     for member in members:
         if member.get("title") == f"!{part}":
             return [member]
@@ -103,7 +106,7 @@ def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
 
 
 def _advice(name: str, members: list[Tree], kinds: list[Tree], schema: Tree) -> str:
-    """Advice about a key that a section does not have."""
+    """Advice for an unknown key: a kind or an inner section that has it, or a similar key."""
     meant = [kind["title"] for kind in kinds if "title" in kind and name in kind["properties"]]
     keys = [key for member in members for key, _ in keys_in(member, schema)]
     meant += [f"'{key}'" for key in keys if key.endswith(f".{name}")]
@@ -114,7 +117,7 @@ def _advice(name: str, members: list[Tree], kinds: list[Tree], schema: Tree) -> 
 
 
 def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str, str]:
-    """Key in a value, and problem, of pydantic's error."""
+    """Inner key and problem in one of pydantic's errors."""
     kind, context, found = error["type"], error.get("ctx", {}), f"found {described(value)}"
     if kind == "value_error":
         cause = context["error"]
@@ -132,12 +135,12 @@ def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str
 
 
 def joined(key: str, inner: str) -> str:
-    """Joins a key and an inner key, such as "robot" and "gravity", or "pairs" and "[0]"."""
+    """Dotted key of an inner key, such as "robot.gravity", or "pairs[0]" for "[0]" in "pairs"."""
     return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 
 def described(value: Any) -> str:
-    """Description of a tree's value for a message."""
+    """Description of a value for a message, such as "a list" or "!Coulomb"."""
     if isinstance(value, dict):
         return f"!{value[TAG]}" if TAG in value else "a mapping"
     if value is None:
@@ -160,5 +163,5 @@ def hint(name: Any, names: Iterable[str]) -> str:
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
-    """Text of the error for a name or path that is neither shipped nor a file."""
+    """Error text for a name that is neither shipped nor a file."""
     return f"no such {what}; {hint(name.rpartition('/')[2], shipped)}"

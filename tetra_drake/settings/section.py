@@ -1,4 +1,4 @@
-"""Sections of settings as pydantic models: tagged kinds, trees, and errors of one line.
+"""Sections of settings as pydantic models, with tagged kinds and errors of one line.
 
 A *tree* is the content of a YAML file: mappings, lists, numbers and texts. Quantities are texts
 with units. A tagged kind, written `!Name {...}` as in Drake's YAML, is a mapping with its tag under
@@ -15,14 +15,15 @@ import os
 import re
 import sys
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self, Union
 
 import pydantic
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.errors import InputError
 from tetra_drake.settings.quantities import EMPTY, Quantity
@@ -37,10 +38,6 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
     """Changes pydantic's JSON Schema of a section to what files may contain."""
     schema |= EMPTY
     schema.pop("required", None)  # a base may have the keys
-    texts = attribute_docstrings(section)
-    for name, field in section.model_fields.items():
-        if name in texts:
-            schema["properties"][field.alias or name]["description"] = texts[name]
     for key, text in section.keys_of_files.items():
         schema["properties"][key] = {"type": "string", "default": None, "description": text}
     for node in parts_in(schema):
@@ -60,9 +57,25 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
             node["default"] = plainest(default, node["unit"])
 
 
+class SchemaWithTexts(GenerateJsonSchema):
+    """JSON Schema whose keys are described by the docstrings of attributes.
+
+    The docstrings are read from the source only here. pydantic's own option reads them at every
+    import, which takes 0.15 s.
+    """
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> Tree:
+        """The schema of a section."""
+        section: Any = schema["cls"]
+        made, texts = super().model_schema(schema), attribute_docstrings(section)
+        for name, field in section.model_fields.items():
+            if name in texts:
+                made["properties"][field.alias or name]["description"] = texts[name]
+        return made
+
+
 def attribute_docstrings(owner: type) -> dict[str, str]:
-    """The docstrings of the attributes of a class and its bases, by name. (pydantic would read them
-    whenever the class is imported.)"""
+    """Docstrings of the attributes of a class and of its bases, by name."""
     texts = {}
     for base in reversed(owner.__mro__):
         if not base.__module__.startswith("tetra_drake"):
@@ -77,7 +90,7 @@ def attribute_docstrings(owner: type) -> dict[str, str]:
 
 @functools.cache
 def _classes_in(module: str) -> dict[str, ast.ClassDef]:
-    """Sources of the classes of a module, by name. inspect would parse the module for each."""
+    """Syntax trees of a module's classes, by name. inspect would parse the module for each."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
 
@@ -104,10 +117,10 @@ class Section(BaseModel):
     )
 
     keys_of_files: ClassVar[dict[str, str]] = {}
-    """Keys that only files have, and what they are."""
+    """Keys that only files have, with their descriptions."""
 
     tag: ClassVar[str] = ""
-    """Name of the kind in files; the name of the class if not given."""
+    """Tag in files, without "!"; by default the name of the class."""
 
     def __init__(self, **values: Any) -> None:
         values = tree_value(values)
@@ -132,7 +145,7 @@ class Section(BaseModel):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _without_tag(cls, tree: Any) -> Any:
-        """The keys of a mapping. Nothing is a section of defaults."""
+        """Removes the tag of a mapping. An empty section has the defaults."""
         if not isinstance(tree, dict) or tree.get(TAG) != cls.tag:
             return {} if tree is None else tree
         return {name: value for name, value in tree.items() if name != TAG}
@@ -150,13 +163,20 @@ class Section(BaseModel):
 
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
-        """All lengths in m. A copy with disturbed numbers keeps them."""
+        """All lengths (m) in the section. A copy with disturbed numbers keeps them."""
         numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
 
     @classmethod
+    def model_json_schema(cls, *arguments: Any, **options: Any) -> Tree:
+        """JSON Schema of what files may contain, with the texts of the keys."""
+        options.setdefault("schema_generator", SchemaWithTexts)
+        return super().model_json_schema(*arguments, **options)
+
+    @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
-        """The section of a tree at `key`. Raises InputError that names `source` and key."""
+        """Makes the section from a tree that stands at `key`. Raises InputError that names `source`
+        and key."""
         tree = tree_value(tree)
         try:
             return cls.model_validate(tree, context=IN_FILE)
@@ -165,12 +185,13 @@ class Section(BaseModel):
 
 
 IN_FILE = "in a file"
-"""Context of a validation where quantities need units. Without it, numbers are SI."""
+"""Context of pydantic's validation of files, where quantities need units. Without it, numbers are
+SI."""
 
 
 class Kinds:
-    """Annotation of a union of sections as tagged kinds. A mapping without a tag is of the first
-    kind."""
+    """Annotation of a union of sections that a tag tells apart, such as `!Coulomb`. A mapping
+    without a tag is of the first kind."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
@@ -182,14 +203,10 @@ class Kinds:
                 return str((value or {}).get(TAG, kinds[0].tag))
             return value.tag if isinstance(value, Section) else None
 
-        def write(section: Section, dump: pydantic.SerializerFunctionWrapHandler) -> Any:
-            return {TAG: section.tag} | dump(section)
-
         tagged = [Annotated[kind, Tag(kind.tag), Field(title=f"!{kind.tag}")] for kind in kinds]
         union: Any = Union[tuple(tagged)]  # noqa: UP007
-        return handler.generate_schema(
-            Annotated[union, Discriminator(tag_of), pydantic.WrapSerializer(write)]
-        )
+        write = pydantic.WrapSerializer(lambda kind, dump: {TAG: kind.tag} | dump(kind))
+        return handler.generate_schema(Annotated[union, Discriminator(tag_of), write])
 
 
 def _hashable(value: Any) -> Any:
@@ -213,7 +230,7 @@ class Varied:
 
 
 def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
-    """Keys of the numbers in a section that are marked as Varied, with the names of the marks."""
+    """Keys of the numbers in a section with the annotation Varied, and the names that it gives."""
     for name, field in type(section).model_fields.items():
         value, inner = getattr(section, name), joined(key, name)
         yield from ((inner, mark.name) for mark in field.metadata if isinstance(mark, Varied))
@@ -224,7 +241,7 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """A tree's value with change(x) in place of each x that is no list and no mapping."""
+    """Copy of a tree with change(x) in place of each x that is no list and no mapping."""
     if isinstance(value, Mapping):
         return {name: mapped(item, change) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -233,7 +250,7 @@ def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def tree_value(value: Any) -> Any:
-    """Converts sections, tuples, arrays and numbers of numpy, and paths to what trees hold."""
+    """Converts a value from Python, such as a section, a tuple, an array or a path, to a tree."""
 
     def convert(part: Any) -> Any:
         if isinstance(part, Section):
@@ -269,7 +286,7 @@ def value_at(tree: Any, key: str) -> Any:
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
-    """A tree's value for a file. `show` makes the texts of quantities."""
+    """Copy of a tree for a file: `show` makes texts of the quantities."""
 
     def write(part: Any) -> Any:
         if not isinstance(part, Quantity):
@@ -279,8 +296,21 @@ def written(value: Any, show: Show = "{!r} {}".format) -> Any:
     return mapped(value, write)
 
 
+def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
+    """Settings in brackets after a blank, such as " (slope 5 deg)"; empty if there are none.
+
+    Numbers have the unit that needs the fewest digits. Defaults are left out, except the settings
+    named in `always`.
+    """
+    given = written(kind.model_dump(exclude_defaults=True), plainest)
+    settings = {name: getattr(kind, name) for name in always} | given
+    lists = {name: " ".join(value) for name, value in settings.items() if isinstance(value, list)}
+    texts = [f"{name} {value}" for name, value in (settings | lists).items()]
+    return f" ({', '.join(texts)})" if texts else ""
+
+
 def parts_in(value: Any) -> Iterator[Any]:
-    """A tree's value and all values in it."""
+    """A tree and all values in it."""
     yield value
     if isinstance(value, (dict, list)):
         for item in value.values() if isinstance(value, dict) else value:

@@ -22,7 +22,7 @@ POUND_FORCE = 4.4482216152605  # N, exact
 
 @dataclass(frozen=True)
 class Units:
-    """Units of shown numbers: of lengths and forces. Angles are in degrees, the rest is in SI."""
+    """Units of length and force for readers. Angles are shown in degrees, other numbers in SI."""
 
     length: float
     """Size in m."""
@@ -39,13 +39,15 @@ class Units:
 
     @property
     def decimals(self) -> int:
-        """Number of decimals of a distance in a sentence, which then tells about 1 mm. Tables and
-        figures have one more."""
+        """Number of decimals of a distance in a sentence: about 1 mm is seen. Tables and figures
+        have one more."""
         return round(math.log10(self.length / 0.001))
 
     def of(self, unit: str) -> tuple[float, str]:
-        """Unit in place of an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name. A
-        unit with other dimensions than length, force, angle and time is returned as it is."""
+        """Size (SI) and name of the unit in place of an SI unit, such as "lbf/in" for "N/m".
+
+        A unit with other dimensions than length, force, angle and time is returned as it is.
+        """
         names = {"m": self.length_name, "N": self.force_name, "rad": "deg", "s": "s"}
         words = re.findall("[A-Za-z]+", unit)
         if not words or not names.keys() >= set(words) or (self.force == 1.0 and "N" in words):
@@ -86,7 +88,7 @@ def shown_in(name: str | None) -> Iterator[None]:
 
 
 def current(own: Units) -> Units:
-    """The units of shown_in(); otherwise `own`."""
+    """The units that shown_in() has chosen; without a choice, `own`."""
     return _chosen.get() or own
 
 
@@ -167,8 +169,7 @@ def given_quantity(text: str, unit: str, source: object, key: str) -> float:
 
 
 def plainest(number: float, unit: str) -> str:
-    """A number given in an SI unit, as text in the unit that needs the fewest digits, such as
-    "20 ms"."""
+    """Text of an SI number in the unit that needs the fewest digits, such as "20 ms"."""
     if number == 0.0:
         return "0"
     candidates = [INCHES.of(unit), *_SMALL.get(unit, []), (1.0, unit.removeprefix("1"))]
@@ -177,8 +178,7 @@ def plainest(number: float, unit: str) -> str:
 
 
 def shortest(number: float, unit: str) -> str:
-    """The text of plainest(), if it reads as exactly the same number; otherwise the exact number in
-    SI."""
+    """Text of plainest() if it reads as exactly the same number; otherwise the exact SI number."""
     exact = f"{number!r} {unit}"
     text = plainest(number, unit)
     return text if " " in text and quantity_to_si(text, unit) == number else exact
