@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws.tally import Tally
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws.actuator import DIRECT, DRIVE, DRIVE_COLUMNS, LIMITED, TENSION_MOTOR, WINCH
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
 from tetra_drake.laws.kinematics import NODE_COLUMNS, P_WN, V_WN

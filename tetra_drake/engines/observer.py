@@ -6,10 +6,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tetra_drake.kernels.allocation import write_tables
 from tetra_drake.kernels.compiling import compiled, machine_code
 from tetra_drake.kernels.lanes import Table
-from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.kernels.packed import Packed, unpacked, write_tables
 from tetra_drake.laws.actuator import DRIVE
 from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot

@@ -1,4 +1,14 @@
-"""Packed arguments: nested NamedTuples of arrays as one pointer.
+"""NamedTuples of tables: allocated by their annotations, and packed for kernels as one pointer.
+
+The annotation of a table defines its shape:
+
+    class Motion(NamedTuple):
+        state: Annotated[Table, "13 * bodies"]
+        rows: Annotated[Table, "bodies", 6, "width"]
+        passed: Annotated[Table, "bodies", int]
+        least: Annotated[Table, 1, math.inf]
+
+    motion = allocate(Motion, {"bodies": 5, "width": 12})
 
 Numba converts each array at each call: 44 ns for an array, 120 ns for one in a NamedTuple. In the
 kernel each array has a reference count. For the constants of a robot, this takes longer than the
@@ -14,8 +24,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+import math
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Generic, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite import ir
@@ -34,13 +45,50 @@ from numba.extending import (
     unbox,
 )
 
-from tetra_drake.kernels.lanes import Field, FieldArray
+from tetra_drake.kernels.lanes import Field, FieldArray, NamedTupleT
 
 Values = TypeVar("Values", bound=tuple)
 
 _intrinsic: Callable[..., Any] = intrinsic
 
 _WORD = ir.IntType(64)
+
+_hints = functools.cache(functools.partial(get_type_hints, include_extras=True))
+
+
+def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
+    """A NamedTuple of new tables.
+
+    Args:
+        kind: class of the NamedTuple. The annotation of a table has a length per dimension: a
+            number, the name of a size, or a product. With `int`, the table has integers. With a
+            float, all numbers have this value; otherwise they are 0. A field without annotation is
+            a NamedTuple of tables.
+        sizes: sizes by name.
+    """
+    fields = []
+    for hint in _hints(kind).values():
+        if get_origin(hint) is not Annotated:
+            fields.append(allocate(hint, sizes))
+            continue
+        marks = hint.__metadata__
+        lengths = [str(mark).split(" * ") for mark in marks if isinstance(mark, (int, str))]
+        shape = [
+            math.prod(int(factor) if factor.isdigit() else sizes[factor] for factor in factors)
+            for factors in lengths
+        ]
+        start = next((mark for mark in marks if isinstance(mark, float)), 0.0)
+        fields.append(np.full(shape, start, dtype=np.int64 if int in marks else np.float64))
+    return kind(*fields)
+
+
+def write_tables(to: NamedTupleT, source: NamedTupleT) -> None:
+    """Writes the numbers of a NamedTuple of tables to another one of the same sizes."""
+    for ours, theirs in zip(to, source, strict=True):
+        if isinstance(ours, tuple):
+            write_tables(ours, theirs)
+        else:
+            ours[...] = theirs
 
 
 class PackedKind(types.Type):
@@ -56,10 +104,6 @@ class PackedKind(types.Type):
         # The name is a part of the name of each function, so it is short.
         content = ", ".join(f"{name}: {kind}" for name, kind in zip(names, members, strict=True))
         super().__init__(name=f"Packed({hashlib.sha256(content.encode()).hexdigest()[:16]})")
-
-    def first_word(self, place: int) -> int:
-        """Index of the first word of a member."""
-        return sum(map(_words, self.members[:place]))
 
 
 def _words(kind: types.Type) -> int:
@@ -114,9 +158,7 @@ class _PackedModel(models.PrimitiveModel):
         super().__init__(manager, kind, _WORD.as_pointer())
 
 
-@typeof_impl.register(Packed)
-def _typeof(value: Packed[Any], context: Any) -> types.Type:
-    return value.kind
+typeof_impl.register(Packed)(lambda value, context: value.kind)
 
 
 @unbox(PackedKind)
@@ -143,7 +185,7 @@ def _attribute(context: Any, builder: Any, packed: PackedKind, words: Any, name:
 def _member(context: Any, builder: Any, packed: PackedKind, words: Any, place: int) -> Any:
     """Emits the reading of a member."""
     kind: Any = packed.members[place]
-    first = packed.first_word(place)
+    first = sum(map(_words, packed.members[:place]))
 
     def word(index: int) -> Any:
         loaded = builder.load(builder.gep(words, [ir.Constant(_WORD, first + index)]))

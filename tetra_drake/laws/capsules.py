@@ -33,9 +33,9 @@ from typing import Annotated, ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, minimum, named
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws import kinematics
 from tetra_drake.laws.contact import NormalForce, normal_force
 from tetra_drake.laws.struts import (

@@ -6,10 +6,9 @@ from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
-from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.kernels.packed import Packed, allocate, unpacked
 from tetra_drake.laws import actuator, cable, capsules, contact, kinematics, terrain
 from tetra_drake.laws.friction import friction_force
 from tetra_drake.laws.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia

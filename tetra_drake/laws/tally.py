@@ -14,9 +14,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, Self
 
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, minimum, select
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws import cable
 from tetra_drake.laws.actuator import LIMITS, exertion
 from tetra_drake.laws.clearance import least_strut_distance
