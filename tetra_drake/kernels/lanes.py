@@ -66,7 +66,7 @@ from tetra_drake.kernels.compiling import inlined
 
 Real: TypeAlias = float
 Truth: TypeAlias = bool
-Table: TypeAlias = Any
+Table: TypeAlias = np.ndarray
 
 NamedTupleT = TypeVar("NamedTupleT", bound=tuple)
 
@@ -471,9 +471,11 @@ class _SetItem(AbstractTemplate):
 # Without `align`, LLVM assumes that a vector is at a multiple of its size, and crashes otherwise.
 
 
-@lower_builtin(operator.getitem, Field, types.Any)
-def _lower_getitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-    return builder.load(_place(context, builder, kinds.args[0], *args), align=8)
+lower_builtin(operator.getitem, Field, types.Any)(
+    lambda context, builder, kinds, args: builder.load(
+        _place(context, builder, kinds.args[0], *args), align=8
+    )
+)
 
 
 @lower_builtin(operator.setitem, Field, types.Any, types.Any)

@@ -57,7 +57,7 @@ _hints = functools.cache(functools.partial(get_type_hints, include_extras=True))
 
 
 def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
-    """A NamedTuple of new tables.
+    """A NamedTuple of new tables, with shapes from the annotations of its fields.
 
     Args:
         kind: class of the NamedTuple. The annotation of a table has a length per dimension: a
@@ -106,6 +106,9 @@ class PackedKind(types.Type):
         super().__init__(name=f"Packed({hashlib.sha256(content.encode()).hexdigest()[:16]})")
 
 
+_kind = functools.cache(PackedKind)  # numba needs longer to make a type than to find it
+
+
 def _words(kind: types.Type) -> int:
     """Number of words of a value."""
     if isinstance(kind, PackedKind):
@@ -131,7 +134,8 @@ class Packed(Generic[Values]):
 def _pack(value: Any, words: list[int]) -> types.Type:
     """Appends the words of a value to `words`. Returns the numba type of the value."""
     if isinstance(value, tuple):
-        return _kind(type(value), tuple(_pack(item, words) for item in value))
+        names = getattr(value, "_fields", None) or tuple(map(str, range(len(value))))
+        return _kind(names, tuple(_pack(item, words) for item in value))
     if isinstance(value, np.ndarray):
         value = FieldArray(value, any_size=True)
     if isinstance(value, FieldArray):
@@ -139,12 +143,6 @@ def _pack(value: Any, words: list[int]) -> types.Type:
         return value.kind
     words.append(int(value))
     return types.boolean if isinstance(value, bool) else types.intp
-
-
-@functools.cache  # numba needs longer to make a type than to find it
-def _kind(of: type[tuple], members: tuple[types.Type, ...]) -> PackedKind:
-    numbers = tuple(map(str, range(len(members))))
-    return PackedKind(getattr(of, "_fields", numbers), members)
 
 
 def unpacked(values: Packed[Values] | Values) -> Values:
@@ -177,11 +175,6 @@ class _Attributes(AttributeTemplate):
         return packed.members[packed.names.index(name)] if name in packed.names else None
 
 
-@lower_getattr_generic(PackedKind)
-def _attribute(context: Any, builder: Any, packed: PackedKind, words: Any, name: str) -> Any:
-    return _member(context, builder, packed, words, packed.names.index(name))
-
-
 def _member(context: Any, builder: Any, packed: PackedKind, words: Any, place: int) -> Any:
     """Emits the reading of a member."""
     kind: Any = packed.members[place]
@@ -206,15 +199,19 @@ def _member(context: Any, builder: Any, packed: PackedKind, words: Any, place: i
     return builder.trunc(word(0), ir.IntType(1)) if kind == types.boolean else word(0)
 
 
+lower_getattr_generic(PackedKind)(
+    lambda context, builder, packed, words, name: _member(
+        context, builder, packed, words, packed.names.index(name)
+    )
+)
+
+
 @_intrinsic
 def _unpacked(context: Any, packed: PackedKind) -> Any:
-    values = types.Tuple(packed.members)
-
-    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
-        members = [_member(c, builder, packed, args[0], i) for i in range(len(packed.members))]
-        return c.make_tuple(builder, values, members)
-
-    return values(packed), emit
+    values, places = types.Tuple(packed.members), range(len(packed.members))
+    return values(packed), lambda c, builder, s, args: c.make_tuple(
+        builder, values, [_member(c, builder, packed, args[0], place) for place in places]
+    )
 
 
 overload(unpacked)(

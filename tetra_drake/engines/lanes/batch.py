@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from numba.core import registry
@@ -278,7 +279,7 @@ class LaneThread:
 
     def widen(self, network: Network) -> None:
         """Widens the range of inhibiting neurons, which is one for all lanes, for a network."""
-        own = self._constants.network
+        own: Any = self._constants.network
         own.first.array[:] = np.minimum(own.first.array, network.first)
         own.beyond.array[:] = np.maximum(own.beyond.array, network.beyond)
 

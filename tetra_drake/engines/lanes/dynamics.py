@@ -18,8 +18,7 @@ from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
-from tetra_drake.laws.model import Model
-from tetra_drake.laws.node_forces import AnchorSprings
+from tetra_drake.laws.model import AnchorSprings, Model
 from tetra_drake.laws.terrain import to_world
 from tetra_drake.laws.vectors import cross, put_vector, vector_at
 
