@@ -85,18 +85,15 @@ class Lanes(types.Type):
     element: ClassVar[Any] = _DOUBLE
     scalar: ClassVar[Any] = types.float64
     accepted: ClassVar[tuple[type, ...]] = types.Float, types.Integer
+    """Types of scalars that stand for the same value in every lane."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"{type(self).__name__}({width})")
 
-    def accepts(self, other: types.Type) -> bool:
-        """True if a scalar of this type stands for the same value in every lane."""
-        return isinstance(other, self.accepted)
-
     def can_convert_from(self, context: Any, other: types.Type) -> Conversion | None:
         """Allows numba to cast scalars. A variable that is sometimes a scalar becomes lanes."""
-        return Conversion.safe if self.accepts(other) else None
+        return Conversion.safe if isinstance(other, self.accepted) else None
 
 
 class Mask(Lanes):
@@ -140,7 +137,9 @@ def _operator(
 
     def generic(self: Any, args: tuple[Any, ...], kws: Any) -> Any:
         vector: Any = next((kind for kind in args if type(kind) is over), None)
-        if vector is None or not all(kind == vector or vector.accepts(kind) for kind in args):
+        if vector is None or not all(
+            kind == vector or isinstance(kind, vector.accepted) for kind in args
+        ):
             return None
         return signature(to(vector.width), *[vector] * len(args))
 
