@@ -38,7 +38,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
 from tetra_drake.scenario.engine_kinds import Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.study.equilibrium import study_equilibrium
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 G = 9.80665

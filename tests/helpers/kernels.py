@@ -4,10 +4,9 @@ import numpy as np
 
 from tetra_drake.engines.lanes.dynamics import Solver, implicit_matrix
 from tetra_drake.engines.lanes.ros2 import StepMemory, take_step
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Real, Table
-from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.kernels.packed import Packed, allocate, unpacked
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot, sizes_of
 from tetra_drake.laws.model import Model
 

@@ -7,8 +7,8 @@ from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import RotationalInertia
 
 from helpers.structures import poses_of
-from tetra_drake.laws.clearance import least_strut_distance
 from tetra_drake.laws.model import Model
+from tetra_drake.laws.struts import least_strut_distance
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 

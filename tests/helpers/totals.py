@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws.tally import Tally
 
 
@@ -15,7 +15,7 @@ def make_totals(bodies: int = 5) -> Tally:
     for name, number in numbers.items():
         getattr(tally.effort, name)[0] = number
     tally.begins[0], tally.time[0], tally.clearance[0] = 3.0, 15.0, 0.01
-    tally.roughness.total[0], tally.tension.of_all[0] = 48.0, 1.0
-    tally.rolled.angle[0] = 7.0
-    tally.lifted.time[:] = np.arange(bodies)
+    tally.roughness[0], tally.least_tension[0] = 48.0, 1.0
+    tally.rolled[0] = 7.0
+    tally.lifted[:] = np.arange(bodies)
     return tally

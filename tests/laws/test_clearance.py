@@ -14,8 +14,8 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from tetra_drake.laws.clearance import Struts, strut_distance
 from tetra_drake.laws.kinematics import NODE_COLUMNS, P_WN
+from tetra_drake.laws.struts import Struts, strut_distance
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario

@@ -84,7 +84,10 @@ def test_actuators_bear_what_the_cable_does_not_and_follow_their_commands(kind):
             lambda: friction.friction_force(FrictionLaw(99, np.zeros(9)), slides()[0]),
             "law",
         ),
-        (lambda: actuator_force(Actuator.of(99), 0.2, 0.3, 0.0, 0.0, CABLE), "kind of actuators"),
+        (
+            lambda: actuator_force(Actuator(99, np.zeros(4)), 0.2, 0.3, 0.0, 0.0, CABLE),
+            "kind of actuators",
+        ),
     ],
 )
 def test_an_unknown_law_is_refused(refused, words):

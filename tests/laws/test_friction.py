@@ -28,21 +28,17 @@ RESET = ResetConstants(P0, SIGMA_1, A_C, SIGMA_0, **OTHERS)
 
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
-@pytest.mark.parametrize("mode", [-1.0, 1.0])
-def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
-    # F = -s0 abs(v) x with x held at +-p0: it opposes a slip in the direction of `mode`.
-    force = tangent_force(TangentSlide(velocity, 12.3, mode), RESET)
-    assert force == pytest.approx(-mode * SIGMA_0 * 0.02 * P0, rel=1e-14)
-
-
-@pytest.mark.parametrize("velocity", [-0.02, 0.02])
-@pytest.mark.parametrize("x", [0.5 * P0, -0.9 * P0])
 @pytest.mark.parametrize("stiffness", [0.0, OLSSON])
-def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x, stiffness):
-    expected = -((stiffness + SIGMA_0 * 0.02) * (1.0 + A_C) * x + SIGMA_1 * velocity)
-    law = RESET._replace(stiffness=stiffness)
-    force = tangent_force(TangentSlide(velocity, x, STICK), law)
-    assert force == pytest.approx(expected, rel=1e-14)
+@pytest.mark.parametrize("share", [0.5, -0.9])
+def test_reset_friction_is_equation_5_with_the_absolute_speed(velocity, stiffness, share):
+    law, per_length = RESET._replace(stiffness=stiffness), stiffness + SIGMA_0 * 0.02
+    sticking = tangent_force(TangentSlide(velocity, share * P0, STICK), law)
+    expected = -(per_length * (1.0 + A_C) * share * P0 + SIGMA_1 * velocity)
+    assert sticking == pytest.approx(expected, rel=1e-14)
+    # In slip x is held at +-p0: the force opposes a slip in the direction of the mode.
+    mode = math.copysign(1.0, share)
+    slipping = tangent_force(TangentSlide(velocity, 12.3, mode), law)
+    assert slipping == pytest.approx(-mode * per_length * P0, rel=1e-14)
 
 
 def test_friction_is_proportional_to_the_load_where_a_load_is_given():

@@ -82,29 +82,21 @@ def sliding(request: pytest.FixtureRequest, scenario: Scenario) -> RobotOnGround
     return robot
 
 
-def test_a_stuck_node_breaks_free_when_its_bristle_reaches_the_limit(sliding, scenario):
+@pytest.mark.parametrize("v", [(1e-4, 0.0, 0.0), (0.0, -1e-4, 0.0)])
+def test_a_stuck_node_breaks_free_when_its_bristle_reaches_the_limit(sliding, scenario, v):
     # c v + k v t = mu_s F_N at F_N = stiffness * 1e-4 m
-    limit = 0.6 * scenario.ground.stiffness * 1e-4
-    expected = (limit - 70.0 * 1e-4) / (1000.0 * 1e-4)
-    assert sliding.time_to_change((1e-4, 0.0, 0.0)) == pytest.approx(expected, rel=1e-6)
-    assert sliding.time_to_change((0.0, -1e-4, 0.0)) == pytest.approx(expected, rel=1e-6)
+    expected = (0.6 * scenario.ground.stiffness * 1e-4 - 70.0 * 1e-4) / (1000.0 * 1e-4)
+    assert sliding.time_to_change(v) == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_node_in_slip_sticks_when_its_damping_holds_it(sliding, scenario):
-    # c (v - a t) = mu_k F_N
     sliding.modes[:, MODE] = 1.0
-    limit = 0.5 * scenario.ground.stiffness * 1e-4
-    expected = (70.0 * 0.01 - limit) / 70.0
-    time = sliding.time_to_change((0.01, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    assert time == pytest.approx(expected, rel=1e-6)
-
-
-def test_a_growing_load_makes_it_stick_sooner(sliding, scenario):
-    # F_N = (k + lambda w) d grows by k w + lambda w^2 as d grows by w; c v stays.
-    sliding.modes[:, MODE] = 1.0
-    w, depth, k, damping = 1e-3, 1e-4, scenario.ground.stiffness, scenario.ground.damping
-    load = (k + damping * w) * depth
-    expected = (70.0 * 0.01 - 0.5 * load) / (0.5 * (k * w + damping * w**2))
+    k, damping, w, depth = scenario.ground.stiffness, scenario.ground.damping, 1e-3, 1e-4
+    # As it slows down: c (v - a t) = mu_k F_N.
+    slower = sliding.time_to_change((0.01, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    assert slower == pytest.approx((70.0 * 0.01 - 0.5 * k * depth) / 70.0, rel=1e-6)
+    # As its load grows: F_N = (k + lambda w) d grows by k w + lambda w^2 as d grows by w.
+    expected = (70.0 * 0.01 - 0.5 * (k + damping * w) * depth) / (0.5 * (k * w + damping * w**2))
     assert sliding.time_to_change((0.01, 0.0, -w)) == pytest.approx(expected, rel=1e-6)
 
 

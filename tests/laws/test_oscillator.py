@@ -3,6 +3,8 @@
 Its agreement with the thesis's listing is tested in tests/robot/test_signals.py.
 """
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -16,34 +18,29 @@ from tetra_drake.laws.oscillator import (
     predict_neurons,
 )
 
-
-def neurons_at(u: list[float] | np.ndarray, v: list[float] | np.ndarray) -> np.ndarray:
-    """The neurons with these states."""
-    return make_neurons(np.concatenate([u, v]))
-
-
 # While both neurons of this oscillator fire, Eq. 7 is linear, without kinks. Halving the step then
 # divides the error of a method by 2^order.
 LINEAR = Network.of([[0.0, 0.4], [0.4, 0.0]], tau_a=0.3, tau_b=0.6, self_inhibition_weight=2.5)
 
 
-def by_listing(steps: int) -> np.ndarray:
-    return last_output(steps, samples=steps, listing=True)
+START = np.array([0.3, 0.25, 0.1, 0.12])
+"""u of both neurons, then v."""
 
 
-def by_runge_kutta(steps: int) -> np.ndarray:
-    return last_output(steps, samples=steps + 1, listing=False)
-
-
-def last_output(steps: int, *, samples: int, listing: bool) -> np.ndarray:
-    neurons, output = neurons_at([0.3, 0.25], [0.1, 0.12]), np.empty((samples, 1))
-    network_output(LINEAR, np.full((1, 2), 0.5), 0.2 / steps, listing, neurons, output)
+def last_output(steps: int, *, listing: bool) -> np.ndarray:
+    output = np.empty((steps if listing else steps + 1, 1))
+    inputs = np.full((1, 2), 0.5)
+    network_output(LINEAR, inputs, 0.2 / steps, listing, make_neurons(START), output)
     return output[-1]
+
+
+by_listing = functools.partial(last_output, listing=True)
+by_runge_kutta = functools.partial(last_output, listing=False)
 
 
 def by_heun(steps: int) -> np.ndarray:
     """Refuses each step once, and goes back to its start."""
-    neurons, inputs = neurons_at([0.3, 0.25], [0.1, 0.12]), np.full(2, 0.5)
+    neurons, inputs = make_neurons(START), np.full(2, 0.5)
     for _ in range(steps):
         for accepted in (False, True):
             predict_neurons(LINEAR, inputs, 0.2 / steps, neurons)

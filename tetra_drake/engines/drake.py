@@ -21,7 +21,7 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_at, frame_of
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
-from tetra_drake.kernels.allocation import write_tables
+from tetra_drake.kernels.packed import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times

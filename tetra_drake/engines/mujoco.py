@@ -34,9 +34,8 @@ from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
-from tetra_drake.kernels.allocation import write_tables
 from tetra_drake.kernels.compiling import compiled
-from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.kernels.packed import Packed, unpacked, write_tables
 from tetra_drake.laws.actuator import DRIVE, DRIVE_COLUMNS, RATE
 from tetra_drake.laws.cable import PASSIVE
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS

@@ -39,6 +39,7 @@ _MOMENT, _MINUTE = 2.0, 60.0
 """Time (s) after which a compilation is announced, and time for which no other one is."""
 _told = -math.inf
 """Time of the last announcement."""
+_SEAL_SIZE = hashlib.sha256().digest_size
 _TIMES = event.TimingListener()
 event.register("numba:compile", _TIMES)
 
@@ -137,7 +138,10 @@ class KernelCache(NullCache):
         target_context.refresh()
         if self._content:
             path, key = self._entry(sig, target_context.codegen())
-            seal, data = _read(path)
+            file = b""
+            with contextlib.suppress(OSError):
+                file = path.read_bytes()
+            seal, data = file[:_SEAL_SIZE], file[_SEAL_SIZE:]
             if seal == _seal(key, data):
                 saved_sig, reduced = pickle.loads(data)
                 if saved_sig == sig:  # different types may have the same name
@@ -166,16 +170,6 @@ class KernelCache(NullCache):
 
 def _seal(key: str, content: bytes) -> bytes:
     return hashlib.sha256(key.encode() + content).digest()
-
-
-def _read(path: Path) -> tuple[bytes, bytes]:
-    """The digest and the content of a cache file; empty if it cannot be read."""
-    try:
-        file = path.read_bytes()
-    except OSError:
-        file = b""
-    size = hashlib.sha256().digest_size
-    return file[:size], file[size:]
 
 
 def announce(kept: bool) -> None:

@@ -42,7 +42,7 @@ import functools
 import math
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -62,12 +62,13 @@ from numba.extending import (
     unbox,
 )
 
-from tetra_drake.kernels.allocation import NamedTupleT
 from tetra_drake.kernels.compiling import inlined
 
 Real: TypeAlias = float
 Truth: TypeAlias = bool
-Table: TypeAlias = Any
+Table: TypeAlias = np.ndarray
+
+NamedTupleT = TypeVar("NamedTupleT", bound=tuple)
 
 _intrinsic: Callable[..., Any] = intrinsic
 
@@ -81,31 +82,26 @@ _ALIGNMENT = 64  # bytes of the widest register
 class Lanes(types.Type):
     """Numba type of a number in lanes: `width` doubles."""
 
-    element: Any = _DOUBLE
-    scalar: Any = types.float64
+    element: ClassVar[Any] = _DOUBLE
+    scalar: ClassVar[Any] = types.float64
+    accepted: ClassVar[tuple[type, ...]] = types.Float, types.Integer
+    """Types of scalars that stand for the same value in every lane."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"{type(self).__name__}({width})")
 
-    def accepts(self, other: types.Type) -> bool:
-        """True if a scalar of this type stands for the same value in every lane."""
-        return isinstance(other, (types.Float, types.Integer))
-
     def can_convert_from(self, context: Any, other: types.Type) -> Conversion | None:
         """Allows numba to cast scalars. A variable that is sometimes a scalar becomes lanes."""
-        return Conversion.safe if self.accepts(other) else None
+        return Conversion.safe if isinstance(other, self.accepted) else None
 
 
 class Mask(Lanes):
     """Numba type of a truth value in lanes: `width` bits."""
 
-    element: Any = _BIT
-    scalar: Any = types.boolean
-
-    def accepts(self, other: types.Type) -> bool:
-        """True if a scalar of this type stands for the same value in every lane."""
-        return isinstance(other, types.Boolean)
+    element: ClassVar[Any] = _BIT
+    scalar: ClassVar[Any] = types.boolean
+    accepted: ClassVar[tuple[type, ...]] = (types.Boolean,)
 
 
 @register_model(Lanes)
@@ -141,7 +137,9 @@ def _operator(
 
     def generic(self: Any, args: tuple[Any, ...], kws: Any) -> Any:
         vector: Any = next((kind for kind in args if type(kind) is over), None)
-        if vector is None or not all(kind == vector or vector.accepts(kind) for kind in args):
+        if vector is None or not all(
+            kind == vector or isinstance(kind, vector.accepted) for kind in args
+        ):
             return None
         return signature(to(vector.width), *[vector] * len(args))
 
@@ -249,11 +247,10 @@ def any_lane(mask: Truth) -> bool:
 
 @_intrinsic
 def _any(context: Any, mask: Mask) -> Any:
-    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
-        bits = builder.bitcast(args[0], ir.IntType(mask.width))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-
-    return signature(types.boolean, mask), emit
+    bits = ir.IntType(mask.width)
+    return signature(types.boolean, mask), lambda c, builder, s, args: builder.icmp_unsigned(
+        "!=", builder.bitcast(args[0], bits), ir.Constant(bits, 0)
+    )
 
 
 overload(any_lane)(
@@ -284,16 +281,15 @@ def _inverse_sqrt_in_single(context: Any, x: types.Type) -> Any:
     return signature(x, x), emit
 
 
-@overload(inverse_sqrt)
-def _overload_inverse_sqrt(x):  # type: ignore[no-untyped-def]
-    def newton(x):  # type: ignore[no-untyped-def]
-        y = _inverse_sqrt_in_single(x)
-        half = 0.5 * x
-        y += y * (0.5 - half * y * y)
-        y += y * (0.5 - half * y * y)
-        return y
+def _inverse_sqrt_by_newton(x):  # type: ignore[no-untyped-def]
+    y = _inverse_sqrt_in_single(x)
+    half = 0.5 * x
+    y += y * (0.5 - half * y * y)
+    y += y * (0.5 - half * y * y)
+    return y
 
-    return newton
+
+overload(inverse_sqrt)(lambda x: _inverse_sqrt_by_newton)
 
 
 def gather(numbers: Table, index: Real, offset: int) -> Real:
@@ -318,11 +314,13 @@ def _gather(context: Any, numbers: Any, index: Any, offset: Any) -> Any:
     return signature(index, numbers, index, types.intp), emit
 
 
-@overload(gather)
-def _overload_gather(numbers, index, offset):  # type: ignore[no-untyped-def]
-    if isinstance(index, Lanes):
-        return lambda numbers, index, offset: _gather(numbers, index, offset)
-    return lambda numbers, index, offset: numbers[int(index) + offset]
+overload(gather)(
+    lambda numbers, index, offset: (
+        (lambda numbers, index, offset: _gather(numbers, index, offset))
+        if isinstance(index, Lanes)
+        else (lambda numbers, index, offset: numbers[int(index) + offset])
+    )
+)
 
 
 def named(kind: type[NamedTupleT], table: Table) -> NamedTupleT:
@@ -403,9 +401,7 @@ class _FieldModel(models.StructModel):
         super().__init__(manager, kind, members)
 
 
-@typeof_impl.register(FieldArray)
-def _typeof(value: FieldArray, context: Any) -> Field:
-    return value.kind
+typeof_impl.register(FieldArray)(lambda value, context: value.kind)
 
 
 @unbox(Field)
@@ -474,9 +470,11 @@ class _SetItem(AbstractTemplate):
 # Without `align`, LLVM assumes that a vector is at a multiple of its size, and crashes otherwise.
 
 
-@lower_builtin(operator.getitem, Field, types.Any)
-def _lower_getitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-    return builder.load(_place(context, builder, kinds.args[0], *args), align=8)
+lower_builtin(operator.getitem, Field, types.Any)(
+    lambda context, builder, kinds, args: builder.load(
+        _place(context, builder, kinds.args[0], *args), align=8
+    )
+)
 
 
 @lower_builtin(operator.setitem, Field, types.Any, types.Any)
@@ -505,21 +503,20 @@ def by_lane(context: Any, field: Any) -> Any:
 
 @_intrinsic
 def _shape(context: Any, field: Field) -> Any:
-    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
-        return c.make_tuple(builder, s.return_type, _lengths(c, builder, field, args[0]))
-
-    return signature(types.UniTuple(types.intp, len(field.lengths)), field), emit
+    lengths = types.UniTuple(types.intp, len(field.lengths))
+    return signature(lengths, field), lambda c, builder, s, args: c.make_tuple(
+        builder, lengths, _lengths(c, builder, field, args[0])
+    )
 
 
 overload_attribute(Field, "shape")(lambda field: lambda field: _shape(field))
 
 
-@overload_attribute(Field, "size")
-def _overload_size(field):  # type: ignore[no-untyped-def]
-    def size(field):  # type: ignore[no-untyped-def]
-        count = 1
-        for length in _shape(field):
-            count *= length
-        return count
+def _size(field):  # type: ignore[no-untyped-def]
+    count = 1
+    for length in _shape(field):
+        count *= length
+    return count
 
-    return size
+
+overload_attribute(Field, "size")(lambda field: _size)

@@ -59,11 +59,6 @@ class Actuator(NamedTuple):
     limits: Table
     """Table of the numbers of Limits."""
 
-    @classmethod
-    def of(cls, kind: int, **limits: float) -> Self:
-        """Actuators of a kind, with limits by name; see Limits."""
-        return cls(kind, np.array(Limits(**limits)))
-
 
 class ActuatorForce(NamedTuple):
     """Tension that an actuator gives its cable, and the rate of its drive."""
@@ -82,7 +77,7 @@ class ActuatorForce(NamedTuple):
 
 
 class Exertion(NamedTuple):
-    """What an actuator does at an instant."""
+    """Load, pull and speed limit of an actuator at an instant, and the length of its cable."""
 
     load: Real
     """Force (N) that it bears. For a direct force this is the tension, as for a motor in its
@@ -97,14 +92,14 @@ class Exertion(NamedTuple):
 
 @inlined
 def has_drive(actuator: Actuator) -> bool:
-    """True if the actuators have drives (states)."""
+    """True if the actuators have a state (drive): winches and tension motors."""
     return actuator.kind != DIRECT
 
 
 @inlined
-def wound(actuator: Actuator, drive: Table, otherwise: Table) -> Table:
-    """The drive, if it is the free length of a cable on a winch; `otherwise` for other actuators.
-    Both may be numbers or tables."""
+def wound(actuator: Actuator, drive: Any, otherwise: Any) -> Any:
+    """Free length (m) of a cable on a winch, which is the winch's drive; `otherwise` for other
+    actuators. Both may be numbers or tables."""
     if actuator.kind == WINCH:
         return drive
     return otherwise
@@ -114,8 +109,8 @@ def wound(actuator: Actuator, drive: Table, otherwise: Table) -> Table:
 def exertion(
     actuator: Actuator, drives: Table, drive: int, tension: Real, length: Real, signal: Real
 ) -> Exertion:
-    """Exertion of an actuator. `drive` is its row in the table `drives`, if it has a drive;
-    `tension` (N) and `length` (m) are of its cable."""
+    """Exertion of an actuator on a cable with a tension (N) and a length (m). `drive` is the
+    actuator's row in the table `drives`, if it has a drive."""
     if not has_drive(actuator):
         return Exertion(load=tension, pull=signal, left=length, limited=0.0 * length)
     load, left = tension - drives[drive, BESIDE], wound(actuator, drives[drive, DRIVE], length)
@@ -126,8 +121,8 @@ def exertion(
 def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
 ) -> ActuatorForce:
-    """Force of an actuator with a drive. `length` (m) is the length of its cable, `rate` (m/s) the
-    rate of the length."""
+    """Force of an actuator with a drive on a cable with a length (m) that grows at a rate
+    (m/s)."""
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
         return winch_force(drive, length, rate, signal, law, limits)
@@ -140,7 +135,7 @@ def actuator_force(
 def winch_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a winch. `drive` is the free length of its cable.
+    """Force of a winch on its cable. Its drive is the free length of the cable.
 
     The cable goes slack as a passive one does; see laws.cable. The winch follows its command
     with a lag. It pays out with at most max_speed, and winds with at most max_speed
@@ -174,7 +169,7 @@ def winch_force(
 def motor_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a tension motor. `drive` is its tension.
+    """Force of a tension motor on its cable. Its drive is the tension.
 
     The motor keeps its cable taut at any length, so its software plays the spring and the damper of
     Eq. 6, but it does not push. It follows its command with a lag. Its tension is at most
@@ -219,8 +214,13 @@ class DrivenCables(NamedTuple):
 
 
 class ActuatorKind(Section):
-    """Base class of the kinds of actuators. Each driven cable has an actuator."""
+    """Base class of the kinds of actuators. Each driven cable has an actuator.
 
+    The methods here are for actuators without drives.
+    """
+
+    kind: ClassVar[int]
+    """Number of the kind in kernels, such as WINCH."""
     lacking: ClassVar[tuple[str, ...]] = ()
     """Properties that some metrics need and these actuators do not have."""
     commanded: ClassVar[str]
@@ -234,8 +234,8 @@ class ActuatorKind(Section):
     effect."""
 
     def actuator(self) -> Actuator:
-        """The actuators in the form of the kernels."""
-        raise NotImplementedError
+        """The actuators in the form of the kernels. Settings are limits of the same names."""
+        return Actuator(self.kind, np.array(Limits(**dict(self))))
 
     def excess(self, signal: float, *, free_length: float) -> str:
         """Text if signals up to `signal` (N) exceed the actuator's limits; empty if they do not.
@@ -244,11 +244,11 @@ class ActuatorKind(Section):
 
     def drives(self, cables: DrivenCables) -> Any:
         """States of the actuators (..., drives); see laws.actuator."""
-        raise NotImplementedError
+        return cables.signal[..., :0]
 
     def commands(self, cables: DrivenCables) -> Any:
         """Setpoints of the actuators, in SI units."""
-        raise NotImplementedError
+        return cables.signal
 
     def signals(self, commands: Any, law: CableLaw) -> Any:
         """Signals (N) with the same effect as setpoints (..., driven cables)."""
@@ -259,18 +259,10 @@ class Force(ActuatorKind):
     """Ideal actuators: the signals are forces on the cables, without limits (thesis section
     2.1.3)."""
 
+    kind = DIRECT
     lacking = (LIMITS,)
     commanded = "force_N"
     keeps_spring = True
-
-    def actuator(self) -> Actuator:
-        return Actuator.of(DIRECT)
-
-    def drives(self, cables: DrivenCables) -> Any:
-        return cables.signal[..., :0]
-
-    def commands(self, cables: DrivenCables) -> Any:
-        return cables.signal
 
 
 class LimitedActuator(ActuatorKind):
@@ -287,6 +279,7 @@ class LimitedActuator(ActuatorKind):
 class Winch(LimitedActuator):
     """A winch on each driven cable: signals command its free length. See laws.actuator."""
 
+    kind = WINCH
     commanded = "free_length_mm"
     command_unit = 1e-3
 
@@ -295,9 +288,6 @@ class Winch(LimitedActuator):
     1 / (2 pi f) of a position loop with a bandwidth f of 8 Hz, typical of small geared motors."""
     least_length: Length = Field(default=0.0, ge=0)
     """Least free length of a cable."""
-
-    def actuator(self) -> Actuator:
-        return Actuator.of(WINCH, **dict(self))
 
     def excess(self, signal: float, *, free_length: float) -> str:
         if free_length >= self.least_length:
@@ -319,11 +309,9 @@ class TensionMotor(LimitedActuator):
     """A motor on each driven cable that controls the tension. The commanded tension is the sum of
     the signal and the forces of the cable's spring and damper. See laws.actuator."""
 
+    kind = TENSION_MOTOR
     commanded = "tension_N"
     plays_cable = True
-
-    def actuator(self) -> Actuator:
-        return Actuator.of(TENSION_MOTOR, **dict(self))
 
     def excess(self, signal: float, *, free_length: float) -> str:
         if signal <= self.max_force:

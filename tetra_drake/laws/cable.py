@@ -12,7 +12,7 @@ damper is weaker than the spring, this is Eq. 6.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -27,13 +27,13 @@ PASSIVE = -1
 
 
 class CableConstants(Section):
-    """Settings that the cables of all kinds of robots have."""
+    """Settings of cables that all kinds of robots have in common."""
 
     damping: Damping = Field(ge=0)
     """Tension per rate of the length."""
 
     def constants(self, *, stiffness: float, free_length: float) -> dict[str, float]:
-        """Constants of a cable by the names of CableLaw: the settings here, and the given ones."""
+        """Constants of a cable by the names of CableLaw: these settings and the given ones."""
         own = {name: getattr(self, name) for name in CableConstants.model_fields}
         return own | {"stiffness": stiffness, "free_length": free_length}
 
@@ -48,7 +48,8 @@ class CableLaw(NamedTuple):
     @classmethod
     def of(cls, cables: Table) -> Self:
         """Constants of the cables in an array of dtype CABLE."""
-        return cls(*(cables[name].copy() for name in cls._fields))
+        tables: Any = (cables[name].copy() for name in cls._fields)
+        return cls(*tables)
 
 
 CABLE = np.dtype(
@@ -61,13 +62,13 @@ CABLE = np.dtype(
 
 
 class Cables(NamedTuple):
-    """Cables in the form of the kernels: a table (cables,) for each field of CABLE."""
+    """Cables of a robot for the kernels: a table (cables,) for each field of CABLE."""
 
     node_a: Table
     node_b: Table
     signal: Table
-    law: Table
-    """Constants of all cables: a CableLaw of tables."""
+    law: Any
+    """Constants of all cables: a CableLaw of tables (cables,)."""
 
     @classmethod
     def of(cls, cables: Table) -> Self:
@@ -137,7 +138,7 @@ def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]
 
 
 def tendon_faults(cables: Table, *, slack: bool) -> dict[str, Table]:
-    """What MuJoCo's tendons do otherwise than the cables in an array of dtype CABLE, in words, with
-    True for each cable (cables,) that it concerns. `slack` is true if cables go slack."""
+    """Differences between MuJoCo's tendons and cables in an array of dtype CABLE: a sentence for
+    each, with True for the cables (cables,) that differ. `slack` is true if cables go slack."""
     is_damped = slack & (cables["damping"] != 0.0)
     return {"the dampers of MuJoCo's tendons also act where a cable is slack": is_damped}

@@ -10,18 +10,18 @@ nearly parallel struts count as slightly thicker in the middle. The distance D o
 
     D² = min |r + s u - t v|² + w ((s - 1/2)² + (t - 1/2)²)
 
-over the places s and t, 0 to 1, on the axes u and v, whose starts are r apart. The weight w is
-(BARREL reach)² at the angle 0, with the sum of the radii as reach; half of it at the angle
-PARALLEL; and 0 if the struts are perpendicular:
+over the positions s and t, 0 to 1, along the axes u and v, whose starts are r apart. With the sum
+of the radii as reach, the weight w is (BARREL reach)² at the angle 0, half of it at the angle
+PARALLEL, and 0 if the struts are perpendicular:
 
     w = (BARREL reach)² / (1 + tan² / PARALLEL²)
 
 So D differs from the distance of the axes by at most 1 % of the reach. The force is the gradient of
 an energy, k (reach - D)² / 2: without dissipation, struts keep the energy at any angle.
 
-Most struts are far from each other. Pairs that are near are found anew when a node has moved by a
+Most struts are far from each other. Near pairs are searched again when a node has moved by a
 quarter of the difference between `near` and the largest distance of axes that touch. The forces do
-not depend on when that was, because other pairs exert none.
+not depend on the time of the search, because other pairs exert none.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from typing import Annotated, ClassVar, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, minimum, named
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws import kinematics
 from tetra_drake.laws.contact import NormalForce, normal_force
 from tetra_drake.laws.struts import (
@@ -72,7 +72,7 @@ LEAST_SQUARE = 1e-30
 
 
 class StrutSearch(NamedTuple):
-    """Distances (m) of the search for near struts, and what else limits steps near contacts."""
+    """Distances (m) at which struts count as near, and limits of steps near contacts."""
 
     near: Real
     """Distance of the axes of two struts below which the pair is near."""
@@ -85,7 +85,7 @@ class StrutSearch(NamedTuple):
 
 
 class StrutContactLaw(NamedTuple):
-    """Contact of the struts in the form of the kernels."""
+    """Law of the contact between struts, with its constants as tables."""
 
     acts: bool
     """False if struts pass through each other."""
@@ -96,13 +96,13 @@ class StrutContactLaw(NamedTuple):
 
 
 class NearStruts(NamedTuple):
-    """Memory for the pairs of struts that are near. Without contact of struts it is empty."""
+    """Memory for the pairs of struts that are near each other; empty without contact of struts."""
 
     p_WN: Annotated[Table, "strut_nodes", 3, math.inf]
     """Positions (nodes, 3) in m of the nodes at the latest search; infinite before the first."""
     pairs: Annotated[Table, "strut_pairs", 2, int]
     """Indices of the two struts of each near pair (pairs, 2)."""
-    count: Annotated[Table, 1, int]
+    count: Annotated[Table, 1, int]  # type: ignore[assignment]  # tuples have a method count()
     """Number of near pairs."""
 
     @classmethod
@@ -112,7 +112,7 @@ class NearStruts(NamedTuple):
 
 
 def near_sizes(struts: Struts) -> dict[str, int]:
-    """Sizes of NearStruts, for allocate()."""
+    """Sizes of the tables of NearStruts, for allocate()."""
     of_bodies = np.diff(struts.first_strut)
     pairs = (of_bodies.sum() ** 2 - (of_bodies**2).sum()) // 2
     return {
@@ -130,7 +130,7 @@ def find_near_struts(
     nodes: Table,
     near: NearStruts,
 ) -> None:
-    """Writes the pairs of struts that are near in any lane.
+    """Finds the pairs of struts that are near each other in any lane.
 
     `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
     laws.kinematics for a `state` (13 bodies,).
@@ -143,7 +143,12 @@ def find_near_struts(
                 continue
             for i in range(struts.first_strut[first], struts.first_strut[first + 1]):
                 for j in range(struts.first_strut[second], struts.first_strut[second + 1]):
-                    if are_near(struts, nodes, i, j, limit):
+                    offset = difference(midpoint(struts, nodes, i), midpoint(struts, nodes, j))
+                    if not may_be_nearer(
+                        offset, 0.5 * (struts.length[i] + struts.length[j]), limit
+                    ):
+                        continue
+                    if any_lane(strut_distance(struts, nodes, i, j) <= limit):
                         near.pairs[count, 0], near.pairs[count, 1] = i, j
                         count += 1
     near.count[0] = count
@@ -156,33 +161,14 @@ class Touch(NamedTuple):
     """Contact of two struts."""
 
     s: Real
-    """Place on the first axis, 0 at its start, 1 at its end."""
+    """Position of the contact along the first axis: 0 at its start, 1 at its end."""
     t: Real
-    """Place on the second axis."""
+    """Position along the second axis."""
     depth: Real
     """Depth (m) of the overlap; negative if the struts are apart."""
     gradient: tuple[Vector3, Vector3, Vector3, Vector3]
     """Derivatives of the distance by the positions of the ends: start and end of the first axis,
     then of the second."""
-
-
-@inlined
-def are_near(struts: Struts, nodes: Table, i: int, j: int, limit: Real) -> bool:
-    """True if the axes of two struts are at most `limit` (m) apart in any lane."""
-    offset = difference(midpoint(struts, nodes, i), midpoint(struts, nodes, j))
-    if not may_be_nearer(offset, 0.5 * (struts.length[i] + struts.length[j]), limit):
-        return False
-    return any_lane(strut_distance(struts, nodes, i, j) <= limit)
-
-
-@inlined
-def have_moved(nodes: Table, near: NearStruts, drift: Real) -> bool:
-    """True if a node has moved by more than `drift` (m) since the latest search, in any lane."""
-    largest = 0.0 * drift
-    for node in range(near.p_WN.shape[0]):
-        moved = difference(vector_at(nodes, node, kinematics.P_WN), vector_at(near.p_WN, node, 0))
-        largest = maximum(largest, dot(moved, moved))
-    return any_lane(largest > drift * drift)
 
 
 @inlined
@@ -223,8 +209,8 @@ def time_to_pass(
 
 @inlined
 def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
-    """Weight w (m²) of the distances of a contact from the middles of both struts, and its first
-    and second derivative by the product uv of the axes.
+    """Weight w (m²) that makes nearly parallel struts count as thicker in the middle, and its first
+    and second derivative with respect to the product uv of the axes.
 
     `reach` (m) is the sum of the radii.
     """
@@ -236,19 +222,13 @@ def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
 
 
 @inlined
-def contact_places(axes: Axes, weight: Real) -> tuple[Real, Real]:
-    """Places on both axes, 0 to 1, between which two struts touch, by the weight of barrel()."""
-    half, uu, vv = 0.5 * weight, axes.uu + weight, axes.vv + weight
-    thicker = Axes(axes.u, axes.v, axes.r, uu, vv, axes.uv, axes.ur - half, axes.vr + half)
-    return nearest_on_struts(thicker, nearest_on_line(thicker))
-
-
-@inlined
 def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
-    """Contact of struts i and j."""
+    """Contact of struts i and j: its position, depth, and gradient."""
     axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]
     weight, weight_rate, _ = barrel(axes, reach)
-    s, t = contact_places(axes, weight)
+    half, uu, vv = 0.5 * weight, axes.uu + weight, axes.vv + weight
+    thicker = Axes(axes.u, axes.v, axes.r, uu, vv, axes.uv, axes.ur - half, axes.vr + half)
+    s, t = nearest_on_struts(thicker, nearest_on_line(thicker))
     between = vector_between(axes, s, t)
     off_middle = (s - 0.5) * (s - 0.5) + (t - 0.5) * (t - 0.5)
     square = dot(between, between) + weight * off_middle
@@ -259,6 +239,33 @@ def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
     by_v = difference(scaled(turn, axes.u), scaled(t, direction))
     starts = difference(direction, by_u), scaled(-1.0, sum_of(direction, by_v))
     return Touch(s, t, reach - square * per_distance, (starts[0], by_u, starts[1], by_v))
+
+
+@inlined
+def add_strut_forces(
+    struts: Struts,
+    law: StrutContactLaw,
+    radius: Table,
+    state: Table,
+    nodes: Table,
+    near: NearStruts,
+) -> None:
+    """Adds the forces between struts that touch to the forces on the nodes.
+
+    Finds the near pairs anew if a node has moved far since the latest search; see
+    find_near_struts().
+    """
+    if not law.acts:
+        return
+    search, normal = named(StrutSearch, law.search), named(NormalForce, law.normal)
+    farthest = 0.0 * search.drift
+    for node in range(near.p_WN.shape[0]):
+        moved = difference(vector_at(nodes, node, kinematics.P_WN), vector_at(near.p_WN, node, 0))
+        farthest = maximum(farthest, dot(moved, moved))
+    if any_lane(farthest > search.drift * search.drift):
+        find_near_struts(struts, law, radius, state, nodes, near)
+    for k in range(near.count[0]):
+        add_contact_force(struts, normal, nodes, near.pairs[k, 0], near.pairs[k, 1])
 
 
 @inlined

@@ -4,10 +4,11 @@ A contact node touches the ground with a sphere about it, its *foot*. The ground
 lowest point, along the normal of the surface. So friction has a lever about the node. A foot
 without radius is the node itself, as in the thesis.
 
-The bristle's deflection is the way that the material at the lowest point slides, not the way of the
-point: a foot that rolls does not bend its bristle. Within a step, it is the distance of the node
-from the stick point, plus what the foot has turned along the ground since the beginning of the
-step. At the end of a step, the stick point moves so that the deflection stays.
+The bristle's deflection is the distance by which the material at the lowest point has slid, not the
+distance by which the point has moved: a foot that rolls does not bend its bristle. Within a step,
+the deflection is the distance of the node from the stick point, plus what the foot has turned along
+the ground since the beginning of the step. At the end of a step, the stick point moves so that the
+deflection stays.
 
 The state of a contact node is a row of the table `modes` (contacts, 12):
 
@@ -22,7 +23,7 @@ The laws use the frames of `terrain`. On flat ground these are the axes of the w
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -54,7 +55,7 @@ normal force (N)."""
 
 
 class GroundSection(Section):
-    """The normal force (Table 1)."""
+    """Stiffness and damping of the ground, which give the normal force (Table 1)."""
 
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Normal force per penetration of a node."""
@@ -71,7 +72,8 @@ class NormalForce(NamedTuple):
 
 
 class Ground(NamedTuple):
-    """Ground in the form of the kernels, and the nodes that may touch it (contact nodes)."""
+    """Ground for the kernels: its laws and surface, and the nodes that may touch it (contact
+    nodes)."""
 
     contacts: Table
     """Rows (contacts,) of the table `nodes` that touch the ground. The row of a foot without radius
@@ -90,8 +92,9 @@ class Ground(NamedTuple):
     flat: bool
     grid: Table
     """Table of the numbers of SurfaceGrid."""
-    heights: Table
-    """Heights (points,) of the surface's control points in m, row by row."""
+    heights: Any
+    """Heights (points,) of the surface's control points in m, row by row. None in lanes, which
+    share one table of heights."""
 
     @classmethod
     def nowhere(cls) -> Self:
@@ -111,8 +114,14 @@ class Ground(NamedTuple):
         )
 
     def under(self, centres: Table, *, carriers: Table, radius: Table, nodes: int) -> Self:
-        """This ground under feet with a `radius` (contacts,) in m about the nodes `centres`, of a
-        model with a number of `nodes`."""
+        """Copy of this ground with contact nodes.
+
+        Args:
+            centres: indices of the contact nodes (contacts,).
+            carriers: index of the body of each contact node (contacts,), ascending.
+            radius: radii of the feet (contacts,) in m.
+            nodes: number of nodes of the robot.
+        """
         of_round = np.flatnonzero(radius)
         contacts = centres.copy()
         contacts[of_round] = nodes + np.arange(of_round.size)
@@ -126,50 +135,35 @@ class Ground(NamedTuple):
             grid=np.array(surface),
         )
 
-    @property
-    def rows(self) -> int:
-        """Number of rows of round feet in the table `nodes`."""
-        return int(np.count_nonzero(self.contacts != self.centres))
-
 
 @inlined
 def meet_ground(ground: Ground, state: Table, nodes: Table, frames: Table) -> None:
-    """Writes the frames of the surface below the contact nodes to `frames` (contacts,
-    FRAME_COLUMNS), and the lowest points of round feet to the table `nodes` of `kinematics`.
+    """Computes the frames of the surface below the contact nodes and the lowest points of feet.
 
-    On flat ground, `frames` is not used.
+    Frames are written to `frames` (contacts, FRAME_COLUMNS). The lowest points of round feet are
+    written to the table `nodes` of `kinematics`.
+
+    The velocity of a lowest point is the one of the body there. The gap in the frame of a round
+    foot is the distance of its lowest point from the surface. On flat ground, `frames` is not used.
     """
     if not ground.flat:
         grid = named(terrain.SurfaceGrid, ground.grid)
         terrain.find_frames(nodes, ground.centres, grid, ground.heights, frames)
-    if ground.is_round:
-        for i in range(ground.contacts.size):
-            if ground.contacts[i] != ground.centres[i]:
-                place_foot(ground, i, state, nodes, frames)
-
-
-@inlined
-def place_foot(ground: Ground, i: int, state: Table, nodes: Table, frames: Table) -> None:
-    """Writes the lowest point of a round foot, with the velocity of the body there, to `nodes`. The
-    gap in `frames` becomes the distance of this point from the surface."""
-    centre, foot, radius = ground.centres[i], ground.contacts[i], ground.radius[i]
-    if not ground.flat:
-        frames[i, terrain.GAP] -= radius
-    drop = terrain.to_world(0.0, 0.0, -radius, frames, i, ground.flat)
-    turns = cross(kinematics.angular_velocity(state, ground.carriers[i]), drop)
-    for column in (kinematics.P_BN_W, kinematics.P_WN):
-        put_vector(sum_of(vector_at(nodes, centre, column), drop), foot, column, nodes)
-    velocity = sum_of(vector_at(nodes, centre, kinematics.V_WN), turns)
-    put_vector(velocity, foot, kinematics.V_WN, nodes)
-    put_vector((0.0, 0.0, 0.0), foot, kinematics.FORCE, nodes)
-
-
-@inlined
-def add_foot_forces(ground: Ground, nodes: Table, generalized: Table) -> None:
-    """Adds the forces on round feet to the generalized force (6 bodies,)."""
+    if not ground.is_round:
+        return
     for i in range(ground.contacts.size):
-        if ground.contacts[i] != ground.centres[i]:
-            kinematics.add_force_at(nodes, ground.contacts[i], ground.carriers[i], generalized)
+        centre, foot, radius = ground.centres[i], ground.contacts[i], ground.radius[i]
+        if foot == centre:
+            continue
+        if not ground.flat:
+            frames[i, terrain.GAP] -= radius
+        drop = terrain.to_world(0.0, 0.0, -radius, frames, i, ground.flat)
+        turns = cross(kinematics.angular_velocity(state, ground.carriers[i]), drop)
+        for column in (kinematics.P_BN_W, kinematics.P_WN):
+            put_vector(sum_of(vector_at(nodes, centre, column), drop), foot, column, nodes)
+        velocity = sum_of(vector_at(nodes, centre, kinematics.V_WN), turns)
+        put_vector(velocity, foot, kinematics.V_WN, nodes)
+        put_vector((0.0, 0.0, 0.0), foot, kinematics.FORCE, nodes)
 
 
 @inlined
@@ -195,7 +189,7 @@ def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
 def sliding(
     state: Table, nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
 ) -> tuple[friction.Slide, Real]:
-    """Motion of foot i along the ground, and the rate (m/s) of its gap."""
+    """Motion of foot i along the ground with its normal force, and the rate (m/s) of its gap."""
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     v_WN = vector_at(nodes, ground.contacts[i], kinematics.V_WN)
     deflection = difference(p_WN, vector_at(modes, i, STICK_POINT))
@@ -232,7 +226,12 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         after_1 = select(stays, due.mode[0], friction.STICK)
         after_2 = select(stays, due.mode[1], friction.STICK)
         if any_lane(lands):
-            set_heading(state, ground, frames, i, lands, modes)
+            # The heading is the body's x axis, projected into the tangent plane.
+            x, y, z = kinematics.rotation(state, ground.carriers[i])
+            h_1, h_2, _ = terrain.to_frame((x[0], y[0], z[0]), frames, i, ground.flat)
+            per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))
+            modes[i, HEADING] = select(lands, h_1 * per_length, modes[i, HEADING])
+            modes[i, HEADING + 1] = select(lands, h_2 * per_length, modes[i, HEADING + 1])
         arrives_or_leaves = touched ^ touches
         moves_1 = (due.begins[0] & stays) | arrives_or_leaves
         moves_2 = (due.begins[1] & stays) | arrives_or_leaves
@@ -285,15 +284,3 @@ def move_stick_point(
     modes[i, STICK_POINT] = select(both, p_x, stick_x + x)
     modes[i, STICK_POINT + 1] = select(both, p_y, stick_y + y)
     modes[i, STICK_POINT + 2] = select(both, p_z, stick_z + z)
-
-
-@inlined
-def set_heading(
-    state: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
-) -> None:
-    """Stores the heading of a contact node's body: its x axis, projected into the tangent plane."""
-    forward = kinematics.forward_axis(state, ground.carriers[i])
-    h_1, h_2, _ = terrain.to_frame(forward, frames, i, ground.flat)
-    per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))
-    modes[i, HEADING] = select(where, h_1 * per_length, modes[i, HEADING])
-    modes[i, HEADING + 1] = select(where, h_2 * per_length, modes[i, HEADING + 1])

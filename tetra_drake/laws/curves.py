@@ -11,7 +11,7 @@ _SWAY = 2e-3
 
 
 def curvature(points: np.ndarray, *, scale: float = 1.0) -> float:
-    """Curvature (1/m) of a path: of the circle fitted to its points (k, 2) in m.
+    """Curvature (1/m) of the circle that fits the points (k, 2) of a path in m.
 
     The curvature is positive if the path bends to the left, and 0 on a line. Taubin's fit (IEEE
     Trans. PAMI 13, 1991, 1115), with p relative to the mean of the points: the circle is

@@ -6,28 +6,26 @@ from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled, inlined
-from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, named, select
-from tetra_drake.kernels.packed import Packed, unpacked
+from tetra_drake.kernels.lanes import Real, Table, any_lane, inverse_sqrt, maximum, select
+from tetra_drake.kernels.packed import Packed, allocate, unpacked
 from tetra_drake.laws import actuator, cable, capsules, contact, kinematics, terrain
 from tetra_drake.laws.friction import friction_force
-from tetra_drake.laws.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
+from tetra_drake.laws.inertia import INERTIA_COLUMNS, times_inertia, turn_inertia
 from tetra_drake.laws.model import Model
-from tetra_drake.laws.node_forces import add_anchor_forces, add_loads
 from tetra_drake.laws.vectors import (
     add_vector,
+    cross,
     difference,
     dot,
     put_vector,
     scaled,
-    subtract_vector,
     vector_at,
 )
 
 
 class Forces(NamedTuple):
-    """Memory for the forces in a state. Kernels write to it."""
+    """Memory for the forces on a robot in a state, which kernels write."""
 
     nodes: Annotated[Table, "nodes", kinematics.NODE_COLUMNS]
     frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]
@@ -48,7 +46,7 @@ class Forces(NamedTuple):
 
 
 def sizes_of(robot: Model) -> dict[str, int]:
-    """Sizes of a robot's tables, for allocate()."""
+    """Sizes of the tables of a robot, by the names that annotations use; see allocate()."""
     drivers, has_drive = robot.cables.signal, actuator.has_drive(robot.actuator)
     near = capsules.near_sizes(robot.struts)
     if not robot.strut_contact.acts:
@@ -57,10 +55,10 @@ def sizes_of(robot: Model) -> dict[str, int]:
     return near | {
         "touches": min(near["strut_pairs"], 3 * bodies),
         "bodies": bodies,
-        "nodes": len(robot.p_BN) + robot.ground.rows,
+        "nodes": len(robot.p_BN) + int(np.count_nonzero(robot.ground.radius)),
         "contacts": robot.ground.contacts.size,
         "cables": drivers.size,
-        "drives": np.count_nonzero(drivers != cable.PASSIVE) if has_drive else 0,
+        "drives": int(np.count_nonzero(drivers != cable.PASSIVE)) if has_drive else 0,
     }
 
 
@@ -70,8 +68,8 @@ Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
 
 @inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
-    """Computes nodes, frames and inertia for a state (13 bodies,). Forces on the nodes become
-    zero."""
+    """Computes motions of nodes and feet, ground frames and inertia for a state (13 bodies,).
+    Forces on the nodes become zero."""
     move_contacts(robot, state, forces)
     if not robot.isotropic:
         turn_inertia(state, robot.bodies.inertia, forces.inertia)
@@ -79,7 +77,8 @@ def move_robot(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
-    """Computes nodes, feet and frames for a state. Forces on them become zero."""
+    """Computes motions of nodes and feet, and ground frames, for a state. Forces on them become
+    zero."""
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     contact.meet_ground(robot.ground, state, forces.nodes, forces.frames)
 
@@ -139,9 +138,8 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
         tension, tension_per_rate, drive = pull_of_cable(
             robot, i, drive, length, rate, signals, drives
         )
-        force = scaled(tension, direction)
-        add_vector(force, a, kinematics.FORCE, nodes)
-        subtract_vector(force, b, kinematics.FORCE, nodes)
+        add_vector(scaled(tension, direction), a, kinematics.FORCE, nodes)
+        add_vector(scaled(-tension, direction), b, kinematics.FORCE, nodes)
         if write_parts:
             put_vector(direction, i, cable.DIRECTION, parts)
             parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
@@ -198,42 +196,49 @@ def compute_forces(
     if robot.isotropic:
         return
     for body in range(bodies):
-        t, v = 6 * body, 7 * bodies + 6 * body
-        w_WB = state[v], state[v + 1], state[v + 2]
-        torque = gyroscopic_torque(forces.inertia, body, w_WB)
+        w_WB = kinematics.angular_velocity(state, body)
+        torque = cross(times_inertia(forces.inertia, body, w_WB), w_WB)  # gyroscopic, -w x (I w)
         for axis in range(3):
-            generalized[t + axis] += torque[axis]
+            generalized[6 * body + axis] += torque[axis]
 
 
 @inlined
 def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
     """Writes the generalized force (6 bodies,) of the forces on nodes and round feet."""
     kinematics.gather_forces(nodes, robot.first_node, generalized)
-    if robot.ground.is_round:
-        contact.add_foot_forces(robot.ground, nodes, generalized)
+    ground = robot.ground
+    if not ground.is_round:
+        return
+    for i in range(ground.contacts.size):
+        foot, g = ground.contacts[i], 6 * ground.carriers[i]
+        if foot == ground.centres[i]:
+            continue
+        force = vector_at(nodes, foot, kinematics.FORCE)
+        torque = cross(vector_at(nodes, foot, kinematics.P_BN_W), force)
+        for axis in range(3):
+            generalized[g + axis] += torque[axis]
+            generalized[g + 3 + axis] += force[axis]
 
 
 @inlined
 def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
     """Adds the forces between struts, of anchors and of loads to the forces on the nodes."""
-    add_strut_forces(robot, state, forces)
-    add_anchor_forces(robot.anchors, forces.nodes)
-    add_loads(robot.loads, forces.nodes)
+    nodes, anchors, loads = forces.nodes, robot.anchors, robot.loads
+    radius, law, near = robot.bodies.radius, robot.strut_contact, forces.near_struts
+    capsules.add_strut_forces(robot.struts, law, radius, state, nodes, near)
 
+    for i in range(anchors.nodes.size):
+        node = anchors.nodes[i]
+        p_WN = vector_at(nodes, node, kinematics.P_WN)
+        p_x, p_y, p_z = difference(p_WN, vector_at(anchors.places, i, 0))
+        v_x, v_y, v_z = vector_at(nodes, node, kinematics.V_WN)
+        k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
+        c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
+        force = -k_x * p_x - c_x * v_x, -k_y * p_y - c_y * v_y, -k_z * p_z - c_z * v_z
+        add_vector(force, node, kinematics.FORCE, nodes)
 
-@inlined
-def add_strut_forces(robot: Model, state: Table, forces: Forces) -> None:
-    """Adds the forces between struts that touch to the forces on the nodes."""
-    law, near, nodes = robot.strut_contact, forces.near_struts, forces.nodes
-    if not law.acts:
-        return
-    search = named(capsules.StrutSearch, law.search)
-    if capsules.have_moved(nodes, near, search.drift):
-        capsules.find_near_struts(robot.struts, law, robot.bodies.radius, state, nodes, near)
-    normal = named(contact.NormalForce, law.normal)
-    for k in range(near.count[0]):
-        i, j = near.pairs[k, 0], near.pairs[k, 1]
-        capsules.add_contact_force(robot.struts, normal, nodes, i, j)
+    for i in range(loads.nodes.size):
+        add_vector(vector_at(loads.forces, i, 0), loads.nodes[i], kinematics.FORCE, nodes)
 
 
 @compiled
@@ -286,11 +291,11 @@ def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized
     Also writes nodes.
     """
     robot, forces = unpacked(parts)
-    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
-    add_strut_forces(robot, state, forces)
-    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
-    law, near = robot.strut_contact, forces.near_struts
-    return capsules.time_to_pass(robot.struts, law, forces.nodes, near, horizon)
+    nodes, law, near = forces.nodes, robot.strut_contact, forces.near_struts
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, nodes)
+    capsules.add_strut_forces(robot.struts, law, robot.bodies.radius, state, nodes, near)
+    kinematics.gather_forces(nodes, robot.first_node, generalized)
+    return capsules.time_to_pass(robot.struts, law, nodes, near, horizon)
 
 
 def forces_of_motion(
@@ -337,8 +342,7 @@ def forces_along(
 def compute_forces_at(
     robot: Model, state: Table, modes: Table, signals: Table, drives: Table, forces: Forces
 ) -> None:
-    """Computes everything in Forces for a state (13 bodies,) and drives (drives,); see
-    compute_forces()."""
+    """Computes all tables of Forces for a state (13 bodies,) and drives (drives,)."""
     generalized = np.empty(6 * robot.bodies.mass.size)
     move_robot(robot, state, forces)
     for i in range(drives.size):
@@ -348,7 +352,7 @@ def compute_forces_at(
 
 @inlined
 def copy_rows(table: Table, rows: Table) -> None:
-    """Writes the first rows of a table."""
+    """Copies the first rows of a table to `rows`."""
     for i in range(rows.shape[0]):
         for c in range(rows.shape[1]):
             rows[i, c] = table[i, c]

@@ -39,7 +39,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -68,13 +68,14 @@ from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section, Varied, settings_text
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
+RESET_INTEGRATOR, COULOMB = range(2)
+"""Kinds of laws."""
+
 STICK = 0.0
 """Friction mode of a node that sticks."""
 
-
 Vector2 = tuple[Real, Real]
 """Components along the tangents t1 and t2."""
-
 
 MUJOCO_FRICTION = 0.5
 """Coefficient of MuJoCo's friction in place of the thesis's law; typical of metal on a floor."""
@@ -94,13 +95,15 @@ class FrictionKind(Section):
 
     modes: ClassVar[str]
     """Meaning of the signs of friction modes in recorded trajectories."""
+    cone_text: ClassVar[str] = ""
+    """Description of MuJoCo's friction for pages, if it is another law; otherwise empty."""
 
     def law(self) -> FrictionLaw:
-        """The law in the form that the kernels need."""
+        """The law of friction for the kernels."""
         raise NotImplementedError
 
     def without_bristles(self) -> FrictionKind:
-        """The same kind as MuJoCo knows it, whose nodes creep in stick."""
+        """This law without stiffness of bristles, for MuJoCo: nodes that stick creep."""
         return self
 
     @property
@@ -114,14 +117,18 @@ class FrictionKind(Section):
         problem = f"found !{type(self).__name__}, which mujoco cannot simulate"
         raise InputError(source, "friction", problem)
 
-    @property
-    def cone_text(self) -> str:
-        """Description of MuJoCo's friction for this law."""
-        return self.text
+
+class FrictionLaw(NamedTuple):
+    """Law of friction for the kernels."""
+
+    kind: int
+    """RESET_INTEGRATOR or COULOMB."""
+    constants: Table
+    """Table of the numbers of ResetConstants or CoulombConstants."""
 
 
 class TangentSlide(NamedTuple):
-    """Motion of a node along one tangent."""
+    """Motion of a node along one tangent of the ground."""
 
     velocity: Real
     """Velocity in m/s."""
@@ -178,6 +185,7 @@ class ResetIntegrator(FrictionKind):
     """
 
     modes = "0 sticks, +1 or -1 slips in that direction along the tangent"
+    cone_text = f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
 
     stiction_range: Annotated[Length, Varied()] = Field(gt=0)
     """Deflection p0 at which a node breaks free."""
@@ -200,19 +208,15 @@ class ResetIntegrator(FrictionKind):
     not given, friction is independent of it."""
 
     def law(self) -> FrictionLaw:
-        return FrictionLaw.of(
-            ResetConstants(
-                stiction_range=self.stiction_range,
-                stiction_damping=self.stiction_damping,
-                stiction_switch=self.stiction_switch,
-                proportional_stiction=self.proportional_stiction,
-                stiffness=self.stiffness,
-                kept=1.0 if self.reset == "never" else 0.0,
-                restarts=1.0 if self.reset == "range" else 0.0,
-                joint=1.0 if self.breaks_free == "both" else 0.0,
-                per_load=0.0 if self.load is None else 1.0 / self.load,
-            )
+        same = {name: value for name, value in self if name in ResetConstants._fields}
+        constants = ResetConstants(
+            **same,
+            kept=float(self.reset == "never"),
+            restarts=float(self.reset == "range"),
+            joint=float(self.breaks_free == "both"),
+            per_load=0.0 if self.load is None else 1.0 / self.load,
         )
+        return FrictionLaw(RESET_INTEGRATOR, np.array(constants))
 
     @property
     def text(self) -> str:
@@ -220,10 +224,6 @@ class ResetIntegrator(FrictionKind):
 
     def cone(self, source: object) -> Cone:
         return Cone(MUJOCO_FRICTION, self.stiction_damping)
-
-    @property
-    def cone_text(self) -> str:
-        return f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
 
 
 class ResetConstants(NamedTuple):
@@ -257,7 +257,7 @@ def reset_force(slide: Slide, law: ResetConstants) -> Vector2:
 
 @inlined
 def load_factor(slide: Slide, law: ResetConstants) -> Real:
-    """Factor of the load on the friction of the reset integrator."""
+    """Factor by which the load multiplies the friction of the reset integrator."""
     return select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
 
 
@@ -285,7 +285,7 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
 
 @inlined
 def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
-    """Next mode along each tangent; see next_tangent_mode()."""
+    """Next mode of the reset integrator along each tangent."""
     slips = law.restarts == 0.0
     ends_1, ends_2 = at_range(slide.t1, law), at_range(slide.t2, law)
     breaks_1, breaks_2 = ends_1 & slips, ends_2 & slips
@@ -323,19 +323,17 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
 
 @inlined
 def reset_margin(slide: Slide, law: ResetConstants) -> float:
-    """Mode margin of the reset integrator: the smaller margin of the two tangents."""
-    return min(tangent_margin(slide.t1, law), tangent_margin(slide.t2, law))
-
-
-@inlined
-def tangent_margin(slide: TangentSlide, law: ResetConstants) -> float:
-    """Mode margin along one tangent of the reset integrator. A node that sticks may be at the
-    stiction range as long as it moves inward."""
-    if slide.mode == STICK:
-        reserve = law.stiction_range - abs(slide.deflection)
-        inward = -slide.velocity * slide.deflection
-        return max(reserve, inward) if inward > 0.0 else reserve
-    return slide.mode * slide.velocity
+    """Mode margin of the reset integrator: the smaller margin of the two tangents. A node that
+    sticks may be at the stiction range as long as it moves inward."""
+    margin = math.inf
+    for tangent in (slide.t1, slide.t2):
+        if tangent.mode == STICK:
+            reserve = law.stiction_range - abs(tangent.deflection)
+            inward = -tangent.velocity * tangent.deflection
+            margin = min(margin, max(reserve, inward) if inward > 0.0 else reserve)
+        else:
+            margin = min(margin, tangent.mode * tangent.velocity)
+    return margin
 
 
 @inlined
@@ -400,17 +398,14 @@ class Coulomb(FrictionKind):
         return self.model_copy(update={"stiffness": 0.0})
 
     def law(self) -> FrictionLaw:
-        return FrictionLaw.of(
-            CoulombConstants(
-                static=self.static,
-                kinetic=self.kinetic,
-                stiffness=self.stiffness,
-                damping=self.damping,
-                per_forward=1.0 / self.forward,
-                per_backward=1.0 / self.backward,
-                per_lateral=1.0 / self.lateral,
-            )
+        same = {name: value for name, value in self if name in CoulombConstants._fields}
+        constants = CoulombConstants(
+            **same,
+            per_forward=1.0 / self.forward,
+            per_backward=1.0 / self.backward,
+            per_lateral=1.0 / self.lateral,
         )
+        return FrictionLaw(COULOMB, np.array(constants))
 
     @property
     def text(self) -> str:
@@ -459,15 +454,9 @@ class BristleForce(NamedTuple):
 
 
 @inlined
-def coulomb_sticks(mode: Vector2) -> Truth:
-    """True if a mode of Coulomb friction means stick."""
-    return (mode[0] == STICK) & (mode[1] == STICK)
-
-
-@inlined
 def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
     """Force of a node's bristle."""
-    stuck = coulomb_sticks((slide.t1.mode, slide.t2.mode))
+    stuck = (slide.t1.mode == STICK) & (slide.t2.mode == STICK)
     stiffness = select(stuck, law.stiffness, 0.0)
     u_1 = law.damping * slide.t1.velocity + stiffness * slide.t1.deflection
     u_2 = law.damping * slide.t2.velocity + stiffness * slide.t2.deflection
@@ -478,9 +467,9 @@ def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
 
 @inlined
 def coulomb_size(u_1: Real, u_2: Real, heading: Vector2, law: CoulombConstants) -> Real:
-    """Size of a vector for direction-dependent friction.
+    """Size of a force for friction that depends on the direction.
 
-    Vectors of the same size lie on an ellipse. Its half-axes are the directional factors: `forward`
+    Forces of the same size lie on an ellipse. Its half-axes are the directional factors: `forward`
     or `backward` along the heading, depending on the sign, and `lateral` across it.
     """
     along = u_1 * heading[0] + u_2 * heading[1]
@@ -528,7 +517,7 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
     length = math.sqrt(square_1 + square_2)
     mode_1 = select(breaks, u_1 / length, select(beyond, slide.t1.mode, STICK))
     mode_2 = select(breaks, u_2 / length, select(beyond, slide.t2.mode, STICK))
-    begins = coulomb_sticks((mode_1, mode_2)) & not_(bristle.stuck)
+    begins = (mode_1 == STICK) & (mode_2 == STICK) & not_(bristle.stuck)
     return NextMode((mode_1, mode_2), (begins, begins), (0.0 * u_1, 0.0 * u_2))
 
 
@@ -562,28 +551,10 @@ def time_to_coulomb_change(
 
 # Functions of the ground's law: each calls the function of the reset integrator or of Coulomb.
 
-LAWS = ResetConstants, CoulombConstants
-RESET_INTEGRATOR, COULOMB = range(len(LAWS))
-"""Kinds of laws, in the order of LAWS."""
-
-
-class FrictionLaw(NamedTuple):
-    """Law of friction: its kind and its constants."""
-
-    kind: int
-    """RESET_INTEGRATOR or COULOMB."""
-    constants: Table
-    """Table of the numbers of ResetConstants or CoulombConstants."""
-
-    @classmethod
-    def of(cls, constants: ResetConstants | CoulombConstants) -> Self:
-        """The law with these constants."""
-        return cls(LAWS.index(type(constants)), np.array(constants))
-
 
 def by_law(reset: F, coulomb: F) -> F:
-    """Function of a FrictionLaw and other arguments, which calls the function of the law with these
-    arguments and the law's constants."""
+    """Makes a function of a FrictionLaw and other arguments. It calls the function of that law with
+    the other arguments and the law's constants."""
 
     @inlined
     def call(friction: FrictionLaw, *more: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Height files: read once, then identified by a digest of their content."""
+"""Files of terrain heights, identified by a digest of their content."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RECORDED = re.compile(r"heights-[0-9a-f]{16}\.npy")
 
 
 class HeightFile(str):
-    """Heights from a file. The text is the name of the file in a record.
+    """Heights of a terrain from a file. As a text, the name of the file in a record.
 
     The name contains a digest of the heights, so equal names mean equal heights. In the tree of a
     scenario, a path is given instead.
@@ -38,9 +38,13 @@ class HeightFile(str):
     """Path of the file that was read."""
 
     @classmethod
-    def read(cls, path: str) -> HeightFile:
-        """Reads a height file. Refuses a file without heights, or with another digest in its
-        name."""
+    def read(cls, path: Any) -> HeightFile:
+        """Reads the height file of a setting. Refuses what is not a path, a file without heights,
+        and a file with another digest in its name."""
+        if isinstance(path, HeightFile):
+            return path
+        if not isinstance(path, str):
+            refuse("", f"found {described(path)}, expected the path of a height file")
         heights = _read_heights(path)
         if heights.ndim != 2 or min(heights.shape) < 3 or heights.size > MOST_HEIGHTS:
             shape = " x ".join(map(str, heights.shape)) or "a single number"
@@ -62,17 +66,10 @@ class HeightFile(str):
         np.lib.format.write_array(content, self.heights, version=(1, 0))
         write_whole(os.path.join(folder, self), content.getvalue())
 
-    @classmethod
-    def of(cls, given: Any) -> HeightFile:
-        """The height file of a setting, which is a path. Refuses anything else."""
-        if not isinstance(given, str):
-            refuse("", f"found {described(given)}, expected the path of a height file")
-        return given if isinstance(given, HeightFile) else cls.read(given)
-
 
 HeightPath = Annotated[
     HeightFile,
-    PlainValidator(HeightFile.of, json_schema_input_type=str),
+    PlainValidator(HeightFile.read, json_schema_input_type=str),
     Field(json_schema_extra={"format": "file name"}),
 ]
 """Setting of a section: in files a path."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Table
 from tetra_drake.laws.kinematics import rotation
-from tetra_drake.laws.vectors import Vector3, cross, dot
+from tetra_drake.laws.vectors import Vector3, dot
 
 XX, YY, ZZ, XY, XZ, YZ, INERTIA_COLUMNS = range(7)
 """Columns of an inertia, and their number."""
@@ -54,9 +54,3 @@ def over_inertia(inertia: Table, body: int, a: Vector3) -> Vector3:
         per_determinant * dot((c_xy, c_yy, c_yz), a),
         per_determinant * dot((c_xz, c_yz, c_zz), a),
     )
-
-
-@inlined
-def gyroscopic_torque(inertia: Table, body: int, w_WB: Vector3) -> Vector3:
-    """Gyroscopic torque -w x (I w) of a body with angular velocity w."""
-    return cross(times_inertia(inertia, body, w_WB), w_WB)

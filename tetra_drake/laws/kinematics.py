@@ -1,4 +1,4 @@
-"""Kinematics of free rigid bodies: motion of their nodes, and forces from nodes to bodies."""
+"""Kinematics of free rigid bodies: motions of their nodes, and sums of the forces on the nodes."""
 
 from __future__ import annotations
 
@@ -171,20 +171,13 @@ def angular_velocity(state: Table, body: int) -> Vector3:
 
 
 @inlined
-def forward_axis(state: Table, body: int) -> Vector3:
-    """The x axis of a body in the world frame."""
-    x, y, z = rotation(state, body)
-    return x[0], y[0], z[0]
-
-
-@inlined
 def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int, body: int
 ) -> Vector3:
     """Acceleration (m/s²) of a node in the world frame. `acceleration` is dv/dt of the bodies, 6
     numbers per body."""
-    v, a = 7 * (state.size // 13) + 6 * body, 6 * body
-    w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
+    a = 6 * body
+    w_x, w_y, w_z = angular_velocity(state, body)
     p_x, p_y, p_z = vector_at(nodes, node, P_BN_W)
     u_x, u_y, u_z = cross((w_x, w_y, w_z), (p_x, p_y, p_z))
     alpha_x, alpha_y, alpha_z = acceleration[a], acceleration[a + 1], acceleration[a + 2]
@@ -208,16 +201,6 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
         g = 6 * body
         generalized_force[g], generalized_force[g + 1], generalized_force[g + 2] = torque
         generalized_force[g + 3], generalized_force[g + 4], generalized_force[g + 5] = total
-
-
-@inlined
-def add_force_at(nodes: Table, row: int, body: int, generalized_force: Table) -> None:
-    """Adds the force in a row of `nodes` to the generalized force of a body."""
-    force, g = vector_at(nodes, row, FORCE), 6 * body
-    torque = cross(vector_at(nodes, row, P_BN_W), force)
-    for axis in range(3):
-        generalized_force[g + axis] += torque[axis]
-        generalized_force[g + 3 + axis] += force[axis]
 
 
 @compiled
@@ -260,3 +243,18 @@ def interpolate_state(before: Table, after: Table, step: float, part: float) -> 
         for k in range(6):
             between[v + k] = left * before[v + k] + part * after[v + k]
     return between
+
+
+def rigid_motions(p: np.ndarray) -> np.ndarray:
+    """Velocities (points, 3, 6) of points p (points, 3) of a rigid body.
+
+    The six motions are rotations about x, y and z through the origin with 1 rad/s, then
+    translations along x, y and z with 1 m/s.
+    """
+    motions = np.zeros((len(p), 3, 6))
+    x, y, z = p.T
+    motions[:, 1, 0], motions[:, 2, 0] = -z, y
+    motions[:, 0, 1], motions[:, 2, 1] = z, -x
+    motions[:, 0, 2], motions[:, 1, 2] = -y, x
+    motions[:, :, 3:] = np.eye(3)
+    return motions

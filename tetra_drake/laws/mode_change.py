@@ -1,4 +1,4 @@
-"""Changes of contact and friction modes: detection, margin, and prediction of their time."""
+"""Changes of contact and friction modes: their detection, and the prediction of their time."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from tetra_drake.laws.forces import Forces, Parts, move_contacts
 from tetra_drake.laws.kinematics import P_BN_W, node_acceleration
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.terrain import to_frame
-from tetra_drake.laws.vectors import Vector3, cross, difference, sum_of, vector_at
+from tetra_drake.laws.vectors import cross, difference, sum_of, vector_at
 
 
 @compiled
 def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
-    """Updates `modes` for a state, as update_modes() does. Also writes nodes and frames."""
+    """Updates the modes of all contact nodes for a state; see contact.update_modes().
+
+    Also writes nodes and frames.
+    """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
     return contact.update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
@@ -58,7 +61,15 @@ def time_to_mode_change(
     ground, nodes, frames = robot.ground, forces.nodes, forces.frames
     time, law = horizon, named(contact.NormalForce, ground.normal)
     for i in range(ground.contacts.size):
-        a_WN = foot_acceleration(ground, i, state, acceleration, nodes)
+        centre, body = ground.centres[i], ground.carriers[i]
+        a_WN = node_acceleration(state, acceleration, nodes, centre, body)
+        if ground.is_round:
+            # The lowest point moves with the contact, not with the material: its centripetal
+            # acceleration is the node's.
+            a, foot = 6 * body, ground.contacts[i]
+            alpha = acceleration[a], acceleration[a + 1], acceleration[a + 2]
+            drop = difference(vector_at(nodes, foot, P_BN_W), vector_at(nodes, centre, P_BN_W))
+            a_WN = sum_of(a_WN, cross(alpha, drop))
         a_1, a_2, a_n = to_frame(a_WN, frames, i, ground.flat)
         slide, v_n = contact.sliding(state, nodes, modes, ground, frames, i)
         touches = modes[i, contact.CONTACT] != 0.0
@@ -74,28 +85,12 @@ def time_to_mode_change(
     return time
 
 
-@inlined
-def foot_acceleration(
-    ground: contact.Ground, i: int, state: Table, acceleration: Table, nodes: Table
-) -> Vector3:
-    """Rate (m/s²) of the velocity at the lowest point of foot i. The point moves with the contact,
-    not with the material, so that it has the centripetal acceleration of the node."""
-    centre, body = ground.centres[i], ground.carriers[i]
-    a_WN = node_acceleration(state, acceleration, nodes, centre, body)
-    if not ground.is_round:
-        return a_WN
-    p_BC_W = vector_at(nodes, ground.contacts[i], P_BN_W)
-    a = 6 * body
-    alpha = acceleration[a], acceleration[a + 1], acceleration[a + 2]
-    return sum_of(a_WN, cross(alpha, difference(p_BC_W, vector_at(nodes, centre, P_BN_W))))
-
-
 @compiled
 def next_mode_change(
     parts: Parts, state: Table, acceleration: Table, modes: Table, horizon: float
 ) -> tuple[bool, float]:
-    """Updates `modes` for a state. Returns whether a mode changed, and the predicted time (s) to
-    the next change (see time_to_mode_change()).
+    """Updates the modes of all contact nodes for a state. Returns whether a mode changed, and the
+    predicted time (s) to the next change; see time_to_mode_change().
 
     Also writes nodes and frames.
     """

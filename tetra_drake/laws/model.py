@@ -1,4 +1,4 @@
-"""Constants of a robot in the form of the kernels."""
+"""Constants of a robot for the kernels."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.kernels.lanes import Table
-from tetra_drake.laws.actuator import DIRECT, Actuator
+from tetra_drake.laws.actuator import Actuator, Force
 from tetra_drake.laws.cable import CABLE, Cables
 from tetra_drake.laws.capsules import StrutContactLaw
 from tetra_drake.laws.contact import Ground
-from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.laws.struts import Struts
 
 WORLD = -1
@@ -32,7 +31,7 @@ class Bodies(NamedTuple):
 
 
 class Couplings(NamedTuple):
-    """Pairs of bodies joined by cables. The cables of a pair are consecutive. They run from the
+    """Pairs of bodies that cables join. The cables of a pair are consecutive. They run from the
     first body, with the lower index, to the second body. Cables from fixed nodes come first."""
 
     first: Table
@@ -44,6 +43,30 @@ class Couplings(NamedTuple):
     cables."""
     held: Table
     """Index of the body of each cable from a fixed node (fixed cables,)."""
+
+
+class AnchorSprings(NamedTuple):
+    """Springs and dampers that hold nodes of bodies along axes of the world; SI units."""
+
+    nodes: Table
+    """Indices of the held nodes (anchors,)."""
+    carriers: Table
+    """Index of the body of each held node (anchors,)."""
+    places: Table
+    """Positions (anchors, 3) at which the springs have no force."""
+    stiffness: Table
+    """Stiffness (anchors, 3) along x, y and z; 0 along a free axis."""
+    damping: Table
+    """Damping (anchors, 3) along x, y and z; 0 along a free axis."""
+
+
+class NodeLoads(NamedTuple):
+    """Constant forces on nodes."""
+
+    nodes: Table
+    """Indices of the loaded nodes (loads,)."""
+    forces: Table
+    """Forces (loads, 3) in N, in the world frame."""
 
 
 class Model(NamedTuple):
@@ -80,7 +103,7 @@ class Model(NamedTuple):
         ground: Ground | None = None,
         slack: bool = True,
     ) -> Self:
-        """Model of cables, or of a ground, at nodes of bodies, and of nothing else."""
+        """Model that has only cables, or only a ground, at nodes of bodies."""
         bodies, none = first_node.size - 1, np.zeros(0)
         no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         first = np.zeros(bodies + 1, dtype=np.int64)
@@ -88,7 +111,7 @@ class Model(NamedTuple):
             p_BN=p_BN,
             first_node=first_node,
             cables=cables or Cables.of(np.zeros(0, dtype=CABLE)),
-            actuator=actuator or Actuator.of(DIRECT),
+            actuator=actuator or Force().actuator(),
             couplings=Couplings(no_index, no_index, first[:1], no_index),
             ground=ground or Ground.nowhere(),
             anchors=AnchorSprings(no_index, no_index, no_vectors, no_vectors, no_vectors),

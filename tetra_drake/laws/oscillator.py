@@ -1,7 +1,7 @@
-"""Matsuoka network (Eq. 7-9) of n oscillators with 2n neurons. Neurons 2k and 2k + 1, counted from
-0, are the extensor and the flexor of oscillator k.
+"""Matsuoka network (Eq. 7-9) of n oscillators with 2n neurons.
 
-The law of neuron i, with the output y = max(0, u) and weights w:
+Neurons 2k and 2k + 1, counted from 0, are the extensor and the flexor of oscillator k. The law of
+neuron i, with the output y = max(0, u) and weights w:
 
     tau_A du_i/dt = u0_i + f_i - u_i - beta v_i - sum_j w_ij y_j
     tau_B dv_i/dt = y_i - v_i
@@ -64,7 +64,7 @@ class CpgSection(Section):
 
 
 class Network(NamedTuple):
-    """Constants of a network, by neuron."""
+    """Constants of a Matsuoka network: tables with a row per neuron."""
 
     first: Table
     """Index of the first neuron that inhibits each neuron (2n,)."""
@@ -113,7 +113,7 @@ class Network(NamedTuple):
 
 
 def make_neurons(state: np.ndarray) -> np.ndarray:
-    """Table `neurons` for a state (4n,): u of all neurons, then v."""
+    """Table `neurons` of a network in a state (4n,): u of all neurons, then v."""
     neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
     neurons[:, U], neurons[:, V] = state.reshape(2, -1)
     return neurons

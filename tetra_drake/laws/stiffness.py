@@ -13,7 +13,6 @@ import numpy as np
 from tetra_drake.laws import cable, capsules, contact, kinematics
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.model import WORLD, Model
-from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.laws.struts import Axes, axes_of, vector_between
 
 
@@ -26,7 +25,7 @@ class Springs(NamedTuple):
     body_b: np.ndarray
     motion_a: np.ndarray
     """Displacements (springs, k, 6) by the six motions of the first bodies; see
-    rigid_motions()."""
+    kinematics.rigid_motions()."""
     motion_b: np.ndarray
     stiffness: np.ndarray
     """Second derivatives (springs, k, k) of the energy with respect to the displacements."""
@@ -47,8 +46,24 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
         _supports(robot, forces, carriers),
         _touching_struts(robot, forces, carriers),
     ):
-        _add_springs(springs, blocks)
-    _add_turning(robot.ground, forces.nodes, carriers, blocks)
+        motion = np.concatenate([springs.motion_a, springs.motion_b], axis=2)
+        added = motion.transpose(0, 2, 1) @ springs.stiffness @ motion
+        ends = np.stack([springs.body_a, springs.body_b], axis=1)
+        for i, j in np.ndindex(2, 2):
+            block = added[:, 6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
+            np.add.at(blocks, (ends[:, i], ends[:, j]), block)
+
+    # The forces on the nodes also have a stiffness as the bodies turn. The line of a normal force
+    # goes through the centre of a round foot, so that it counts as a force on the node.
+    ground, nodes = robot.ground, forces.nodes
+    p = nodes[: len(carriers), kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    on_rows = nodes[:, kinematics.FORCE : kinematics.FORCE + 3]
+    force, is_round = on_rows[: len(carriers)].copy(), ground.contacts != ground.centres
+    force[ground.centres[is_round]] += on_rows[ground.contacts[is_round]]
+    products = np.einsum("ni,nj->nij", p, force)
+    trace = np.einsum("nii,jk->njk", products, np.eye(3))
+    turning = trace - 0.5 * (products + products.transpose(0, 2, 1))
+    np.add.at(blocks[:, :, :3, :3], (carriers, carriers), turning)
     return blocks[:bodies, :bodies].transpose(0, 2, 1, 3).reshape(6 * bodies, 6 * bodies)
 
 
@@ -66,8 +81,8 @@ def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     return Springs(
         carriers[cables.node_a],
         carriers[cables.node_b],
-        rigid_motions(p_BN_W[cables.node_a]),
-        -rigid_motions(p_BN_W[cables.node_b]),
+        kinematics.rigid_motions(p_BN_W[cables.node_a]),
+        -kinematics.rigid_motions(p_BN_W[cables.node_b]),
         (lengthwise - sideways)[:, None, None] * along + sideways[:, None, None] * np.eye(3),
     )
 
@@ -81,7 +96,7 @@ def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
     axes = np.concatenate([presses[:, None] * vertical, anchors.stiffness])
     nodes = np.concatenate([ground.centres, anchors.nodes])
     p_BN_W = forces.nodes[nodes, kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    world, motion = np.full(len(nodes), WORLD), rigid_motions(p_BN_W)
+    world, motion = np.full(len(nodes), WORLD), kinematics.rigid_motions(p_BN_W)
     return Springs(carriers[nodes], world, motion, -motion, axes[:, None] * np.eye(3))
 
 
@@ -99,7 +114,7 @@ def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Spri
             ends.append([struts.node_a[i], struts.node_b[i], struts.node_a[j], struts.node_b[j]])
     of_touch = np.array(ends, dtype=int).reshape(-1, 4)
     p_BN_W = nodes[of_touch, kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    motions = rigid_motions(p_BN_W.reshape(-1, 3)).reshape(-1, 4, 3, 6)
+    motions = kinematics.rigid_motions(p_BN_W.reshape(-1, 3)).reshape(-1, 4, 3, 6)
     motion_a, motion_b = motions.copy(), motions.copy()
     motion_a[:, 2:], motion_b[:, :2] = 0.0, 0.0
     return Springs(
@@ -117,9 +132,9 @@ def _stiffness_of_touch(
     """Second derivatives (12, 12) of the energy of a contact of struts, with respect to the
     displacements of their ends. `reach` (m) is the sum of the radii.
 
-    Half the squared distance, D² / 2, is the minimum of a function of the places s and t; see
-    laws.capsules. Its second derivatives are those at fixed places, less what the places gain as
-    they move. A place at an end does not move.
+    Half the squared distance, D² / 2, is the minimum of a function of the positions s and t; see
+    laws.capsules. Its second derivatives are those at fixed positions, less what the positions gain
+    as they move. A position at the end of a strut does not move.
     """
     s, t, gradient = touch.s, touch.t, np.concatenate(touch.gradient)
     weight, by_product, second_by_product = capsules.barrel(axes, reach)
@@ -142,28 +157,3 @@ def _stiffness_of_touch(
     steep = np.outer(gradient, gradient)
     distance = max(reach - touch.depth, capsules.LEAST_SQUARE**0.5)  # as in find_touch()
     return stiffness * (steep - touch.depth / distance * (second - steep))
-
-
-def _add_springs(springs: Springs, blocks: np.ndarray) -> None:
-    """Adds the stiffness of springs to the blocks (bodies + 1, bodies + 1, 6, 6)."""
-    motion = np.concatenate([springs.motion_a, springs.motion_b], axis=2)
-    added = motion.transpose(0, 2, 1) @ springs.stiffness @ motion
-    ends = np.stack([springs.body_a, springs.body_b], axis=1)
-    for i, j in np.ndindex(2, 2):
-        block = added[:, 6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
-        np.add.at(blocks, (ends[:, i], ends[:, j]), block)
-
-
-def _add_turning(
-    ground: contact.Ground, nodes: np.ndarray, carriers: np.ndarray, blocks: np.ndarray
-) -> None:
-    """Adds the stiffness that the forces on the nodes have as the bodies turn. The line of a normal
-    force goes through the centre of a round foot, so that the force is as one on the node."""
-    p = nodes[: len(carriers), kinematics.P_BN_W : kinematics.P_BN_W + 3]
-    forces = nodes[:, kinematics.FORCE : kinematics.FORCE + 3]
-    force, is_round = forces[: len(carriers)].copy(), ground.contacts != ground.centres
-    force[ground.centres[is_round]] += forces[ground.contacts[is_round]]
-    products = np.einsum("ni,nj->nij", p, force)
-    trace = np.einsum("nii,jk->njk", products, np.eye(3))
-    turning = trace - 0.5 * (products + products.transpose(0, 2, 1))
-    np.add.at(blocks[:, :, :3, :3], (carriers, carriers), turning)

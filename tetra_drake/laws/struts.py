@@ -1,4 +1,7 @@
-"""Struts as the kernels take them, and the nearest points of two struts."""
+"""Struts, the nearest points of two struts, and the clearance of a robot.
+
+The *clearance* is the least distance between the axes of struts of different bodies.
+"""
 
 from __future__ import annotations
 
@@ -59,8 +62,8 @@ def axes_of(struts: Struts, nodes: Table, i: int, j: int) -> Axes:
 
 @inlined
 def nearest_on_line(axes: Axes) -> Real:
-    """Place on the first axis that is nearest to the line of the second: 0 at its start, 1 at its
-    end (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9)."""
+    """Position along the first axis that is nearest to the line of the second: 0 at its start, 1 at
+    its end (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9)."""
     uu_vv = axes.uu * axes.vv
     square_of_sine = maximum(uu_vv - axes.uv * axes.uv, _PARALLEL * uu_vv)
     return (axes.uv * axes.vr - axes.ur * axes.vv) / square_of_sine
@@ -68,11 +71,11 @@ def nearest_on_line(axes: Axes) -> Real:
 
 @inlined
 def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
-    """Places on both axes, 0 to 1, that are nearest to each other.
+    """Positions along both axes, 0 to 1, that are nearest to each other.
 
-    `s` is the place on the first axis that is nearest to the line of the second. If a place is
-    beyond the end of its strut, the end is used, and the place on the other strut that is nearest
-    to it.
+    `s` is the position along the first axis that is nearest to the line of the second axis. If a
+    position is beyond the end of its strut, the end is used, and the point of the other strut that
+    is nearest to it.
     """
     t = share((axes.uv * share(s) + axes.vr) / axes.vv)
     return share((axes.uv * t - axes.ur) / axes.uu), t
@@ -80,7 +83,7 @@ def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
 
 @inlined
 def vector_between(axes: Axes, s: Real, t: Real) -> Vector3:
-    """Vector (m) from the place t on the second axis to the place s on the first."""
+    """Vector (m) from position t along the second axis to position s along the first."""
     return difference(sum_of(axes.r, scaled(s, axes.u)), scaled(t, axes.v))
 
 
@@ -114,9 +117,42 @@ def midpoint(struts: Struts, nodes: Table, i: int) -> Vector3:
 
 @inlined
 def may_be_nearer(offset: Vector3, reach: Real, least: Real) -> bool:
-    """False if two parts are certainly farther from each other than `least`, in all lanes.
+    """False if two parts are certainly farther from each other than `least` (m), in all lanes.
 
     `offset` is the vector between the centres of the parts, `reach` (m) the sum of their radii.
     """
     bound = reach + least
     return any_lane(dot(offset, offset) <= MARGIN * bound * bound)
+
+
+@inlined
+def least_strut_distance(
+    struts: Struts, radius: Table, first_node: Table, state: Table, nodes: Table, least: Real
+) -> Real:
+    """Least distance (m) between struts of different bodies, or `least` if it is smaller.
+
+    `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
+    laws.kinematics for a `state` (13 bodies,). `first_node` is Model.first_node.
+    """
+    for first in range(radius.size):
+        for second in range(first + 1, radius.size):
+            offset = difference(origin(state, second), origin(state, first))
+            if not may_be_nearer(offset, radius[first] + radius[second], least):
+                continue
+            begin = dot(offset, vector_at(nodes, first_node[second], P_WN))
+            for node in range(first_node[second] + 1, first_node[second + 1]):
+                begin = minimum(begin, dot(offset, vector_at(nodes, node, P_WN)))
+            length = math.sqrt(dot(offset, offset))
+            for a in range(struts.first_strut[first], struts.first_strut[first + 1]):
+                end_a = dot(offset, vector_at(nodes, struts.node_a[a], P_WN))
+                end_b = dot(offset, vector_at(nodes, struts.node_b[a], P_WN))
+                # Along the offset, the strut may end long before the second body begins.
+                if not any_lane(begin - maximum(end_a, end_b) <= MARGIN * least * length):
+                    continue
+                midpoint_a = midpoint(struts, nodes, a)
+                for b in range(struts.first_strut[second], struts.first_strut[second + 1]):
+                    apart = difference(midpoint_a, midpoint(struts, nodes, b))
+                    reach = 0.5 * (struts.length[a] + struts.length[b])
+                    if may_be_nearer(apart, reach, least):
+                        least = minimum(least, strut_distance(struts, nodes, a, b))
+    return least

@@ -1,9 +1,8 @@
 """Tally of a simulation: sums and extremes over all steps, which metrics are computed from.
 
-A part of the tally is a NamedTuple of tables, with a kernel that adds a step to them. All engines
-call observe(), which calls these kernels, at every step. On MuJoCo, which has its own contact, the
-forces of the ground here are the law's at MuJoCo's states. TalliedMetrics declares the metrics that
-are computed from the tables; scenario.metrics has all metrics.
+All engines call observe() at every step. On MuJoCo, which has its own contact, the forces of the
+ground here are the law's at MuJoCo's states. TalliedMetrics declares the metrics that are computed
+from the tables; scenario.metrics has all metrics.
 """
 
 from __future__ import annotations
@@ -14,35 +13,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, Self
 
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import inlined
-from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, minimum, select
+from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, select
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws import cable
 from tetra_drake.laws.actuator import LIMITS, exertion
-from tetra_drake.laws.clearance import least_strut_distance
 from tetra_drake.laws.contact import NORMAL
 from tetra_drake.laws.forces import Forces, sizes_of
 from tetra_drake.laws.kinematics import pitch_rate
 from tetra_drake.laws.model import Model
-
-
-class Step(NamedTuple):
-    """A step of a simulation, with signals and forces at its end. The first step, and a repeated
-    step, take no time."""
-
-    robot: Model
-    signals: Table
-    """Signals (signals,) in N at the end of the step."""
-    signals_before: Table
-    """Signals (signals,) in N at the beginning of the step."""
-    forces: Forces
-    duration: Real
-    """Duration of the step in s."""
-    takes_time: Truth
-    counts: Truth
-    """True if the step takes time and is in the steady stretch. Sums are over these steps."""
-    counted: Real
-    """Duration (s) of the step if it counts, otherwise 0."""
+from tetra_drake.laws.struts import least_strut_distance
 
 
 class Effort(NamedTuple):
@@ -69,107 +49,8 @@ class Effort(NamedTuple):
     """Time at a limit of an actuator, in s."""
 
 
-@inlined
-def add_to_effort(effort: Effort, step: Step) -> None:
-    """Adds a step."""
-    signal, cable_forces = step.robot.cables.signal, step.forces.cable_forces
-    drives = step.forces.drives
-    per_time, work = select(step.takes_time, 1.0 / step.duration, 0.0), 0.0 * step.duration
-    drive = 0
-    for i in range(effort.left.size):
-        if signal[i] == cable.PASSIVE:
-            continue
-        tension, length = cable_forces[i, cable.TENSION], cable_forces[i, cable.LENGTH]
-        mean_signal = 0.5 * (step.signals_before[signal[i]] + step.signals[signal[i]])
-        own = exertion(step.robot.actuator, drives, drive, tension, length, mean_signal)
-        drive += 1
-        wound = select(step.takes_time, effort.left[i] - own.left, 0.0)
-        effort.left[i] = own.left
-        speed = wound * per_time
-        effort.peak_force[0] = maximum(effort.peak_force[0], own.load)
-        effort.peak_speed[0] = maximum(effort.peak_speed[0], abs(speed))
-        effort.peak_power[0] = maximum(effort.peak_power[0], own.load * speed)
-        wound = select(step.counts, wound, 0.0)
-        work += maximum(own.pull * wound, 0.0)
-        effort.impulse[0] += step.counted * own.load
-        effort.wound[0] += abs(wound)
-        effort.pulled[0] += maximum(own.load * wound, 0.0)
-        effort.limited[0] += step.counted * own.limited
-    effort.work[0] += work
-
-
-class Roughness(NamedTuple):
-    """Roughness of the signals."""
-
-    total: Annotated[Table, 1]
-    """Integral of (dS/dt)² of all signals, in N²/s."""
-
-
-@inlined
-def add_to_roughness(roughness: Roughness, step: Step) -> None:
-    """Adds a step."""
-    square = 0.0 * step.duration
-    for k in range(step.signals.size):
-        change = step.signals[k] - step.signals_before[k]
-        square += change * change
-    roughness.total[0] += select(step.counts, square / step.duration, 0.0)
-
-
-class Lifted(NamedTuple):
-    """Time that bodies are off the ground."""
-
-    time: Annotated[Table, "bodies"]
-    """Time (bodies,) in s while no contact node of a body bears a normal force."""
-
-
-@inlined
-def add_to_lifted(lifted: Lifted, step: Step) -> None:
-    """Adds a step."""
-    carriers, i = step.robot.ground.carriers, 0
-    for body in range(lifted.time.size):
-        load = 0.0 * step.counted
-        while i < carriers.size and carriers[i] == body:
-            load += step.forces.ground_forces[i, NORMAL]
-            i += 1
-        lifted.time[body] += select(load == 0.0, step.counted, 0.0)
-
-
-class LeastTension(NamedTuple):
-    """Least tension over all steps."""
-
-    of_all: Annotated[Table, 1, math.inf]
-    """Least tension of all cables, in N."""
-
-
-@inlined
-def add_to_tension(tension: LeastTension, step: Step) -> None:
-    """Adds a step."""
-    least = tension.of_all[0]
-    for i in range(step.forces.cable_forces.shape[0]):
-        least = minimum(least, step.forces.cable_forces[i, cable.TENSION])
-    tension.of_all[0] = least
-
-
-class Rolled(NamedTuple):
-    """Rotation of the structure about the world's y axis, over all steps."""
-
-    rate: Annotated[Table, 1]
-    """Angular velocity (rad/s) at the latest step; see kinematics.pitch_rate()."""
-    angle: Annotated[Table, 1]
-    """Integral of the rate, in rad."""
-
-
-@inlined
-def add_to_rolled(rolled: Rolled, step: Step) -> None:
-    """Adds a step."""
-    first_node = step.robot.first_node
-    rate = pitch_rate(step.forces.nodes, first_node[first_node.size - 1])
-    rolled.angle[0] += select(step.takes_time, 0.5 * step.duration * (rolled.rate[0] + rate), 0.0)
-    rolled.rate[0] = rate
-
-
 class Tally(NamedTuple):
-    """Tally of a simulation: its time, and the parts that metrics need."""
+    """Sums and extremes over all steps of a simulation, which metrics are computed from."""
 
     begins: Annotated[Table, 1]
     """Time (s) at which the steady stretch begins."""
@@ -180,10 +61,16 @@ class Tally(NamedTuple):
     clearance: Annotated[Table, 1, math.inf]
     """Least distance between struts, in m; see update_clearance()."""
     effort: Effort
-    roughness: Roughness
-    lifted: Lifted
-    tension: LeastTension
-    rolled: Rolled
+    roughness: Annotated[Table, 1]
+    """Integral of (dS/dt)² of all signals S over the steady stretch, in N²/s."""
+    lifted: Annotated[Table, "bodies"]
+    """Time (s) in the steady stretch while no contact node of a body bears a normal force."""
+    least_tension: Annotated[Table, 1, math.inf]
+    """Least tension of all cables at any time, in N."""
+    pitch_rate: Annotated[Table, 1]
+    """Angular velocity (rad/s) at the latest step; see kinematics.pitch_rate()."""
+    rolled: Annotated[Table, 1]
+    """Integral of the angular velocity over all steps, in rad."""
 
     @classmethod
     def of(cls, robot: Model, *, signals: int, begins: float) -> Self:
@@ -196,34 +83,71 @@ class Tally(NamedTuple):
 
 @inlined
 def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
-    """Adds the step that ends at `time` (s) with these signals and forces."""
+    """Adds the step that ends at `time` (s) with these signals and forces.
+
+    The first step, and a repeated step, take no time. A step counts if it takes time and is in the
+    steady stretch.
+    """
     duration = time - tally.time[0]
     takes_time = duration > 0.0
     counts = takes_time & (tally.time[0] >= tally.begins[0])
-    step = Step(
-        robot=robot,
-        signals=signals,
-        signals_before=tally.signals,
-        forces=forces,
-        duration=duration,
-        takes_time=takes_time,
-        counts=counts,
-        counted=select(counts, duration, 0.0),
-    )
-    add_to_effort(tally.effort, step)
-    add_to_roughness(tally.roughness, step)
-    add_to_lifted(tally.lifted, step)
-    add_to_tension(tally.tension, step)
-    add_to_rolled(tally.rolled, step)
+    counted = select(counts, duration, 0.0)
+    cable_forces, effort = forces.cable_forces, tally.effort
+
+    per_time, work, drive = select(takes_time, 1.0 / duration, 0.0), 0.0 * duration, 0
+    for i in range(effort.left.size):
+        driver = robot.cables.signal[i]
+        if driver == cable.PASSIVE:
+            continue
+        tension, length = cable_forces[i, cable.TENSION], cable_forces[i, cable.LENGTH]
+        mean_signal = 0.5 * (tally.signals[driver] + signals[driver])
+        own = exertion(robot.actuator, forces.drives, drive, tension, length, mean_signal)
+        drive += 1
+        wound = select(takes_time, effort.left[i] - own.left, 0.0)
+        effort.left[i] = own.left
+        speed = wound * per_time
+        effort.peak_force[0] = maximum(effort.peak_force[0], own.load)
+        effort.peak_speed[0] = maximum(effort.peak_speed[0], abs(speed))
+        effort.peak_power[0] = maximum(effort.peak_power[0], own.load * speed)
+        wound = select(counts, wound, 0.0)
+        work += maximum(own.pull * wound, 0.0)
+        effort.impulse[0] += counted * own.load
+        effort.wound[0] += abs(wound)
+        effort.pulled[0] += maximum(own.load * wound, 0.0)
+        effort.limited[0] += counted * own.limited
+    effort.work[0] += work
+
+    square = 0.0 * duration
     for k in range(signals.size):
+        change = signals[k] - tally.signals[k]
+        square += change * change
         tally.signals[k] = signals[k]
-    tally.time[0] = time
+    tally.roughness[0] += select(counts, square / duration, 0.0)
+
+    i = 0
+    for body in range(tally.lifted.size):
+        load = 0.0 * counted
+        while i < robot.ground.carriers.size and robot.ground.carriers[i] == body:
+            load += forces.ground_forces[i, NORMAL]
+            i += 1
+        tally.lifted[body] += select(load == 0.0, counted, 0.0)
+
+    for i in range(cable_forces.shape[0]):
+        tension = cable_forces[i, cable.TENSION]
+        tally.least_tension[0] = minimum(tally.least_tension[0], tension)
+
+    rate = pitch_rate(forces.nodes, robot.first_node[robot.first_node.size - 1])
+    turned = 0.5 * duration * (tally.pitch_rate[0] + rate)
+    tally.rolled[0] += select(takes_time, turned, 0.0)
+    tally.pitch_rate[0], tally.time[0] = rate, time
 
 
 @inlined
 def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
-    """Updates the clearance for a state (13 bodies,). It is too slow to be called at every step.
-    `nodes` is the table of laws.kinematics."""
+    """Updates the least distance between struts for a state (13 bodies,).
+
+    It is too slow to be called at every step. `nodes` is the table of laws.kinematics.
+    """
     radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]
     least = least_strut_distance(robot.struts, radius, first_node, state, nodes, least)
     tally.clearance[0] = least
@@ -254,18 +178,18 @@ class Metric:
 
 
 def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
-    """A field of a class of metrics, with its declaration as metadata; see Metric."""
+    """Field of a class of metrics, with the arguments of Metric."""
     return field(metadata={"metric": Metric(unit, note, compute, **more)})
 
 
 def total(name: str) -> Callable[[Any], float]:
-    """Function of a Walk: a number of its tally, such as "effort.work"."""
+    """Function that reads a number of a Walk's tally, such as "effort.work"."""
     number = operator.attrgetter(name)
     return lambda walk: number(walk.tally)[0]
 
 
 def mean(name: str) -> Callable[[Any], float]:
-    """Function of a Walk: a total of Effort as mean over the steady stretch and the actuators."""
+    """Function that divides a total of Effort by a Walk's steady time and number of actuators."""
     return lambda walk: walk.per_actuator_time * getattr(walk.tally.effort, name)[0]
 
 
@@ -274,23 +198,25 @@ def greatest(unit: str, note: str, compute: Callable[[Any], float], **more: Any)
     return metric(unit, note, compute, most=True, is_cost=True, **more)
 
 
-def _signal_rate(walk: Any) -> float:
-    mean_square = walk.per_steady_time * float(walk.tally.roughness.total[0])
-    return math.sqrt(mean_square / max(walk.signals.shape[1], 1))
-
-
 @dataclass(frozen=True)
 class TalliedMetrics:
     """Metrics of every step of a simulation: functions of the tally."""
 
-    rolled: float = metric("rad", "forward positive", total("rolled.angle"))
+    rolled: float = metric("rad", "forward positive", total("rolled"))
     """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
     turns count. It is the integral of the angular velocity of the rigid motion that fits the nodes'
     velocities best, so a change of shape alone does not count."""
     actuator_work: float = metric("J", "of all actuators", total("effort.work"), is_cost=True)
     """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
     max(0, -S dl/dt) for driven cables with signal S and length l."""
-    signal_rate: float = metric("N/s", "how fast signals change", _signal_rate, is_cost=True)
+    signal_rate: float = metric(
+        "N/s",
+        "how fast signals change",
+        lambda walk: math.sqrt(
+            walk.per_steady_time * float(walk.tally.roughness[0]) / max(walk.signals.shape[1], 1)
+        ),
+        is_cost=True,
+    )
     """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
     lifted: float = metric(
         "",
@@ -304,7 +230,7 @@ class TalliedMetrics:
     clearance: float = metric("m", "smallest gap of struts' axes", total("clearance"), least=True)
     """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
     is less than their diameter: the model does not prevent this."""
-    tension: float = metric("N", "smallest of any cable", total("tension.of_all"), least=True)
+    tension: float = metric("N", "smallest of any cable", total("least_tension"), least=True)
     """Least tension of any cable at any time. Below 0 the cable would have to push."""
     peak_actuator_force: float = greatest(
         "N", "at any time; a cable can pull a winch backward", total("effort.peak_force")

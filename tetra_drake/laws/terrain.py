@@ -1,4 +1,4 @@
-"""Terrain: the surface of the ground, z = h(x, y), its tangent frame at a node, and its kinds.
+"""Terrain: the surface of the ground, z = h(x, y), its tangent frames, and kinds of terrain.
 
 The world has x forward, y left, and z up. The robot starts around the origin, T1's base at x = 0,
 and walks along +x.
@@ -48,7 +48,7 @@ without its x, which is 0."""
 
 
 class SurfaceGrid(NamedTuple):
-    """Grid of a surface's control points; SI units."""
+    """Position and size of the grid of a surface's control points; SI units."""
 
     corner_x: Real
     """Coordinate x of the first control point."""
@@ -178,7 +178,7 @@ STEEPEST = math.radians(60.0)
 
 @dataclass(frozen=True)
 class Grid:
-    """Heights on a regular grid: the control points of the surface."""
+    """Heights of a terrain on a regular grid: the control points of the surface."""
 
     heights: np.ndarray
     """Heights (rows, columns) in m. Rows are along x, columns along y."""
@@ -195,8 +195,8 @@ class Relief(Section):
     """True if h = 0 everywhere. The kernels are faster then."""
     is_ground: ClassVar[bool] = True
     """False if there is nothing that nodes could touch."""
-    uneven: ClassVar[str] = "on uneven ground"
-    """Words for where a robot walks on this kind of uneven ground."""
+    place: ClassVar[str] = "on uneven ground"
+    """Words for where a robot walks if the terrain is no slope; empty on level ground."""
 
     @property
     def plane_slope(self) -> float | None:
@@ -207,10 +207,8 @@ class Relief(Section):
     def where(self) -> str:
         """Words for where a robot walks, such as "up 5 degrees"; empty on level ground."""
         slope = self.plane_slope
-        if slope is None:
-            return self.uneven
-        if slope == 0.0:
-            return ""
+        if not slope:
+            return self.place
         return f"{'up' if slope > 0.0 else 'down'} {abs(math.degrees(slope)):.3g} degrees"
 
     @property
@@ -227,7 +225,7 @@ class Relief(Section):
         """Writes the files of the terrain to the folder of a record, under new names."""
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
-        """The heights of the terrain.
+        """Heights of the terrain on a grid.
 
         Steps and obstacles without a start begin at x = `ahead` (m). The generated area grows with
         the robot's `scale`; see Blueprint.scale. Raises InputError, naming `source` and the key,
@@ -237,9 +235,10 @@ class Relief(Section):
 
 
 class Flat(Relief):
-    """h = 0 everywhere: the thesis's floor, and the default."""
+    """Level ground at height 0: the thesis's floor, and the default."""
 
     is_flat = True
+    place = ""
 
     @property
     def plane_slope(self) -> float:
@@ -254,10 +253,7 @@ class Nothing(Flat):
     """No ground: nodes touch nothing. For structures that float or hang."""
 
     is_ground = False
-
-    @property
-    def where(self) -> str:
-        return "without ground"
+    place = "without ground"
 
     @property
     def text(self) -> str:
@@ -270,6 +266,8 @@ class Incline(Relief):
     The robot starts on it, turned with it.
     """
 
+    place = ""
+
     slope: Angle = Field(ge=-STEEPEST, le=STEEPEST)
     """Angle by which the ground rises along +x."""
 
@@ -280,17 +278,18 @@ class Incline(Relief):
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         cell = scale * FAR, scale * FAR  # three heights make a plane one cell wide
         x, y = _axes(cell, 0.0, scale)
-        return _grid(x, y, math.tan(self.slope) * x, cell)
+        return Grid(math.tan(self.slope) * x, (x[0, 0], y[0, 0]), cell)
 
 
 class Steps(Relief):
-    """Stairs across the way: h = height min(count, floor((x - start) / depth) + 1) from `start` on.
+    """Stairs across the robot's path, from x = `start` on.
 
-    A step rises over a cell before and after its edge: the height of a step, or a quarter of its
-    depth if that is less.
+    Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1). It
+    rises over a cell before and after its edge: the height of a step, or a quarter of its depth if
+    that is less.
     """
 
-    uneven = "over steps"
+    place = "over steps"
 
     height: Length
     """Height of each step above the one before; negative goes down."""
@@ -309,7 +308,7 @@ class Steps(Relief):
         cell = self.depth / math.ceil(self.depth / finest), scale * ASIDE
         x, y = _axes(cell, start + 0.5 * cell[0], scale)  # edges midway between two heights
         risen = np.clip(np.floor((x - start) / self.depth) + 1.0, 0.0, self.count)
-        return _grid(x, y, self.height * risen, cell)
+        return Grid(self.height * risen, (x[0, 0], y[0, 0]), cell)
 
 
 class Rough(Relief):
@@ -320,7 +319,7 @@ class Rough(Relief):
     in.
     """
 
-    uneven = "on rough ground"
+    place = "on rough ground"
 
     amplitude: Length = Field(ge=0)
     """Half the range of heights."""
@@ -335,7 +334,7 @@ class Rough(Relief):
         x, y = _axes((half, half), 0.0, scale)
         generator = np.random.default_rng(self.seed)
         heights = generator.uniform(-2.0 * self.amplitude, 0.0, x.shape)
-        return _grid(x, y, heights, (half, half))
+        return Grid(heights, (x[0, 0], y[0, 0]), (half, half))
 
 
 class Obstacles(Relief):
@@ -345,7 +344,7 @@ class Obstacles(Relief):
     `start`. The grid lowers a bump's top by about an eighth.
     """
 
-    uneven = "over obstacles"
+    place = "over obstacles"
 
     height: Length = Field(gt=0)
     """Height of a bump."""
@@ -378,7 +377,7 @@ class Obstacles(Relief):
             at, centre = tuple(at[inside].T), centres[inside]
             r_squared = (x[at] - centre[:, 0]) ** 2 + (y[at] - centre[:, 1]) ** 2
             np.maximum.at(heights, at, self.height * (1.0 - r_squared / self.radius**2))
-        return _grid(x, y, heights, (cell, cell))
+        return Grid(heights, (x[0, 0], y[0, 0]), (cell, cell))
 
 
 class HeightField(Relief):
@@ -427,8 +426,3 @@ def _axes(cell: tuple[float, float], origin: float, scale: float) -> tuple[np.nd
     x = origin + cell[0] * np.arange(first - 1, last + 2)
     x, y = np.meshgrid(x, cell[1] * np.arange(-aside, aside + 1.0), indexing="ij")
     return x, y
-
-
-def _grid(x: np.ndarray, y: np.ndarray, heights: np.ndarray, cell: tuple[float, float]) -> Grid:
-    """Grid of heights (rows, columns) at the coordinates of _axes()."""
-    return Grid(heights, (float(x[0, 0]), float(y[0, 0])), cell)

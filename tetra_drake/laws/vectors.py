@@ -31,14 +31,6 @@ def add_vector(vector: Vector3, row: int, column: int, table: Table) -> None:
 
 
 @inlined
-def subtract_vector(vector: Vector3, row: int, column: int, table: Table) -> None:
-    """Subtracts a vector from three columns of a table, beginning with `column`."""
-    table[row, column] -= vector[0]
-    table[row, column + 1] -= vector[1]
-    table[row, column + 2] -= vector[2]
-
-
-@inlined
 def sum_of(a: Vector3, b: Vector3) -> Vector3:
     """Sum a + b of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]

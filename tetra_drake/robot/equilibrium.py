@@ -19,9 +19,8 @@ from tetra_drake.laws import cable
 from tetra_drake.laws.capsules import BARREL, PARALLEL
 from tetra_drake.laws.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.laws.forces import Forces, Parts, compute_forces, move_robot
-from tetra_drake.laws.kinematics import FORCE, P_WN, move_bodies
+from tetra_drake.laws.kinematics import FORCE, P_WN, move_bodies, rigid_motions
 from tetra_drake.laws.model import Model
-from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.laws.stiffness import stiffness_matrix
 from tetra_drake.robot.statics import null_space
 

@@ -6,9 +6,9 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import compiled
 from tetra_drake.kernels.lanes import Table
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws import cable, contact, kinematics
 from tetra_drake.laws.forces import forces_of_motion
 from tetra_drake.robot.robot import Robot

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.laws.rigid_motions import rigid_motions
+from tetra_drake.laws.kinematics import rigid_motions
 
 TOLERANCE = 1e-6
 """Singular values below this share of the greatest count as zero. Lengths are in units of the

@@ -24,8 +24,7 @@ from pydrake.multibody.tree import (
 
 from tetra_drake.laws import cable, kinematics
 from tetra_drake.laws.capsules import StrutSearch
-from tetra_drake.laws.model import WORLD, Couplings
-from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
+from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
 from tetra_drake.robot.equilibrium import Equilibrium

@@ -74,7 +74,7 @@ class Mujoco(EngineSettings):
     """Time step. A simulation fails at once if it is too long for springs and dampers."""
 
     def friction_text(self, friction: FrictionKind) -> str:
-        return friction.cone_text
+        return friction.cone_text or friction.text
 
 
 EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds()]

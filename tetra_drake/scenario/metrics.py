@@ -93,7 +93,7 @@ class Walk(Poses):
     @property
     def lifted_shares(self) -> tuple[float, ...]:
         """Share of the steady stretch during which each body is off the ground."""
-        return tuple((self.per_steady_time * self.tally.lifted.time).tolist())
+        return tuple((self.per_steady_time * self.tally.lifted).tolist())
 
 
 def _cost_of_transport(walk: Walk) -> float:

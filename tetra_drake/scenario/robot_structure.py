@@ -18,8 +18,8 @@ import pydantic
 from pydantic import Field
 
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch, elastic_tension
+from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.model import WORLD
-from tetra_drake.laws.rigid_motions import rigid_motions
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.robot_tetrahedra import (

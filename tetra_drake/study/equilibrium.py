@@ -20,8 +20,7 @@ from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
-from tetra_drake.laws.kinematics import FORCE
-from tetra_drake.laws.rigid_motions import rigid_motions
+from tetra_drake.laws.kinematics import FORCE, rigid_motions
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.elastic_struts import condensed

@@ -25,10 +25,9 @@ from tetra_drake.engines.lanes.prepared import Prepared
 from tetra_drake.engines.lanes.tables import in_lanes, numbered, numbers_of, views
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
-from tetra_drake.kernels.allocation import allocate
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.lanes import FieldArray
-from tetra_drake.kernels.packed import Packed
+from tetra_drake.kernels.packed import Packed, allocate
 from tetra_drake.laws.actuator import DRIVE
 from tetra_drake.laws.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result

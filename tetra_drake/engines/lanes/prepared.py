@@ -12,7 +12,7 @@ from tetra_drake.engines.lanes import loop
 from tetra_drake.engines.lanes.dynamics import Solver
 from tetra_drake.engines.lanes.loop import Constants, LaneState
 from tetra_drake.engines.lanes.tables import shared
-from tetra_drake.kernels.allocation import allocate
+from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws.actuator import DRIVE, Limits
 from tetra_drake.laws.forces import sizes_of
 from tetra_drake.laws.oscillator import make_neurons

@@ -37,7 +37,7 @@ class Touching(NamedTuple):
     """Parts time² * stiffness of w."""
     vector: Annotated[Table, "6 * bodies"]
     """Scratch memory."""
-    count: Annotated[Table, 1, int]
+    count: Annotated[Table, 1, int]  # type: ignore[assignment]  # tuples have a method count()
     """Number of contacts."""
 
 
