@@ -66,7 +66,7 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused,
     assert compressed.iterations.equals(plain.iterations)
     file = plain.file("iterations.jsonl", trial=0)
     entries = file.read()
-    more = entries[-1] | {"iteration": len(entries)}
+    more = entries[-1].model_copy(update={"iteration": len(entries)})
     file.append([more])
     assert file.read() == [*entries, more]
     packed = run / "trial_00" / "iterations.jsonl.xz"

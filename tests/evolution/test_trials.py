@@ -48,7 +48,8 @@ def test_neither_workers_nor_executor_nor_timing_change_the_record(
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
     monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 20)
-    record_run(tmp_path / "pool", small_scenario(), evaluator=evaluators.InProcesses(Bowl(), 2))
+    processes = evaluators.on_executor(Bowl(), evaluators.WorkerProcesses, 2)
+    record_run(tmp_path / "pool", small_scenario(), evaluator=processes)
     assert read_record(tmp_path / "pool") == reference
 
 

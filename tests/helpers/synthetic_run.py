@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from tetra_drake.evolution.entries import EliteLine
+from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord, TrialRecord
+from tetra_drake.evolution.trials import TrialRecord
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
@@ -86,7 +88,7 @@ def write_map(directory: Path, kept: Mapping[int, float]) -> Path:
         write_run(directory, [trial], scenario=scenario, metrics=metrics)
     (directory / "elites.jsonl").unlink(missing_ok=True)
     for index, share in kept.items():
-        line = {"trial": 0, "index": index, "kept": share, "mean_distance": 0.1}
+        line = EliteLine(trial=0, index=index, kept=share, mean_distance=0.1)
         load_run(directory).file("elites.jsonl").append([line])
     return directory
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.analysis.robustness import by_gait, robustness
-from tetra_drake.evolution.entries import ELITES, RecordFile
+from tetra_drake.evolution.entries import ELITES, EliteLine, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number
@@ -45,7 +45,8 @@ def elites(run: Run) -> pandas.DataFrame:
     import pandas
 
     table, kind = run.with_parameters, run.scenario.optimizer
-    judged = pandas.DataFrame(run.file(ELITES).read(), columns=[*_KEY, *_JUDGED])
+    lines = [line.content() for line in run.file(ELITES).read()]
+    judged = pandas.DataFrame(lines, columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
         low, high = np.array(list(kind.measures.values())).T
@@ -81,7 +82,7 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
     )
     table = by_gait(judgement)
     lines = [
-        {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}
+        EliteLine(trial=trial, index=index, kept=kept, mean_distance=json_number(mean))
         for (trial, index), kept, mean in zip(keys, table["kept"], table["mean"], strict=True)
     ]
     file.append(lines)

@@ -1,4 +1,10 @@
-"""Trials of a run: each has an optimiser, a record and a state. Also the loop over all trials."""
+"""Trials of a run: each has an optimiser, a record and a state. Also the loop over all trials.
+
+Evaluations are recorded iteration by iteration, so their order does not depend on which simulation
+was finished first. A run is resumed by repeating it from the start, with recorded fitnesses in
+place of simulations. Every vector and every line must be as recorded. Therefore resuming needs the
+same versions of the packages and the same kind of processor.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +15,37 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
-from tetra_drake.evolution.evaluators import Evaluator, evaluate_all, finished, submitted
-from tetra_drake.evolution.run_record import RunRecord, TrialRecord
+from tetra_drake.evolution.entries import (
+    BEST_GAIT,
+    EVALUATIONS,
+    IN_PROGRESS,
+    ITERATIONS,
+    EvaluationLine,
+    IterationLine,
+    Line,
+    RecordFile,
+    first_problem,
+    trial_folder,
+)
+from tetra_drake.evolution.evaluators import Submit, evaluate_all, finished
+from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
-from tetra_drake.robot.gait import ParameterSpace, save_gait
+from tetra_drake.robot.gait import ParameterSpace, Vector, save_gait
 from tetra_drake.settings.units import INCHES, Units
 
 _SHOW_PERIOD = 1.0  # s
 
 ALL_DONE = "all evaluations done"
 """Reason for the end of a trial whose optimiser did not stop earlier."""
+
+_NOT_REPEATED = (
+    "{} is not what scenario and seed lead to here; resume the run with the versions of the "
+    "packages and on the kind of processor it was begun with"
+)
 
 
 @dataclass
@@ -46,17 +69,89 @@ class TrialStatus:
     stop: str | None = None
     """Reason for the trial's end; None during the trial."""
 
-    def complete(self, line: Mapping[str, Any], *, best_distance: float) -> None:
-        """Updates the state with a line of iterations.jsonl and the distance of the best gait."""
-        self.iteration = line["iteration"]
-        self.stop = line["stop"] if isinstance(line["stop"], str) else None
-        best = line["best_fitness"]
-        # A line from a table has NaN in place of null.
-        self.best_fitness = -math.inf if best is None or math.isnan(best) else best
-        self.best_distance = best_distance
-
 
 _Evaluated = tuple[Task, Evaluation]
+
+
+class TrialRecord:
+    """Files of a trial. Lines that are recorded already are checked, not written again."""
+
+    def __init__(self, run: RunRecord, number: int) -> None:
+        self._run = run
+        self._files: dict[str, RecordFile] = {}
+        self._lines: dict[str, list[Any]] = {}
+        """Recorded lines of each file."""
+        for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
+            file = RecordFile.of(run.directory, run.manifest.run, name, trial=number)
+            if run.begun:
+                file.repair()
+            self._files[name] = file
+            self._lines[name] = file.read() if run.begun else []
+        self._recorded: dict[int, tuple[str, int]] = {}
+        """File and row of each recorded evaluation, by its index."""
+        for name in (IN_PROGRESS, EVALUATIONS):
+            for row, line in enumerate(self._lines[name]):
+                self._recorded[line.index] = name, row
+
+    def recall(self, index: int, vector: Vector) -> Evaluation | None:
+        """The recorded evaluation with this index, or None. Raises InputError if it was recorded
+        for another vector."""
+        if index not in self._recorded:
+            return None
+        name, row = self._recorded[index]
+        line: EvaluationLine = self._lines[name][row]
+        if line.genome != vector.tolist():
+            self._files[name].refuse(row, _NOT_REPEATED.format("the genome"))
+        return line.evaluation()
+
+    def keep(self, task: Task, evaluation: Evaluation) -> None:
+        """Saves an evaluation of an incomplete iteration."""
+        self._run.begin()
+        self._files[IN_PROGRESS].append([EvaluationLine.of(task, evaluation)])
+
+    def complete(
+        self,
+        results: Sequence[_Evaluated],
+        iteration: Mapping[str, Any],
+        *,
+        placed: Sequence[int | None] | None,
+    ) -> None:
+        """Writes the lines of an iteration; lines that are recorded already are checked. For
+        `placed` see optimizers.base.Iteration. Raises InputError if an optimiser from Python
+        reports what cannot be recorded."""
+        more: list[dict[str, Any]] = [{} for _ in results]
+        if placed is not None:
+            more = [{"placed": member} for member in placed]
+        try:
+            evaluations = [
+                EvaluationLine.of(task, evaluation, **keys)
+                for (task, evaluation), keys in zip(results, more, strict=True)
+            ]
+            last = IterationLine.model_validate(iteration)
+        except ValidationError as error:
+            raise InputError("optimizer", *first_problem(error)) from error
+        # The order matters: after a kill in between, a resumed run completes the files.
+        self._write(EVALUATIONS, evaluations, first=evaluations[0].index)
+        self._write(ITERATIONS, [last], first=last.iteration)
+        if evaluations[-1].index >= len(self._lines[EVALUATIONS]):
+            self._files[IN_PROGRESS].path.unlink(missing_ok=True)
+
+    def finish(self, evaluations: int) -> None:
+        """Checks that the record has no evaluations beyond the end of the trial."""
+        if len(self._lines[EVALUATIONS]) > evaluations:
+            self._files[EVALUATIONS].refuse(evaluations, "the trial ends before this evaluation")
+        self._files[IN_PROGRESS].path.unlink(missing_ok=True)
+
+    def _write(self, name: str, lines: Sequence[Line], *, first: int) -> None:
+        recorded = self._lines[name][first:]
+        for row, (theirs, ours) in enumerate(zip(recorded, lines, strict=False), start=first):
+            then, now = theirs.content(), ours.content()
+            for key in then | now:
+                if then.get(key) != now.get(key):
+                    self._files[name].refuse(row, _NOT_REPEATED.format(key))
+        if missing := lines[len(recorded) :]:
+            self._run.begin()
+            self._files[name].append(missing)
 
 
 class Trial:
@@ -131,28 +226,24 @@ class Trial:
 
     def _complete(self) -> None:
         """Ends an iteration: tells the optimiser its evaluations, and records it."""
-        results = [self._results[index] for index in sorted(self._results)]
+        results, status = [self._results[index] for index in sorted(self._results)], self.status
         outcome = self._optimizer.tell([evaluation for _, evaluation in results])
         for task, evaluation in results:
-            if evaluation.fitness > (self._best[1].fitness if self._best else -math.inf):
+            if evaluation.fitness > status.best_fitness:
                 self._best = task, evaluation
-        status = self.status
+                status.best_fitness = evaluation.fitness
+                status.best_distance = evaluation.metrics.get("distance", math.nan)
         all_done = status.evaluations == status.evaluations_at_most
-        best_fitness, best_evaluation, distance = None, None, math.nan
-        if self._best is not None:
-            task, evaluation = self._best
-            best_fitness, best_evaluation = evaluation.fitness, task.index
-            distance = evaluation.metrics.get("distance", math.nan)
         line = {
             "iteration": status.iteration + 1,
             "evaluations": status.evaluations,
-            "best_fitness": best_fitness,
-            "best_evaluation": best_evaluation,
+            "best_fitness": None if self._best is None else status.best_fitness,
+            "best_evaluation": None if self._best is None else self._best[0].index,
             "stop": ALL_DONE if all_done else outcome.stop,
             **outcome.report,
         }
         self._record.complete(results, line, placed=outcome.placed)
-        status.complete(line, best_distance=distance)
+        status.iteration, status.stop = line["iteration"], line["stop"]
 
 
 def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
@@ -174,7 +265,7 @@ def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) ->
 
 def run_trials(
     trials: Sequence[Trial],
-    evaluator: Evaluator,
+    submit: Submit,
     *,
     show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
@@ -185,24 +276,25 @@ def run_trials(
     """
     statuses = [trial.status for trial in trials]
     show(statuses)
-    running = submitted(evaluator, [t for trial in trials for t in trial.unevaluated.values()])
+    tasks = [task for trial in trials for task in trial.unevaluated.values()]
+    running = {submit(task): task for task in tasks}
     while running:
         for task, evaluation in finished(running, _SHOW_PERIOD):
             trial = trials[task.trial]
             if trial.take(task, evaluation):
-                running |= submitted(evaluator, trial.unevaluated.values())
+                running |= {submit(new): new for new in trial.unevaluated.values()}
         show(statuses)
     return statuses
 
 
-def check_fitness(trials: Sequence[Trial], directory: Path, evaluator: Evaluator) -> None:
+def check_fitness(trials: Sequence[Trial], directory: Path, submit: Submit) -> None:
     """Evaluates the first recorded gait with a fitness again. Raises InputError if its fitness
     differs, so that a record never mixes two objectives."""
     recalled = [trial.recalled for trial in trials if trial.recalled is not None]
     if not recalled:
         return
     task, recorded = recalled[0]
-    ((_, again),) = evaluate_all(evaluator, [task])
+    ((_, again),) = evaluate_all(submit, [task])
     if again.fitness != recorded.fitness:
         outcome = again.failure or f"fitness {again.fitness!r}"
         found = f"{task} has fitness {recorded.fitness!r}, and evaluated again {outcome}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.source import load_source
+from tetra_drake.evolution.run import load_source
 from tetra_drake.files import check_file
 from tetra_drake.formatting import Say, silent
 from tetra_drake.report.result_folder import RESULT, load_result
