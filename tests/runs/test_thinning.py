@@ -56,7 +56,7 @@ def runs(tmp_path_factory):
     scenario = tiny_scenario().with_changes(changes)
     run = write_run(folder / "run", TRIALS, scenario=scenario, metrics=metrics)
     recorded = load_run(run)
-    entry = recorded.file("evaluations.jsonl", 0).read()[AGAIN]
+    entry = list(recorded.file("evaluations.jsonl", 0).read())[AGAIN]
     recorded.file("reevaluations.jsonl", 0).append([entry.model_copy(update={"engine": "drake"})])
     on_map = EliteLine(trial=0, index=1, kept=1.0, mean_distance=2.0)
     recorded.file("elites.jsonl").append([on_map])

@@ -219,8 +219,8 @@ class RecordFile:
             return cls(directory / name, {"run": run})
         return cls(trial_folder(directory, trial) / name, {"run": run, "trial": trial})
 
-    def read(self) -> list[Any]:
-        """All complete lines, compressed or not, as objects of their class in LINES. Empty if there
+    def read(self) -> Iterator[Any]:
+        """All complete lines, compressed or not, as objects of their class in LINES. None if there
         is no file.
 
         Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
@@ -228,7 +228,7 @@ class RecordFile:
         """
         kind, is_counted = LINES[self.path.name], self.path.name in _COUNTED
         entries = itertools.chain(_entries(compressed(self.path)), _entries(self.path))
-        lines: dict[tuple[int, ...], Line] = {}
+        seen = set()
         for row, entry in enumerate(entries):
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
@@ -244,10 +244,10 @@ class RecordFile:
             if is_counted and numbers != (row,):
                 problem = f"is damaged: {names} is {numbers[0]}, expected {row}"
                 self.refuse(row, f"{problem}; {REMEDY}")
-            if numbers in lines:
+            if numbers in seen:
                 self.refuse(row, f"has {names} of a line before it; {REMEDY}")
-            lines[numbers] = line
-        return list(lines.values())
+            seen.add(numbers)
+            yield line
 
     def append(self, lines: Iterable[Line]) -> None:
         """Appends lines; creates the folder if it is missing. On return the operating system has

@@ -102,7 +102,7 @@ def _name(given: object) -> str:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a run: scenario, seed, versions and method."""
+    """Definition of a run: scenario, seed, installed versions and method."""
 
     scenario: Scenario
     seed: int
@@ -114,16 +114,6 @@ class Manifest:
     """True if most genomes were removed to save space, as in the folder runs/."""
     reevaluate: bool = True
     """False if the run was begun without simulations after the evolution; see evolve()."""
-
-    @classmethod
-    def of(
-        cls, scenario: Scenario, seed: int, method: Method, *, reevaluate: bool = True
-    ) -> Manifest:
-        """The manifest of a new run, with the versions that are installed."""
-        now = versions(scenario.engine.packages)
-        parts = (dump_scenario(scenario), seed, now, vars(method))
-        name = _sha256(json.dumps(parts))[:_NAME]
-        return cls(scenario, seed, now, method, name, reevaluate=reevaluate)
 
     @property
     def other_versions(self) -> list[str]:
@@ -230,8 +220,10 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
     ) -> RunRecord:
         """A new run in a new or empty directory. With `overwrite` the directory may hold another
         run, unless a process is working on it. begin() writes the first file."""
-        method = method or Method.of(scenario)
-        manifest = Manifest.of(scenario, seed, method, reevaluate=reevaluate)
+        method, installed = method or Method.of(scenario), versions(scenario.engine.packages)
+        definition = json.dumps((dump_scenario(scenario), seed, installed, vars(method)))
+        name = _sha256(definition)[:_NAME]
+        manifest = Manifest(scenario, seed, installed, method, name, reevaluate=reevaluate)
         check_folder(directory)
         problem = _why_not_new(directory)
         if not problem:

@@ -226,13 +226,13 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
     for trial in range(manifest.scenario.evolution.trials):
         file = RecordFile.of(directory, manifest.run, name, trial=trial)
         for number, line in enumerate(file.read()):
-            row = line.content()
-            if isinstance(line, EvaluationLine):
-                if line.genome is not None and len(line.genome) != len(parameters):
-                    found = f"a genome of {len(line.genome)} numbers"
-                    file.refuse(number, f"is damaged: found {found}, expected {len(parameters)}")
-                row = line.row(parameters=parameters, bodies=bodies)
-            rows.append({"trial": trial, **row})
+            if not isinstance(line, EvaluationLine):
+                rows.append({"trial": trial, **line.content()})
+                continue
+            if line.genome is not None and len(line.genome) != len(parameters):
+                found = f"a genome of {len(line.genome)} numbers"
+                file.refuse(number, f"is damaged: found {found}, expected {len(parameters)}")
+            rows.append({"trial": trial, **line.row(parameters=parameters, bodies=bodies)})
     types = LINES[name].column_types() | dict.fromkeys((*METRICS, "distance_in"), "float")
     columns = None if rows else ["trial", *LINES[name].model_fields, *METRICS, "distance_in"]
     table = pandas.DataFrame(rows, columns=columns)

@@ -9,7 +9,7 @@ same versions of the packages and the same kind of processor.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ from tetra_drake.evolution.evaluators import Submit, evaluate_all, finished
 from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
-from tetra_drake.robot.gait import ParameterSpace, Vector, save_gait
+from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.settings.units import INCHES, Units
 
 _SHOW_PERIOD = 1.0  # s
@@ -70,88 +70,34 @@ class TrialStatus:
     """Reason for the trial's end; None during the trial."""
 
 
-_Evaluated = tuple[Task, Evaluation]
+class RepeatedFile:
+    """File of a trial when a run is repeated from its start. Lines that are recorded already are
+    checked, not written again."""
 
-
-class TrialRecord:
-    """Files of a trial. Lines that are recorded already are checked, not written again."""
-
-    def __init__(self, run: RunRecord, number: int) -> None:
+    def __init__(self, run: RunRecord, trial: int, name: str) -> None:
         self._run = run
-        self._files: dict[str, RecordFile] = {}
-        self._lines: dict[str, list[Any]] = {}
-        """Recorded lines of each file."""
-        for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
-            file = RecordFile.of(run.directory, run.manifest.run, name, trial=number)
-            if run.begun:
-                file.repair()
-            self._files[name] = file
-            self._lines[name] = file.read() if run.begun else []
-        self._recorded: dict[int, tuple[str, int]] = {}
-        """File and row of each recorded evaluation, by its index."""
-        for name in (IN_PROGRESS, EVALUATIONS):
-            for row, line in enumerate(self._lines[name]):
-                self._recorded[line.index] = name, row
+        self.file = RecordFile.of(run.directory, run.manifest.run, name, trial=trial)
+        self.lines: list[Any] = []
+        """Lines that were recorded before."""
+        if run.begun:
+            self.file.repair()
+            self.lines = list(self.file.read())
 
-    def recall(self, index: int, vector: Vector) -> Evaluation | None:
-        """The recorded evaluation with this index, or None. Raises InputError if it was recorded
-        for another vector."""
-        if index not in self._recorded:
-            return None
-        name, row = self._recorded[index]
-        line: EvaluationLine = self._lines[name][row]
-        if line.genome != vector.tolist():
-            self._files[name].refuse(row, _NOT_REPEATED.format("the genome"))
-        return line.evaluation()
-
-    def keep(self, task: Task, evaluation: Evaluation) -> None:
-        """Saves an evaluation of an incomplete iteration."""
-        self._run.begin()
-        self._files[IN_PROGRESS].append([EvaluationLine.of(task, evaluation)])
-
-    def complete(
-        self,
-        results: Sequence[_Evaluated],
-        iteration: Mapping[str, Any],
-        *,
-        placed: Sequence[int | None] | None,
-    ) -> None:
-        """Writes the lines of an iteration; lines that are recorded already are checked. For
-        `placed` see optimizers.base.Iteration. Raises InputError if an optimiser from Python
-        reports what cannot be recorded."""
-        more: list[dict[str, Any]] = [{} for _ in results]
-        if placed is not None:
-            more = [{"placed": member} for member in placed]
-        try:
-            evaluations = [
-                EvaluationLine.of(task, evaluation, **keys)
-                for (task, evaluation), keys in zip(results, more, strict=True)
-            ]
-            last = IterationLine.model_validate(iteration)
-        except ValidationError as error:
-            raise InputError("optimizer", *first_problem(error)) from error
-        # The order matters: after a kill in between, a resumed run completes the files.
-        self._write(EVALUATIONS, evaluations, first=evaluations[0].index)
-        self._write(ITERATIONS, [last], first=last.iteration)
-        if evaluations[-1].index >= len(self._lines[EVALUATIONS]):
-            self._files[IN_PROGRESS].path.unlink(missing_ok=True)
-
-    def finish(self, evaluations: int) -> None:
-        """Checks that the record has no evaluations beyond the end of the trial."""
-        if len(self._lines[EVALUATIONS]) > evaluations:
-            self._files[EVALUATIONS].refuse(evaluations, "the trial ends before this evaluation")
-        self._files[IN_PROGRESS].path.unlink(missing_ok=True)
-
-    def _write(self, name: str, lines: Sequence[Line], *, first: int) -> None:
-        recorded = self._lines[name][first:]
+    def write(self, lines: Sequence[Line], *, first: int) -> None:
+        """Writes lines, the first of which has this number. Raises InputError if a recorded line
+        differs."""
+        recorded = self.lines[first:]
         for row, (theirs, ours) in enumerate(zip(recorded, lines, strict=False), start=first):
             then, now = theirs.content(), ours.content()
             for key in then | now:
                 if then.get(key) != now.get(key):
-                    self._files[name].refuse(row, _NOT_REPEATED.format(key))
+                    self.file.refuse(row, _NOT_REPEATED.format(key))
         if missing := lines[len(recorded) :]:
             self._run.begin()
-            self._files[name].append(missing)
+            self.file.append(missing)
+
+
+_Evaluated = tuple[Task, Evaluation]
 
 
 class Trial:
@@ -172,7 +118,14 @@ class Trial:
         self.recalled: _Evaluated | None = None
         """The first recorded task with a fitness."""
         self._optimizer = optimizer
-        self._record = TrialRecord(run, number)
+        self._evaluations = RepeatedFile(run, number, EVALUATIONS)
+        self._iterations = RepeatedFile(run, number, ITERATIONS)
+        self._in_progress = RepeatedFile(run, number, IN_PROGRESS)
+        self._recorded: dict[int, tuple[RecordFile, int, EvaluationLine]] = {}
+        """File, number and line of each recorded evaluation, by its index."""
+        for repeated in (self._in_progress, self._evaluations):
+            for row, line in enumerate(repeated.lines):
+                self._recorded[line.index] = repeated.file, row, line
         self._results: dict[int, _Evaluated] = {}
         """Evaluated tasks of the current iteration, by index."""
         self._best: _Evaluated | None = None
@@ -185,7 +138,8 @@ class Trial:
         del self.unevaluated[task.index]
         self._add(task, evaluation)
         if self.unevaluated:
-            self._record.keep(task, evaluation)
+            lines = self._in_progress.lines
+            self._in_progress.write([EvaluationLine.of(task, evaluation)], first=len(lines))
             return False
         self._complete()
         self._advance()
@@ -193,17 +147,22 @@ class Trial:
 
     def _advance(self) -> None:
         """Runs recorded iterations, up to the first unrecorded vectors or the trial's end."""
-        while self.status.stop is None:
+        status = self.status
+        while status.stop is None:
             self._results = {}
-            first, trial = self.status.evaluations, self.status.number
-            iteration = self.status.iteration + 1
-            batch = self._optimizer.ask()[: self.status.evaluations_at_most - first]
+            first = status.evaluations
+            batch = self._optimizer.ask()[: status.evaluations_at_most - first]
             for index, vector in enumerate(batch, start=first):
-                task = self._manifest.task(vector, trial=trial, index=index, iteration=iteration)
-                evaluation = self._record.recall(index, vector)
-                if evaluation is None:
+                task = self._manifest.task(
+                    vector, trial=status.number, index=index, iteration=status.iteration + 1
+                )
+                if index not in self._recorded:
                     self.unevaluated[index] = task
                     continue
+                file, row, line = self._recorded[index]
+                if line.genome != vector.tolist():
+                    file.refuse(row, _NOT_REPEATED.format("the genome"))
+                evaluation = line.evaluation()
                 self._add(task, evaluation)
                 if self.recalled is None and evaluation.failure is None:
                     self.recalled = task, evaluation
@@ -211,7 +170,11 @@ class Trial:
                 break
             self._complete()
         else:
-            self._record.finish(self.status.evaluations)
+            if len(self._evaluations.lines) > status.evaluations:
+                problem = "the trial ends before this evaluation"
+                self._evaluations.file.refuse(status.evaluations, problem)
+            self._in_progress.file.path.unlink(missing_ok=True)
+
         if self._best is not None and self._best is not self._saved:
             task, _ = self._saved = self._best
             gait = self._manifest.gait(task.vector, trial=task.trial, index=task.index)
@@ -225,7 +188,8 @@ class Trial:
         status.wall_time += evaluation.wall_time
 
     def _complete(self) -> None:
-        """Ends an iteration: tells the optimiser its evaluations, and records it."""
+        """Ends an iteration: tells the optimiser its evaluations, and records it. Raises InputError
+        if an optimiser from Python reports what cannot be recorded."""
         results, status = [self._results[index] for index in sorted(self._results)], self.status
         outcome = self._optimizer.tell([evaluation for _, evaluation in results])
         for task, evaluation in results:
@@ -233,8 +197,9 @@ class Trial:
                 self._best = task, evaluation
                 status.best_fitness = evaluation.fitness
                 status.best_distance = evaluation.metrics.get("distance", math.nan)
+
         all_done = status.evaluations == status.evaluations_at_most
-        line = {
+        content = {
             "iteration": status.iteration + 1,
             "evaluations": status.evaluations,
             "best_fitness": None if self._best is None else status.best_fitness,
@@ -242,8 +207,24 @@ class Trial:
             "stop": ALL_DONE if all_done else outcome.stop,
             **outcome.report,
         }
-        self._record.complete(results, line, placed=outcome.placed)
-        status.iteration, status.stop = line["iteration"], line["stop"]
+        placed: list[dict[str, Any]] = [{} for _ in results]
+        if outcome.placed is not None:
+            placed = [{"placed": member} for member in outcome.placed]
+        try:
+            iteration = IterationLine.model_validate(content)
+            evaluations = [
+                EvaluationLine.of(task, evaluation, **key)
+                for (task, evaluation), key in zip(results, placed, strict=True)
+            ]
+        except ValidationError as error:
+            raise InputError("optimizer", *first_problem(error)) from error
+
+        # The order matters: after a kill in between, a resumed run completes the files.
+        self._evaluations.write(evaluations, first=evaluations[0].index)
+        self._iterations.write([iteration], first=iteration.iteration)
+        if evaluations[-1].index >= len(self._evaluations.lines):
+            self._in_progress.file.path.unlink(missing_ok=True)
+        status.iteration, status.stop = iteration.iteration, iteration.stop
 
 
 def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
