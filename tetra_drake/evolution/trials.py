@@ -84,8 +84,7 @@ class RepeatedFile:
             self.lines = list(self.file.read())
 
     def write(self, lines: Sequence[Line], *, first: int) -> None:
-        """Writes lines, the first of which has this number. Raises InputError if a recorded line
-        differs."""
+        """Writes lines from number `first` on. Raises InputError if a recorded line differs."""
         recorded = self.lines[first:]
         for row, (theirs, ours) in enumerate(zip(recorded, lines, strict=False), start=first):
             then, now = theirs.content(), ours.content()
