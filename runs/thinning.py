@@ -57,22 +57,28 @@ def thin(source: Path, out: Path) -> None:
     whole = {(int(trial), int(index)) for trial, index in _that_matter(run)}
     metrics = _that_choose(run.scenario)
     for trial in range(run.scenario.evolution.trials):
-        entries = run.file(EVALUATIONS, trial).read()
-        thinned = [e if (trial, e["index"]) in whole else _thinned(e, metrics) for e in entries]
-        for entry in thinned:
-            entry["wall_time_s"] = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
-        again = run.file(REEVALUATIONS, trial).read()
+        thinned = []
+        for entry in _entries(run, EVALUATIONS, trial):
+            kept = entry if (trial, entry["index"]) in whole else _thinned(entry, metrics)
+            wall_time = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
+            thinned.append(kept | {"wall_time_s": wall_time})
+        again = [e | {"genome": None} for e in _entries(run, REEVALUATIONS, trial)]
         _write(run, out, EVALUATIONS, thinned, trial=trial)
-        _write(run, out, ITERATIONS, run.file(ITERATIONS, trial).read(), trial=trial)
-        _write(run, out, REEVALUATIONS, [e | {"genome": None} for e in again], trial=trial)
+        _write(run, out, ITERATIONS, _entries(run, ITERATIONS, trial), trial=trial)
+        _write(run, out, REEVALUATIONS, again, trial=trial)
         best_gait = trial_folder(source, trial) / BEST_GAIT
         if best_gait.exists():
             text = best_gait.read_text(encoding="utf-8")
             write_whole(trial_folder(out, trial) / BEST_GAIT, text)
-    _write(run, out, ELITES, run.file(ELITES).read())
+    _write(run, out, ELITES, _entries(run, ELITES))
     run.scenario.terrain.save(out)
     write_whole(out / SCENARIO, (source / SCENARIO).read_text(encoding="utf-8"))
     write_whole(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+
+
+def _entries(run: Run, name: str, trial: int | None = None) -> list[dict[str, Any]]:
+    """Content of the lines of a file of a run."""
+    return [line.content() for line in run.file(name, trial).read()]
 
 
 def _that_matter(run: Run) -> set[tuple[Any, Any]]:

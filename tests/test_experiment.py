@@ -11,11 +11,10 @@ from helpers.converged import shortly
 import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluators import OnExecutor
-from tetra_drake.evolution.manifest import write_manifest
+from tetra_drake.evolution.evaluators import on_executor
+from tetra_drake.evolution.manifest import RunRecord, write_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
-from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.laws.terrain import Steps
 from tetra_drake.optimizers.steady_state import SteadyStateOptimizer
 
@@ -246,9 +245,9 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
 
 def test_an_interrupted_run_says_how_to_go_on(evolve, tmp_path, capsys, monkeypatch, interrupting):
     out = tmp_path / "my run"
-    broken = OnExecutor(evaluate=Bowl(), make=interrupting, workers=1)
     interrupting.left = 17
-    monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: broken)
+    name = "tetra_drake.experiment.evaluator_of"
+    monkeypatch.setattr(name, lambda *_, **__: on_executor(Bowl(), interrupting, 1))
     assert evolve(*SMALL, "--out", out) == 130
     printed = capsys.readouterr()
     assert f"tetra-drake evolve --out '{out}' --resume" in printed.err

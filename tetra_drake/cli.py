@@ -413,7 +413,7 @@ def _robustness(
 
     Example: tetra-drake robustness runs/thesis --draws 50 --out robustness
     """
-    from tetra_drake.evolution.source import load_source
+    from tetra_drake.evolution.run import load_source
     from tetra_drake.study.robustness import robustness, robustness_text, save_judgement
 
     found = load_source(source, scenario=scenario, warn=_warn)
@@ -649,7 +649,7 @@ def _chosen_gait(
     scenario: str | None, gait: Path | None, seed: int | None, engine: str | None = None
 ) -> tuple[Scenario, Gait]:
     """The scenario, with the engine, and the gait to simulate on it."""
-    from tetra_drake.evolution.source import load_source
+    from tetra_drake.evolution.run import load_source
     from tetra_drake.robot.gait import WALKING_SEED, seeded_gait
     from tetra_drake.scenario.load import load_scenario
 

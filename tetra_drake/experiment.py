@@ -14,10 +14,9 @@ from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
-from tetra_drake.evolution.manifest import Manifest, Method, read_manifest
+from tetra_drake.evolution.manifest import Manifest, Method, RunRecord, read_manifest
 from tetra_drake.evolution.progress import Display, Progress
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
 from tetra_drake.files import check_folder, given_path
 from tetra_drake.formatting import Say, silent

@@ -15,7 +15,7 @@ from helpers import analytic
 
 from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
-from tetra_drake.evolution.evaluators import OnExecutor, evaluate_all
+from tetra_drake.evolution.evaluators import evaluate_all, on_executor
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
 
@@ -40,7 +40,7 @@ def test_a_gait_that_ends_its_worker_ends_the_run(cluster, tasks, monkeypatch, r
     with (
         refused("worker processes", "", "died"),
         dask_cluster(cluster) as make,
-        OnExecutor(analytic.Dying(12), make, 2) as evaluator,
+        on_executor(analytic.Dying(12), make, 2) as evaluator,
     ):
         for task, evaluation in evaluate_all(evaluator, tasks):
             assert evaluation == analytic.Bowl()(task)
@@ -69,7 +69,7 @@ def test_killed_workers_leave_no_trace(cluster, tmp_path):
             os.kill(killed[-1], signal.SIGKILL)
 
     with dask_cluster(cluster) as make:
-        evaluator = OnExecutor(bowl, make, 2)
+        evaluator = on_executor(bowl, make, 2)
         analytic.record_run(tmp_path / "run", scenario, evaluator=evaluator, show=kill)
     assert killed
     assert analytic.read_record(tmp_path / "run") == analytic.read_record(tmp_path / "whole")
@@ -80,7 +80,7 @@ def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, tasks):
     with (
         pytest.raises(KeyboardInterrupt),
         dask_cluster(cluster) as make,
-        OnExecutor(analytic.Bowl(delay=1.0), make, 2) as evaluator,
+        on_executor(analytic.Bowl(delay=1.0), make, 2) as evaluator,
     ):
         for _ in evaluate_all(evaluator, tasks[:8]):
             assert cluster.scheduler.tasks
@@ -104,7 +104,7 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
     def evaluator_of(evaluate, *, executor, **_):
-        return OnExecutor(analytic.Bowl(), executor or ThreadPoolExecutor, 1)
+        return on_executor(analytic.Bowl(), executor or ThreadPoolExecutor, 1)
 
     for module in ("experiment", "evolution.reevaluation"):
         monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", evaluator_of)

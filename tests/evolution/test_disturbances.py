@@ -12,9 +12,8 @@ from helpers.quantities import with_unit
 from pytest import approx
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.draws import combine_metrics, worst_mean
-from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.evaluators import InLanes
+from tetra_drake.evolution.evaluation import GaitEvaluation, combine_metrics, worst_mean
+from tetra_drake.evolution.evaluators import in_lanes
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.laws.terrain import Steps
@@ -125,7 +124,7 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, 
     tasks = [Task(vector, index=i, seed=(1, 0, i)) for i in range(4)]
     evaluate = GaitEvaluation(scenario)
     alone = [dataclasses.replace(evaluate(task), wall_time=0.0) for task in tasks]
-    with InLanes(evaluate, 1) as lanes:
+    with in_lanes(evaluate, 1) as lanes:
         beside = analytic.evaluated(lanes, tasks)
     for i, evaluation in enumerate(alone):
         assert dataclasses.replace(beside[i], wall_time=0.0) == evaluation

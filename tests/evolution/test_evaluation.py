@@ -11,7 +11,7 @@ from helpers.converged import shortly
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.evaluators import InLanes, InProcesses
+from tetra_drake.evolution.evaluators import WorkerProcesses, in_lanes, on_executor
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
 
@@ -31,7 +31,7 @@ def vectors(tiny):
 def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vectors):
     tasks = tasks_of(vectors)
     here = [GaitEvaluation(tiny)(task) for task in tasks]
-    with InProcesses(GaitEvaluation(tiny), 1) as processes:
+    with on_executor(GaitEvaluation(tiny), WorkerProcesses, 1) as processes:
         there = evaluated(processes, tasks)
     for index, vector in enumerate(vectors):
         result = simulate(tiny, ParameterSpace.of(tiny).gait(vector, name="any"), record=True)
@@ -74,8 +74,8 @@ def test_failures_say_why_and_are_the_worst(tiny, vectors, lanes, changes, objec
     engine = {"engine": "!Compiled" if lanes else "!Drake"}
     evaluate = GaitEvaluation(tiny.with_changes(engine | changes), objective)
     if lanes:
-        with InLanes(evaluate, 1) as evaluator:
-            failed = evaluator.submit(Task(vectors[0])).result()
+        with in_lanes(evaluate, 1) as submit:
+            failed = submit(Task(vectors[0])).result()
     else:
         failed = evaluate(Task(vectors[0]))
     assert failed.failure.startswith(kind)
@@ -100,7 +100,7 @@ def test_an_error_of_an_objective_in_lanes_ends_the_run(tiny, vectors):
         raise ZeroDivisionError("mine")
 
     evaluate = GaitEvaluation(tiny.with_changes({"engine": "!Compiled"}), objective)
-    with InLanes(evaluate, 1) as lanes, pytest.raises(ZeroDivisionError, match="mine"):
+    with in_lanes(evaluate, 1) as lanes, pytest.raises(ZeroDivisionError, match="mine"):
         evaluated(lanes, tasks_of(vectors))
 
 

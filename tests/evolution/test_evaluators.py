@@ -9,21 +9,16 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 from helpers import analytic
 
-from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
+from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
 from tetra_drake.evolution.run import load_run
 
 
-def on_processes(evaluate, workers):
-    """An executor whose processes die together."""
-    return OnExecutor(evaluate, ProcessPoolExecutor, workers)
-
-
-@pytest.mark.parametrize("make", [InProcesses, on_processes])
+@pytest.mark.parametrize("make", [WorkerProcesses, ProcessPoolExecutor])
 def test_a_run_whose_worker_dies_says_so_and_is_resumed(make, tmp_path, refused):
     run, scenario = tmp_path / "run", analytic.small_scenario(trials=1)
     analytic.record_run(tmp_path / "whole", scenario)
     with refused("worker processes", "", "died"):
-        analytic.record_run(run, scenario, evaluator=make(analytic.Dying(17), 2))
+        analytic.record_run(run, scenario, evaluator=on_executor(analytic.Dying(17), make, 2))
     assert load_run(run).evaluations["failure"].isin([None, "fell off the table"]).all()
     analytic.record_run(run)
     assert analytic.read_record(run) == analytic.read_record(tmp_path / "whole")
@@ -32,7 +27,10 @@ def test_a_run_whose_worker_dies_says_so_and_is_resumed(make, tmp_path, refused)
 def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, refused):
     monkeypatch.delenv("TETRA_DRAKE_LOADED_IN", raising=False)
     evaluate = importlib.import_module("helpers.unloadable").evaluate
-    with refused("worker processes", "", "do not start"), InProcesses(evaluate, 1) as processes:
+    with (
+        refused("worker processes", "", "do not start"),
+        on_executor(evaluate, WorkerProcesses, 1) as processes,
+    ):
         analytic.evaluated(processes, tasks)
     assert "only one process can load this" in capfd.readouterr().err
 
@@ -40,7 +38,7 @@ def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, 
 PROGRAM = """
 import numpy as np
 import tetra_drake
-from tetra_drake.evolution.evaluators import InProcesses
+from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
 from helpers.analytic import Bowl, evaluated, small_scenario, tasks_of
 def objective(result):
     return result.metrics.twist
@@ -51,7 +49,7 @@ def evolve(**options):
     print(len(run.evaluations), run.statuses[0].failures)
 """
 EVALUATE = """
-with InProcesses(Bowl(), 1) as processes:
+with on_executor(Bowl(), WorkerProcesses, 1) as processes:
     print(evaluated(processes, tasks_of(np.ones((1, 26)))))
 """
 

@@ -65,10 +65,10 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused,
     assert compressed.evaluations.equals(plain.evaluations)
     assert compressed.iterations.equals(plain.iterations)
     file = plain.file("iterations.jsonl", trial=0)
-    entries = file.read()
-    more = entries[-1] | {"iteration": len(entries)}
+    entries = list(file.read())
+    more = entries[-1].model_copy(update={"iteration": len(entries)})
     file.append([more])
-    assert file.read() == [*entries, more]
+    assert list(file.read()) == [*entries, more]
     packed = run / "trial_00" / "iterations.jsonl.xz"
     monkeypatch.setattr("tetra_drake.evolution.entries.MOST", 2**20)
     torn, large = lzma.compress(b"{}\n")[:-9], lzma.compress(bytes(2**21), preset=0)

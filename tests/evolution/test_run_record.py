@@ -10,10 +10,10 @@ import pytest
 from helpers.analytic import read_record, small_scenario
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import json_line
-from tetra_drake.evolution.manifest import read_manifest
+from tetra_drake.evolution.entries import EliteLine, EvaluationLine, json_line
+from tetra_drake.evolution.manifest import RunRecord, read_manifest
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord, TrialRecord
+from tetra_drake.evolution.trials import RepeatedFile
 from tetra_drake.optimizers.base import Evaluation, Task
 
 
@@ -145,15 +145,15 @@ def test_a_damaged_line_is_named(run_small, refused, name, number, damage, probl
 
 def test_a_line_too_many_or_there_twice_is_refused(run_small, refused):
     run = load_run(run_small(trials=1))
-    judged = {"trial": 0, "index": 3, "kept": 1.0, "mean_distance": 0.2}
-    entry = run.file("evaluations.jsonl", 0).read()[3]
+    judged = EliteLine(trial=0, index=3, kept=1.0, mean_distance=0.2)
+    entry = list(run.file("evaluations.jsonl", 0).read())[3]
     for name, trial, line in (("elites.jsonl", None, judged), ("reevaluations.jsonl", 0, entry)):
         file = run.file(name, trial)
         file.append([line, line])
         with refused(file.path, "line 2", "index"):
-            file.read()
+            list(file.read())
     file = run.file("evaluations.jsonl", 0)
-    file.append([entry | {"index": 42}])
+    file.append([entry.model_copy(update={"index": 42})])
     with refused(file.path, "line 43", "ends before"):
         run_small(resume=True)
 
@@ -165,13 +165,13 @@ def test_a_run_is_replaced_when_a_new_one_has_its_first_line(run_small, monkeypa
 
     fail = Mock(side_effect=InputError(run, "", "disk full"))
     with RunRecord.create(run, scenario=small_scenario(), seed=6, overwrite=True) as record:
-        trial = TrialRecord(record, 0)
-        assert trial.recall(0, np.zeros(26)) is None
+        file = RepeatedFile(record, 0, "in_progress.jsonl")
+        assert file.lines == []
         with monkeypatch.context() as broken, refused(run, "", "disk full"):
-            broken.setattr("tetra_drake.evolution.run_record.write_manifest", fail)
+            broken.setattr("tetra_drake.evolution.manifest.write_manifest", fail)
             record.begin()
         assert read_record(run) == before
-        trial.keep(Task(np.ones(26)), Evaluation(1.0))
+        file.write([EvaluationLine.of(Task(np.ones(26)), Evaluation(1.0))], first=0)
     files = {".lock", "manifest.json", "scenario.yaml", "trial_00/in_progress.jsonl"}
     assert read_record(run).keys() == files
     assert read_manifest(run).seed == 6

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
-from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.source import load_source
+from tetra_drake.evolution.run import load_run, load_source
 from tetra_drake.robot.gait import save_gait
 from tetra_drake.scenario.load import dump_scenario
 

@@ -1,15 +1,14 @@
 """The trial loop on a cheap fitness: what it records, and that only scenario and seed decide it."""
 
 import json
-import time
 
 import numpy as np
 import pytest
-from helpers.analytic import Bowl, read_record, record_run, small_scenario
+from helpers.analytic import Bowl, RandomSearch, read_record, record_run, small_scenario
 
 from tetra_drake.evolution import evaluators
 from tetra_drake.evolution.run import load_run
-from tetra_drake.optimizers.base import Evaluation, Task
+from tetra_drake.optimizers.base import Evaluation, Iteration, Task
 
 
 def lines(path):
@@ -48,7 +47,8 @@ def test_neither_workers_nor_executor_nor_timing_change_the_record(
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
     monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 20)
-    record_run(tmp_path / "pool", small_scenario(), evaluator=evaluators.InProcesses(Bowl(), 2))
+    processes = evaluators.on_executor(Bowl(), evaluators.WorkerProcesses, 2)
+    record_run(tmp_path / "pool", small_scenario(), evaluator=processes)
     assert read_record(tmp_path / "pool") == reference
 
 
@@ -60,18 +60,15 @@ def test_trials_differ_and_do_not_depend_on_their_number(run_small):
     assert first not in (second, other["weight_1"].tolist())
 
 
-def test_as_many_evaluations_as_workers_are_under_way(run_small):
-    under_way, most = set(), []
+@pytest.mark.parametrize("report", [{"mean_fitness": "wide"}, {"stop": 3}])
+def test_an_optimiser_that_reports_what_cannot_be_recorded_is_named(tmp_path, refused, report):
+    class Odd(RandomSearch):
+        def tell(self, evaluations):
+            return Iteration(report)
 
-    def evaluate(task):
-        under_way.add(str(task))
-        most.append(len(under_way))
-        time.sleep(0.002)
-        under_way.discard(str(task))
-        return Bowl()(task)
-
-    run_small(workers=3, evaluate=evaluate)
-    assert max(most) == 3
+    with refused("optimizer", *report, "Input should be a valid"):
+        record_run(tmp_path, small_scenario(trials=1), optimizer=Odd)
+    assert not list(tmp_path.rglob("iterations.jsonl"))
 
 
 def test_a_run_in_which_everything_fails_goes_to_its_end(run_small):

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.draws import combine
-from tetra_drake.evolution.evaluators import Evaluator, OnExecutor, evaluate_all
-from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.evolution.evaluation import combine
+from tetra_drake.evolution.evaluators import Evaluator, Submit, evaluate_all, on_executor
+from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.trials import TrialStatus, open_trials, run_trials
 from tetra_drake.optimizers.base import Evaluate, Evaluation, Iteration, MakeOptimizer, Task
 from tetra_drake.robot.gait import Vector
@@ -99,14 +99,14 @@ def drawn_scenario(**options) -> Scenario:
     return small_scenario(**options).with_changes({"disturbances": settings})
 
 
-def in_threads(evaluate: Evaluate = BOWL, workers: int = 2) -> OnExecutor:
+def in_threads(evaluate: Evaluate = BOWL, workers: int = 2) -> Evaluator:
     """An evaluator in threads."""
-    return OnExecutor(evaluate, ThreadPoolExecutor, workers)
+    return on_executor(evaluate, ThreadPoolExecutor, workers)
 
 
-def evaluated(evaluator: Evaluator, tasks: Sequence[Task]) -> dict[int, Evaluation]:
+def evaluated(submit: Submit, tasks: Sequence[Task]) -> dict[int, Evaluation]:
     """The evaluations of tasks, by their indices."""
-    return {task.index: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
+    return {task.index: evaluation for task, evaluation in evaluate_all(submit, tasks)}
 
 
 def tasks_of(vectors: Iterable[Vector], seed: IterationSeed | None = None) -> list[Task]:

@@ -5,12 +5,12 @@ The executor is processes or threads.
 
 import signal
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from helpers.analytic import DrawnBowl, drawn_scenario, in_threads
-from tetra_drake.evolution.evaluators import InProcesses
-from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.run_record import RunRecord
+from helpers.analytic import DrawnBowl, drawn_scenario
+from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
+from tetra_drake.evolution.manifest import MANIFEST, RunRecord
 from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.interrupts import heeding_interrupts
 
@@ -21,8 +21,8 @@ if __name__ == "__main__":
         opened = RunRecord.resume(directory)
     else:
         opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9)
-    make = InProcesses if sys.argv[2] == "processes" else in_threads
-    evaluate = DrawnBowl(delay=float(sys.argv[3]))
-    with heeding_interrupts(), opened as record, make(evaluate, 2) as evaluator:
+    make = WorkerProcesses if sys.argv[2] == "processes" else ThreadPoolExecutor
+    evaluator = on_executor(DrawnBowl(delay=float(sys.argv[3])), make, 2)
+    with heeding_interrupts(), opened as record, evaluator as submit:
         print("begun", flush=True)
-        run_trials(open_trials(record), evaluator)
+        run_trials(open_trials(record), submit)

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from tetra_drake.evolution.entries import EliteLine, EvaluationLine, IterationLine
+from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord, TrialRecord
+from tetra_drake.evolution.trials import RepeatedFile
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
@@ -49,7 +51,8 @@ def write_run(
     with RunRecord.create(directory, scenario=scenario, seed=7) as record:
         record.begin()
         for number, iterations in enumerate(trials):
-            trial = TrialRecord(record, number)
+            lines = RepeatedFile(record, number, "evaluations.jsonl")
+            ends = RepeatedFile(record, number, "iterations.jsonl")
             made, population = [], {}
             for iteration, children in enumerate(iterations):
                 begin = len(made)
@@ -60,16 +63,19 @@ def write_run(
                     population |= {} if placed is None else {placed: fitness}
                 finite = [fitness for fitness in population.values() if fitness is not None]
                 task, best = max(made, key=lambda result: result[1].fitness)
-                ends = iteration == len(iterations) - 1 and number not in unfinished
-                line = {
-                    "iteration": iteration,
-                    "evaluations": len(made),
-                    "mean_fitness": sum(finite) / len(finite) if finite else None,
-                    "best_fitness": None if best.failure else best.fitness,
-                    "best_evaluation": None if best.failure else task.index,
-                    "stop": "all evaluations done" if ends else None,
-                }
-                trial.complete(made[begin:], line, placed=[placed for _, placed in children])
+                is_last = iteration == len(iterations) - 1 and number not in unfinished
+                placed = zip(made[begin:], children, strict=True)
+                new = [EvaluationLine.of(*one, placed=place) for one, (_, place) in placed]
+                line = IterationLine(
+                    iteration=iteration,
+                    evaluations=len(made),
+                    mean_fitness=sum(finite) / len(finite) if finite else None,
+                    best_fitness=None if best.failure else best.fitness,
+                    best_evaluation=None if best.failure else task.index,
+                    stop="all evaluations done" if is_last else None,
+                )
+                lines.write(new, first=begin)
+                ends.write([line], first=iteration)
     return directory
 
 
@@ -86,7 +92,7 @@ def write_map(directory: Path, kept: Mapping[int, float]) -> Path:
         write_run(directory, [trial], scenario=scenario, metrics=metrics)
     (directory / "elites.jsonl").unlink(missing_ok=True)
     for index, share in kept.items():
-        line = {"trial": 0, "index": index, "kept": share, "mean_distance": 0.1}
+        line = EliteLine(trial=0, index=index, kept=share, mean_distance=0.1)
         load_run(directory).file("elites.jsonl").append([line])
     return directory
 

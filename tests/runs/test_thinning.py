@@ -7,9 +7,10 @@ from helpers.analytic import in_threads
 from helpers.synthetic_run import tiny_scenario, write_run
 from thinning import last_population, thin
 
+from tetra_drake.evolution.entries import EliteLine
+from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.laws.terrain import HeightField
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -55,9 +56,9 @@ def runs(tmp_path_factory):
     scenario = tiny_scenario().with_changes(changes)
     run = write_run(folder / "run", TRIALS, scenario=scenario, metrics=metrics)
     recorded = load_run(run)
-    entry = recorded.file("evaluations.jsonl", 0).read()[AGAIN]
-    recorded.file("reevaluations.jsonl", 0).append([entry | {"engine": "drake"}])
-    on_map = {"trial": 0, "index": 1, "kept": 1, "mean_distance": 2.0}
+    entry = list(recorded.file("evaluations.jsonl", 0).read())[AGAIN]
+    recorded.file("reevaluations.jsonl", 0).append([entry.model_copy(update={"engine": "drake"})])
+    on_map = EliteLine(trial=0, index=1, kept=1.0, mean_distance=2.0)
     recorded.file("elites.jsonl").append([on_map])
     thin(run, folder / "thinned")
     return load_run(run), load_run(folder / "thinned")

@@ -5,6 +5,7 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 from pandas import DataFrame
 
+from tetra_drake.evolution.entries import EliteLine
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -32,7 +33,7 @@ def keep(run, shares):
     file = run.file("elites.jsonl")
     file.path.unlink(missing_ok=True)
     line = {"trial": 0, "mean_distance": None}
-    file.append([line | {"index": index, "kept": kept} for index, kept in shares.items()])
+    file.append([EliteLine(**line, index=index, kept=kept) for index, kept in shares.items()])
 
 
 def keys(gaits):

@@ -25,17 +25,18 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, NoReturn
+from typing import Annotated, Any, ClassVar, NoReturn
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, make_folder, read_bytes, writing
 from tetra_drake.optimizers.base import Evaluation, Task
-from tetra_drake.scenario.metrics import wrong_metric
+from tetra_drake.scenario.metrics import METRICS, wrong_metric
+from tetra_drake.settings.units import INCH
 
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
@@ -48,6 +49,9 @@ REMEDY = (
     "cut this line and those after it off the file, and `tetra-drake evolve --resume` makes good "
     "what is missing"
 )
+
+_PACKED = ".xz"
+"""Suffix of compressed files."""
 
 _CHECKSUM = re.compile(rb'(.*), "crc": "([0-9a-f]{8})"\}')
 """Pattern of a line: its content, then the CRC-32 of the content in hexadecimal digits."""
@@ -63,36 +67,104 @@ def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
 _Count = Annotated[int, Field(ge=0, lt=2**31)]
 
 
-class _Line(BaseModel):
-    """Keys and types of a line. Further keys are ignored."""
+class Line(BaseModel):
+    """Content of a line in a record: keys with their types. Undeclared keys are kept."""
 
-    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(strict=True, allow_inf_nan=False, extra="allow")
+
+    identity: ClassVar[tuple[str, ...]] = ()
+    """Keys whose values together differ from line to line."""
+
+    def content(self) -> dict[str, Any]:
+        """The keys that the line has, with their values."""
+        return self.model_dump(exclude_unset=True)
+
+    @classmethod
+    def column_types(cls) -> dict[str, str]:
+        """Types of the table's columns for numbers that may be missing, by key."""
+        types = {}
+        for key, field in cls.model_fields.items():
+            if field.annotation == float | None:
+                types[key] = "float"
+            elif field.annotation == _Count | None:
+                types[key] = "Int64"
+        return types
 
 
-class _Draws(_Line):
+class Draws(Line):
     """Numbers of each draw of disturbances."""
 
     fitness: Annotated[list[float], Field(min_length=1)]
     distance: Annotated[list[float], Field(min_length=1)]
 
 
-class _EvaluationLine(_Line):
-    """Keys of an evaluation; `genome` is None in a thinned run."""
+class EvaluationLine(Line):
+    """Line of an evaluation."""
+
+    identity = ("index",)
 
     index: _Count
     iteration: _Count
     genome: Annotated[list[float], Field(min_length=1)] | None
+    """Parameters of the gait; None in a thinned run."""
     metrics: Annotated[dict[str, Any], AfterValidator(_checked)]
     fitness: float | None
+    """None for a failure."""
     failure: str | None
     wall_time_s: float
     engine: str
+    draws: Draws | None = None
     placed: _Count | None = None
-    draws: _Draws | None = None
+    """Index in the population; None if the gait was dropped. Optimisers without a population leave
+    the key out."""
+
+    @classmethod
+    def of(cls, task: Task, evaluation: Evaluation, **more: Any) -> EvaluationLine:
+        """The line of an evaluation, with `more` keys."""
+        if evaluation.draws is not None:
+            more = {"draws": dict(evaluation.draws), **more}
+        return cls(
+            index=task.index,
+            iteration=task.iteration,
+            genome=task.vector.tolist(),
+            metrics=dict(evaluation.metrics),
+            fitness=json_number(evaluation.fitness),
+            failure=evaluation.failure,
+            wall_time_s=round(evaluation.wall_time, 4),
+            engine=evaluation.engine,
+            **more,
+        )
+
+    def evaluation(self) -> Evaluation:
+        """The evaluation that the line records."""
+        return Evaluation(
+            fitness=-math.inf if self.fitness is None else self.fitness,
+            metrics=self.metrics,
+            failure=self.failure,
+            wall_time=self.wall_time_s,
+            engine=self.engine,
+            draws=None if self.draws is None else self.draws.content(),
+        )
+
+    def row(self, *, parameters: Sequence[str], bodies: Sequence[str]) -> dict[str, Any]:
+        """The line as a row of a table: one column for each number. `parameters` are the columns of
+        the genome; `bodies` are the names of the bodies."""
+        row = self.content()
+        genome = row.pop("genome") or [math.nan] * len(parameters)
+        row |= dict.fromkeys(METRICS, math.nan) | row.pop("metrics")
+        for body, share in zip(bodies, row.pop("lifted_shares", []), strict=False):
+            row[f"lifted_{body}"] = share
+        row["distance_in"] = row["distance"] / INCH
+        if draws := row.pop("draws", None):
+            row |= {f"draws_{name}": numbers for name, numbers in draws.items()}
+            row["worst_distance"] = min(draws["distance"])
+        return row | dict(zip(parameters, genome, strict=True))
 
 
-class _IterationLine(_Line):
-    """Keys of an iteration; `mean_fitness` is in the report of some optimisers."""
+class IterationLine(Line):
+    """Line of an iteration. The keys after `stop` are the optimiser's report."""
+
+    identity = ("iteration",)
 
     iteration: _Count
     evaluations: _Count
@@ -102,8 +174,10 @@ class _IterationLine(_Line):
     mean_fitness: float | None = None
 
 
-class _EliteLine(_Line):
-    """Keys of an elite on disturbed robots."""
+class EliteLine(Line):
+    """Line of an elite on disturbed robots; see analysis.elites."""
+
+    identity = ("trial", "index")
 
     trial: _Count
     index: _Count
@@ -111,58 +185,22 @@ class _EliteLine(_Line):
     mean_distance: float | None
 
 
-class _Schema(NamedTuple):
-    """Schema of the lines of a file."""
-
-    line: type[_Line]
-    keys: tuple[str, ...]
-    """Keys whose values together are unique among the lines."""
-    is_counted: bool = False
-    """True if the single key is the number of the line, from 0."""
-
-
-_SCHEMAS = {
-    EVALUATIONS: _Schema(_EvaluationLine, ("index",), is_counted=True),
-    ITERATIONS: _Schema(_IterationLine, ("iteration",), is_counted=True),
-    IN_PROGRESS: _Schema(_EvaluationLine, ("index",)),
-    REEVALUATIONS: _Schema(_EvaluationLine, ("index",)),
-    ELITES: _Schema(_EliteLine, ("trial", "index")),
+LINES: dict[str, type[Line]] = {
+    EVALUATIONS: EvaluationLine,
+    ITERATIONS: IterationLine,
+    IN_PROGRESS: EvaluationLine,
+    REEVALUATIONS: EvaluationLine,
+    ELITES: EliteLine,
 }
-"""Schemas by file name."""
+"""Class of the lines by file name."""
+
+_COUNTED = (EVALUATIONS, ITERATIONS)
+"""Files whose lines are numbered from 0, without gaps."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
     """The folder of a trial."""
     return directory / f"trial_{number:02d}"
-
-
-def evaluation_entry(task: Task, evaluation: Evaluation) -> dict[str, Any]:
-    """An evaluation as a line of the record; the fitness of a failure is null."""
-    entry = {
-        "index": task.index,
-        "iteration": task.iteration,
-        "genome": task.vector.tolist(),
-        "metrics": dict(evaluation.metrics),
-        "fitness": json_number(evaluation.fitness),
-        "failure": evaluation.failure,
-        "wall_time_s": round(evaluation.wall_time, 4),
-        "engine": evaluation.engine,
-    }
-    if evaluation.draws is not None:
-        entry["draws"] = dict(evaluation.draws)
-    return entry
-
-
-def recorded_evaluation(entry: Mapping[str, Any]) -> Evaluation:
-    """The evaluation that a line of the record holds; inverse of evaluation_entry()."""
-    return Evaluation(
-        fitness=-math.inf if entry["fitness"] is None else entry["fitness"],
-        metrics=entry["metrics"],
-        failure=entry["failure"],
-        wall_time=entry["wall_time_s"],
-        engine=entry["engine"],
-        draws=entry.get("draws"),
-    )
 
 
 @dataclass(frozen=True)
@@ -181,47 +219,47 @@ class RecordFile:
             return cls(directory / name, {"run": run})
         return cls(trial_folder(directory, trial) / name, {"run": run, "trial": trial})
 
-    def read(self) -> list[dict[str, Any]]:
-        """The content of all complete lines, compressed or not, without the keys of `owner`. Empty
-        if there is no file.
+    def read(self) -> Iterator[Any]:
+        """All complete lines, compressed or not, as objects of their class in LINES. None if there
+        is no file.
 
         Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
         to another run or trial.
         """
-        packed, schema = compressed(self.path), _SCHEMAS[self.path.name]
-        earlier = _parse(_unpacked(packed), packed, is_packed=True)
-        later = _parse(_read(self.path), self.path, is_packed=False)
-        entries: dict[tuple[int, ...], dict[str, Any]] = {}
-        for row, entry in enumerate(itertools.chain(earlier, later)):
+        kind, is_counted = LINES[self.path.name], self.path.name in _COUNTED
+        entries = itertools.chain(_entries(compressed(self.path)), _entries(self.path))
+        seen = set()
+        for row, entry in enumerate(entries):
             for key, ours in self.owner.items():
                 if (theirs := entry.pop(key, None)) != ours:
                     self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
             try:
-                schema.line.model_validate(entry)
+                line = kind.model_validate(entry)
             except ValidationError as error:
-                first = error.errors(include_url=False)[0]
-                key = ".".join(str(part) for part in first["loc"])
-                self.refuse(row, f"is damaged: {key}: {first['msg']}; {REMEDY}")
-            values, keys = tuple(entry[key] for key in schema.keys), " and ".join(schema.keys)
-            if schema.is_counted and values != (row,):
-                problem = f"is damaged: {keys} is {values[0]}, expected {row}"
-                self.refuse(row, f"{problem}; {REMEDY}")
-            if values in entries:
-                self.refuse(row, f"has {keys} of a line before it; {REMEDY}")
-            entries[values] = entry
-        return list(entries.values())
+                key, problem = first_problem(error)
+                self.refuse(row, f"is damaged: {key}: {problem}; {REMEDY}")
 
-    def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
+            names = " and ".join(kind.identity)
+            numbers = tuple(getattr(line, key) for key in kind.identity)
+            if is_counted and numbers != (row,):
+                problem = f"is damaged: {names} is {numbers[0]}, expected {row}"
+                self.refuse(row, f"{problem}; {REMEDY}")
+            if numbers in seen:
+                self.refuse(row, f"has {names} of a line before it; {REMEDY}")
+            seen.add(numbers)
+            yield line
+
+    def append(self, lines: Iterable[Line]) -> None:
         """Appends lines; creates the folder if it is missing. On return the operating system has
         the lines. A kill during the call damages at most the last line."""
         make_folder(self.path.parent)
-        text = "".join(json_line({**self.owner, **entry}) for entry in entries)
+        text = "".join(json_line({**self.owner, **line.content()}) for line in lines)
         with writing(self.path), self.path.open("ab") as file:
             file.write(text.encode())
 
     def repair(self) -> None:
         """Cuts off an incomplete last line."""
-        content = _read(self.path)
+        content = _content(self.path)
         if content and not content.endswith(b"\n"):
             with writing(self.path):
                 os.truncate(self.path, content.rfind(b"\n") + 1)
@@ -231,9 +269,15 @@ class RecordFile:
         raise InputError(self.path, f"line {row + 1}", problem)
 
 
+def first_problem(error: ValidationError) -> tuple[str, str]:
+    """Key and problem of the first value of a line that is wrong."""
+    first = error.errors(include_url=False)[0]
+    return ".".join(str(part) for part in first["loc"]), first["msg"]
+
+
 def compressed(path: Path) -> Path:
     """Path of the compressed file with the lines that precede the lines of `path`."""
-    return path.with_name(path.name + ".xz")
+    return path.with_name(path.name + _PACKED)
 
 
 def json_line(entry: Mapping[str, Any]) -> str:
@@ -242,23 +286,17 @@ def json_line(entry: Mapping[str, Any]) -> str:
     return f'{text}, "crc": "{zlib.crc32(text.encode()):08x}"}}\n'
 
 
-def _read(path: Path) -> bytes:
-    """Content of a file, empty if there is none. Raises InputError if it cannot be read."""
-    try:
-        return read_bytes(path, "record", most=MOST)
-    except InputError as error:
-        if isinstance(error.__cause__, FileNotFoundError):
-            return b""
-        raise
-
-
-def _unpacked(path: Path) -> bytes:
-    """Content of a compressed file, empty if there is none. Raises InputError if it is damaged."""
+def _content(path: Path) -> bytes:
+    """Lines of a file, unpacked if it is compressed; empty if there is none. Raises InputError if
+    the file cannot be read or is damaged."""
     if not os.path.lexists(path):
         return b""
+    content = read_bytes(path, "record", most=MOST)
+    if path.suffix != _PACKED:
+        return content
     unpacking = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=MOST)
     try:
-        content = unpacking.decompress(read_bytes(path, "record", most=MOST), MOST)
+        content = unpacking.decompress(content, MOST)
     except lzma.LZMAError as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     if not unpacking.eof or unpacking.unused_data:
@@ -266,9 +304,10 @@ def _unpacked(path: Path) -> bytes:
     return content
 
 
-def _parse(content: bytes, file: Path, *, is_packed: bool) -> Iterator[dict[str, Any]]:
-    """The entries of a file's lines. A line has a checksum unless it is packed. A kill may have cut
-    the last line, but not before it was packed."""
+def _entries(path: Path) -> Iterator[dict[str, Any]]:
+    """The JSON objects of a file's lines. A line has a checksum, unless the file is compressed. A
+    kill may have cut the last line, but not of a compressed file."""
+    content, is_packed = _content(path), path.suffix == _PACKED
     for number, line in enumerate(io.BytesIO(content), start=1):
         is_whole, problem = line.endswith(b"\n"), ""
         if not (is_whole or is_packed):
@@ -286,5 +325,5 @@ def _parse(content: bytes, file: Path, *, is_packed: bool) -> Iterator[dict[str,
         if match is not None and zlib.crc32(match[1]) != int(match[2], 16):
             problem = "its checksum does not match its content"
         if problem:
-            raise InputError(file, f"line {number}", f"is damaged: {problem}; {REMEDY}")
+            raise InputError(path, f"line {number}", f"is damaged: {problem}; {REMEDY}")
         yield entry

@@ -1,5 +1,5 @@
-"""GaitEvaluation: the fitness of a parameter vector, by one simulation or by one per draw of the
-scenario's disturbances."""
+"""Fitness of a parameter vector, by one simulation or by one per draw of the scenario's
+disturbances."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ import functools
 import itertools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, SupportsFloat
+
+import numpy as np
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
@@ -23,13 +25,12 @@ from tetra_drake.errors import (
     StepBudgetExceeded,
     TimeBudgetExceeded,
 )
-from tetra_drake.evolution.draws import combine
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
-from tetra_drake.scenario.metrics import unmet_requirements
+from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -58,9 +59,11 @@ class GaitEvaluation:
         """Fitness and metrics of a vector, or the reason of its failure. Draws are simulated one
         after another; the first draw without metrics ends the evaluation."""
         started = time.perf_counter()
+        limited = time_limit(self.scenario.evolution.time_budget)(simulate)
         draws = []
         for scenario, gait in self._simulations(task):
-            draws.append(self._judged(scenario, functools.partial(self._simulate, scenario, gait)))
+            simulation = functools.partial(limited, scenario, gait, record=self.records)
+            draws.append(self._judged(scenario, simulation))
             if not draws[-1].metrics:
                 break
         wall_time = time.perf_counter() - started
@@ -142,10 +145,6 @@ class GaitEvaluation:
         draws = functools.partial(draws_of_iteration, self.scenario)
         return functools.lru_cache(_SEEDS_KEPT)(draws)
 
-    def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
-        with time_limit(self.scenario.evolution.time_budget):
-            return simulate(scenario=scenario, gait=gait, record=self.records)
-
     def _fitness(self, result: SimulationResult) -> float:
         if self.objective is None:
             return result.fitness
@@ -169,3 +168,43 @@ _KINDS: dict[type[Exception], str] = {
     StepBudgetExceeded: "step budget",
     TimeBudgetExceeded: "time budget",
 }
+
+
+def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
+    """Combines the evaluations of a gait's draws. Fitness is the mean over the worst `share` of the
+    draws. The gait fails if one draw fails."""
+    wall_time = sum(draw.wall_time for draw in draws)
+    failures = [f"draw {k}: {e.failure}" for k, e in enumerate(draws) if e.failure is not None]
+    metrics = combine_metrics([draw.metrics for draw in draws])
+    if failures:
+        return Evaluation(-math.inf, metrics, failures[0], wall_time)
+    fitnesses = [draw.fitness for draw in draws]
+    lists = {"fitness": fitnesses, "distance": [draw.metrics["distance"] for draw in draws]}
+    return Evaluation(worst_mean(fitnesses, share), metrics, wall_time=wall_time, draws=lists)
+
+
+def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Each metric over the draws: its mean, least or greatest value. Empty if a draw has no
+    metrics."""
+    if not all(draws):
+        return {}
+    combined: dict[str, Any] = {}
+    for name in draws[0]:
+        values, metric = [draw[name] for draw in draws], METRICS.get(name)
+        if None in values:  # an infinite metric is recorded as null
+            combined[name] = None
+        elif metric and metric.least:
+            combined[name] = min(values)
+        elif metric and metric.most:
+            combined[name] = max(values)
+        else:
+            combined[name] = np.mean(values, axis=0).tolist()
+    return combined
+
+
+def worst_mean(fitnesses: Sequence[float], share: float) -> float:
+    """Mean of the lowest `share` of the fitnesses. A fractional last value gets its fraction as
+    weight. At least one value counts."""
+    ranked, count = sorted(fitnesses), max(1.0, share * len(fitnesses))
+    weights = [min(1.0, max(0.0, count - i)) for i in range(len(ranked))]
+    return math.fsum(w * f for w, f in zip(weights, ranked, strict=True)) / count

@@ -1,15 +1,15 @@
-"""Evaluators: take a task and return a future of its evaluation.
+"""Evaluation of many gaits at once. An evaluator is a context manager; it yields a function that
+takes a task and returns the future of its evaluation.
 
-    InLanes        threads of the compiled engine, each with several gaits side by side
-    InProcesses    worker processes, for engines that hold Python's global lock
-    OnExecutor     any executor of concurrent.futures: threads, Dask, MPI
+    in_lanes           threads of the compiled engine, each with several gaits side by side
+    on_executor        any executor of concurrent.futures: threads, Dask, MPI
+    WorkerProcesses    executor for engines that hold Python's global lock
 
 An evaluator stores no results. After a crash, a run is resumed from its record.
 """
 
 from __future__ import annotations
 
-import abc
 import contextlib
 import multiprocessing
 import os
@@ -20,6 +20,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, Executor, Future
+from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,13 @@ from tetra_drake.optimizers.base import Evaluate, Evaluation, Task
 if TYPE_CHECKING:
     from tetra_drake.evolution.evaluation import GaitEvaluation
 
+Submit = Callable[[Task], Future[Evaluation]]
+"""Function that begins the evaluation of a task. Tasks are evaluated in any order."""
+
+Evaluator = contextlib.AbstractContextManager[Submit]
+"""Context manager that yields a Submit. The end of its block cancels the evaluations that are not
+done."""
+
 MakeExecutor = Callable[[int], Executor]
 """Function that makes an executor with the given number of workers. If it cannot choose the number,
 it has an attribute `workers`: the current number, or a text about it."""
@@ -40,15 +48,8 @@ TASKS_PER_WORKER = 150
 """Number of tasks after which a worker process is replaced. Drake before 1.56 leaks about 2 MB per
 diagram with Python systems."""
 
-
-class Evaluator(contextlib.AbstractContextManager["Evaluator"]):
-    """Evaluates tasks in any order. It is used in a `with` block; the end of the block cancels the
-    evaluations that are not done."""
-
-    @abc.abstractmethod
-    def submit(self, task: Task) -> Future[Evaluation]:
-        """Future of a task's evaluation. If the worker dies, the future raises the error of its
-        executor, such as BrokenExecutor."""
+_SOURCE = "worker processes"
+_UNGUARDED = 'the program lacks `if __name__ == "__main__":` around what it does'
 
 
 def evaluator_of(
@@ -69,38 +70,59 @@ def evaluator_of(
     scenario, workers = evaluate.scenario, workers or available_cores()
     engine = engine_of(scenario)
     if executor is None and engine.lanes > 1:
-        return InLanes(evaluate, workers)
+        return in_lanes(evaluate, workers)
     engine.prepare(scenario)
     if executor is not None:
-        return OnExecutor(evaluate, executor, workers)
+        return on_executor(evaluate, executor, workers)
     if problem := _why_not_sent(evaluate):
         warn(f"gaits are evaluated one by one in this process: worker processes {problem}")
-        return OnExecutor(evaluate, futures.ThreadPoolExecutor, 1)
-    return InProcesses(evaluate, workers)
+        return on_executor(evaluate, futures.ThreadPoolExecutor, 1)
+    return on_executor(evaluate, WorkerProcesses, workers)
 
 
-class InLanes(Evaluator):
-    """Evaluates gaits in the lanes of the compiled engine, in several threads."""
+@contextlib.contextmanager
+def in_lanes(evaluate: GaitEvaluation, workers: int) -> Iterator[Submit]:
+    """Evaluator in the lanes of the compiled engine, with this number of threads."""
+    from tetra_drake.engines.queue import SimulationQueue
 
-    def __init__(self, evaluate: GaitEvaluation, workers: int) -> None:
-        from tetra_drake.engines.queue import SimulationQueue
-
-        self._evaluate = evaluate
-        self._queue = SimulationQueue(workers, record=evaluate.records)
-
-    def __exit__(self, *error: object) -> None:
-        self._queue.__exit__(*error)
-
-    def submit(self, task: Task) -> Future[Evaluation]:
-        """See Evaluator.submit()."""
-        return self._evaluate.on_queue(task, self._queue)
+    with SimulationQueue(workers, record=evaluate.records) as queue:
+        yield lambda task: evaluate.on_queue(task, queue)
 
 
-class InProcesses(Evaluator):
-    """Evaluates in worker processes. They are spawned, not forked, and end with this process."""
+@contextlib.contextmanager
+def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterator[Submit]:
+    """Evaluator on an executor of concurrent.futures.
 
-    def __init__(self, evaluate: Evaluate, workers: int) -> None:
-        self._evaluate = evaluate
+    If a worker dies, its future raises the error of the executor, such as BrokenExecutor. A task
+    for an executor that is broken or shut down raises InputError.
+    """
+    executor, is_done = make(workers), False
+    running: set[Future[Evaluation]] = set()
+
+    def submit(task: Task) -> Future[Evaluation]:
+        try:
+            future = executor.submit(evaluate, task)
+        except RuntimeError as error:
+            problem = f"takes no more tasks; the run can be resumed: {error}"
+            raise InputError("executor", "", problem) from error
+        running.add(future)
+        future.add_done_callback(running.discard)
+        return future
+
+    try:
+        yield submit
+        is_done = True
+    finally:
+        for future in list(running):
+            future.cancel()
+        executor.shutdown(wait=is_done)
+
+
+class WorkerProcesses(Executor):
+    """Executor on processes that are spawned, not forked. They end with this process, and are
+    replaced after TASKS_PER_WORKER tasks."""
+
+    def __init__(self, workers: int) -> None:
         self._lifeline, self._holder = multiprocessing.Pipe(duplex=False)
         self._processes = futures.ProcessPoolExecutor(
             workers,
@@ -113,22 +135,22 @@ class InProcesses(Evaluator):
         # (https://github.com/python/cpython/issues/115634). So tasks wait in front of threads.
         self._threads = futures.ThreadPoolExecutor(workers)
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._threads.shutdown(wait=False, cancel_futures=True)
-        if kind is not None:
+    def submit(self, function: Callable[..., Any], /, *args: Any, **more: Any) -> Future[Any]:
+        """See Executor.submit()."""
+        with deaf_to_ctrl_c():
+            return self._threads.submit(
+                lambda: self._processes.submit(function, *args, **more).result()
+            )
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Ends the processes: after their tasks, or at once without `wait`."""
+        self._threads.shutdown(wait=False, cancel_futures=cancel_futures or not wait)
+        if not wait:
             self._holder.close()
         self._threads.shutdown()
         self._processes.shutdown()
         self._holder.close()
         self._lifeline.close()
-
-    def submit(self, task: Task) -> Future[Evaluation]:
-        """See Evaluator.submit()."""
-        with deaf_to_ctrl_c():
-            return self._threads.submit(self._in_process, task)
-
-    def _in_process(self, task: Task) -> Evaluation:
-        return self._processes.submit(self._evaluate, task).result()
 
 
 def _end_with(lifeline: Connection) -> None:
@@ -154,54 +176,24 @@ def deaf_to_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class OnExecutor(Evaluator):
-    """Evaluates on an executor of concurrent.futures."""
-
-    def __init__(self, evaluate: Evaluate, make: MakeExecutor, workers: int) -> None:
-        self._evaluate, self._executor = evaluate, make(workers)
-        self._submitted: set[Future[Evaluation]] = set()
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        for future in list(self._submitted):
-            future.cancel()
-        self._executor.shutdown(wait=kind is None)
-
-    def submit(self, task: Task) -> Future[Evaluation]:
-        """See Evaluator.submit(). Raises InputError if the executor is broken or shut down."""
-        try:
-            future = self._executor.submit(self._evaluate, task)
-        except RuntimeError as error:
-            problem = f"takes no more tasks; the run can be resumed: {error}"
-            raise InputError("executor", "", problem) from error
-        self._submitted.add(future)
-        future.add_done_callback(self._submitted.discard)
-        return future
-
-
+@dataclass(frozen=True)
 class Lent(Executor):
     """An executor of the user, as a MakeExecutor: it is not shut down."""
 
-    def __init__(self, executor: Executor, workers: int | str = "its executor's") -> None:
-        self._executor, self.workers = executor, workers
+    executor: Executor
+    workers: int | str = "its executor's"
 
     def __call__(self, workers: int) -> Executor:
         return self
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **more: Any) -> Future[Any]:
         """See Executor.submit()."""
-        return self._executor.submit(function, *args, **more)
+        return self.executor.submit(function, *args, **more)
 
 
-Running = dict[Future[Evaluation], Task]
-"""Submitted tasks, by the futures of their evaluations."""
-
-
-def submitted(evaluator: Evaluator, tasks: Iterable[Task]) -> Running:
-    """Submits tasks to an evaluator."""
-    return {evaluator.submit(task): task for task in tasks}
-
-
-def finished(running: Running, timeout: float | None = None) -> list[tuple[Task, Evaluation]]:
+def finished(
+    running: dict[Future[Evaluation], Task], timeout: float | None = None
+) -> list[tuple[Task, Evaluation]]:
     """Removes finished tasks from `running`; returns them with their evaluations.
 
     Returns when at least one is finished, or after `timeout` seconds. An error of a task is raised
@@ -209,33 +201,24 @@ def finished(running: Running, timeout: float | None = None) -> list[tuple[Task,
     """
     done, _ = futures.wait(running, timeout, return_when=futures.FIRST_COMPLETED)
     evaluated = [f for f in done if not f.cancelled() and f.exception() is None]
-    return [(running.pop(future), _result(future)) for future in evaluated or done]
-
-
-def _result(future: Future[Evaluation]) -> Evaluation:
+    dask = sys.modules.get("distributed")
+    died = (BrokenExecutor, *([dask.KilledWorker] if dask else []))
     try:
-        return future.result()
+        return [(running.pop(future), future.result()) for future in evaluated or done]
     except futures.CancelledError as error:
         problem = "has dropped evaluations, as if its scheduler had ended; the run can be resumed"
         raise InputError("executor", "", problem) from error
-    except Exception as error:
-        dask = sys.modules.get("distributed")
-        if isinstance(error, BrokenExecutor) or (dask and isinstance(error, dask.KilledWorker)):
-            cause = f"it may be that memory is short, or that {_UNGUARDED}"
-            problem = f"do not start or have died, as they may say above; {cause}"
-            raise InputError(_SOURCE, "", f"{problem}; a run can be resumed") from error
-        raise
+    except died as error:
+        cause = f"it may be that memory is short, or that {_UNGUARDED}"
+        problem = f"do not start or have died, as they may say above; {cause}"
+        raise InputError(_SOURCE, "", f"{problem}; a run can be resumed") from error
 
 
-def evaluate_all(evaluator: Evaluator, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:
+def evaluate_all(submit: Submit, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:
     """Evaluates tasks. Yields each task with its evaluation as soon as it is finished."""
-    running = submitted(evaluator, tasks)
+    running = {submit(task): task for task in tasks}
     while running:
         yield from finished(running)
-
-
-_SOURCE = "worker processes"
-_UNGUARDED = 'the program lacks `if __name__ == "__main__":` around what it does'
 
 
 def check_guard() -> None:

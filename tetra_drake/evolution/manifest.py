@@ -1,8 +1,10 @@
-"""Manifest of a run: its definition, on disk and in memory.
+"""A run on disk: its definition, its lock, and how it is begun and resumed.
 
     manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of these and of
                      scenario.yaml
     scenario.yaml    the scenario with all settings; its height file, if any, beside it
+    .lock            locked while a process works on the run
+    trial_00/ ...    see evolution.entries
 
 The name of a run is a digest of this definition. Each line of the record has the name.
 
@@ -14,20 +16,31 @@ recorded fitness (see trials.check_fitness).
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import fcntl
 import hashlib
 import json
 import os
+import shutil
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_json, read_text, write_whole
+from tetra_drake.files import (
+    check_file,
+    check_folder,
+    make_folder,
+    read_json,
+    read_text,
+    write_whole,
+)
+from tetra_drake.laws.height_files import RECORDED
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
@@ -36,7 +49,10 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section
 
 SCHEMA = 4
-MANIFEST = "manifest.json"
+MANIFEST, LOCK = "manifest.json", ".lock"
+
+_ASIDE = ".replaced"
+"""Folder that holds the old run while it is replaced."""
 
 _NAME = 12
 """Number of characters of a run's name."""
@@ -69,22 +85,24 @@ class Method:
         """Which of "objective" and "optimizer" come from Python, not from the scenario."""
         return [part for part, name in vars(self).items() if "." in name]
 
-    def check_same(self, other: Method, source: object) -> None:
-        """Raises InputError, with "objective" or "optimizer" as key, if `other` differs."""
-        for part, ours in vars(self).items():
-            theirs = getattr(other, part)
-            if ours == theirs:
-                continue
-            problem = f"the run was made with {ours}, not {theirs}"
-            if part in self.given_from_python:
-                call = f"tetra_drake.evolve(None, {str(source)!r}, resume=True, {part}=...)"
-                problem += f"; resume it from Python: {call}"
-            raise InputError(source, part, problem)
+
+def _name(given: object) -> str:
+    """Name of a function, class or instance. Outside this package it includes the module, and the
+    fields of a dataclass."""
+    kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
+    module = kind.__module__ or "__main__"  # code run by exec() has no module
+    if module.startswith("tetra_drake."):
+        return str(kind.__qualname__)
+    name = f"{module}.{kind.__qualname__}"
+    if not dataclasses.is_dataclass(given) or isinstance(given, type):
+        return name
+    fields = {field.name: getattr(given, field.name) for field in dataclasses.fields(given)}
+    return f"{name} {json.dumps(fields, default=lambda value: type(value).__name__)}"
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a run: scenario, seed, versions and method."""
+    """Definition of a run: scenario, seed, installed versions and method."""
 
     scenario: Scenario
     seed: int
@@ -96,16 +114,6 @@ class Manifest:
     """True if most genomes were removed to save space, as in the folder runs/."""
     reevaluate: bool = True
     """False if the run was begun without simulations after the evolution; see evolve()."""
-
-    @classmethod
-    def of(
-        cls, scenario: Scenario, seed: int, method: Method, *, reevaluate: bool = True
-    ) -> Manifest:
-        """The manifest of a new run, with the versions that are installed."""
-        now = versions(scenario.engine.packages)
-        parts = (dump_scenario(scenario), seed, now, vars(method))
-        name = _sha256(json.dumps(parts))[:_NAME]
-        return cls(scenario, seed, now, method, name, reevaluate=reevaluate)
 
     @property
     def other_versions(self) -> list[str]:
@@ -126,6 +134,32 @@ class Manifest:
         seed = (self.seed, trial, iteration) if draws else None
         return Task(vector, trial, index, iteration, seed)
 
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the manifest without its scenario, which has a digest of its own."""
+        parts = (self.run, self.seed, dict(self.versions), vars(self.method))
+        return _sha256(json.dumps(parts, sort_keys=True))
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class _File(Section):
+    """Content of manifest.json."""
+
+    version: int = Field(alias="schema", ge=SCHEMA, le=SCHEMA)
+    run: str
+    seed: int = Field(ge=0)
+    versions: dict[str, str]
+    scenario_sha256: str
+    objective: str
+    optimizer: str
+    sha256: str
+    """The manifest's digest."""
+    thinned: bool = False
+    reevaluate: bool = True
+
 
 def read_manifest(directory: Path) -> Manifest:
     """Reads the manifest of a run; raises InputError if it is missing or damaged."""
@@ -141,63 +175,151 @@ def read_manifest(directory: Path) -> Manifest:
     manifest = Manifest(
         scenario, file.seed, file.versions, method, file.run, file.thinned, file.reevaluate
     )
-    if file.sha256 != _digest(manifest):
+    if file.sha256 != manifest.digest:
         raise InputError(path, "sha256", "does not fit the other keys: they were changed")
     return manifest
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
     """Writes scenario.yaml and then manifest.json, which makes the directory a run."""
-    text = save_scenario(directory, manifest.scenario)
-    content = {
-        "schema": SCHEMA,
-        "run": manifest.run,
-        "seed": manifest.seed,
-        "versions": dict(manifest.versions),
-        "scenario_sha256": _sha256(text),
+    file = _File(
+        schema=SCHEMA,
+        run=manifest.run,
+        seed=manifest.seed,
+        versions=dict(manifest.versions),
+        scenario_sha256=_sha256(save_scenario(directory, manifest.scenario)),
         **vars(manifest.method),
-        "sha256": _digest(manifest),
-    }
-    if not manifest.reevaluate:
-        content["reevaluate"] = False
+        sha256=manifest.digest,
+        reevaluate=manifest.reevaluate,
+    )
+    content = file.model_dump(by_alias=True, exclude_defaults=True)
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
-class _File(Section):
-    """The content of manifest.json."""
+@dataclass(eq=False)
+class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
+    """A run directory, locked against other processes until the end of its `with` block. A new run
+    is locked from begin() on."""
 
-    version: int = Field(alias="schema", ge=SCHEMA, le=SCHEMA)
-    run: str
-    seed: int = Field(ge=0)
-    versions: dict[str, str]
-    scenario_sha256: str
-    objective: str
-    optimizer: str
-    sha256: str
-    """SHA-256 of run, seed, versions, objective and optimiser."""
-    thinned: bool = False
-    reevaluate: bool = True
+    directory: Path
+    manifest: Manifest
+    begun: bool = False
+    """True if the manifest is written."""
+    _lock: BinaryIO | None = None
+
+    @classmethod
+    def create(
+        cls,
+        directory: Path,
+        *,
+        scenario: Scenario,
+        seed: int,
+        method: Method | None = None,
+        overwrite: bool = False,
+        reevaluate: bool = True,
+    ) -> RunRecord:
+        """A new run in a new or empty directory. With `overwrite` the directory may hold another
+        run, unless a process is working on it. begin() writes the first file."""
+        method, installed = method or Method.of(scenario), versions(scenario.engine.packages)
+        definition = json.dumps((dump_scenario(scenario), seed, installed, vars(method)))
+        name = _sha256(definition)[:_NAME]
+        manifest = Manifest(scenario, seed, installed, method, name, reevaluate=reevaluate)
+        check_folder(directory)
+        problem = _why_not_new(directory)
+        if not problem:
+            return cls(directory, manifest)
+        if not overwrite:
+            raise InputError(directory, "", problem)
+        read_manifest(directory)
+        return cls(directory, manifest, _lock=_locked(directory))
+
+    @classmethod
+    def resume(
+        cls,
+        directory: Path,
+        *,
+        scenario: Scenario | None = None,
+        seed: int | None = None,
+        method: Method | None = None,
+    ) -> RunRecord:
+        """Opens a run to continue it. A given scenario, seed or method must be equal to the
+        run's."""
+        manifest = read_manifest(directory)
+        if manifest.thinned:
+            raise InputError(directory, "", "is thinned: it lacks genomes that resuming needs")
+        if seed not in (None, manifest.seed):
+            raise InputError(directory, "seed", f"the run has seed {manifest.seed}, not {seed}")
+        if scenario is not None:
+            for key, value in manifest.scenario.differences(scenario):
+                problem = f"the run has {value}; it is resumed with its own scenario"
+                raise InputError(directory, key, problem)
+        ours = manifest.method
+        for part, given in vars(method or ours).items():
+            recorded = vars(ours)[part]
+            if given == recorded:
+                continue
+            problem = f"the run was made with {recorded}, not {given}"
+            if part in ours.given_from_python:
+                call = f"tetra_drake.evolve(None, {str(directory)!r}, resume=True, {part}=...)"
+                problem += f"; resume it from Python: {call}"
+            raise InputError(directory, part, problem)
+        return cls(directory, manifest, begun=True, _lock=_locked(directory))
+
+    def begin(self) -> None:
+        """Writes the manifest, if it is not written yet. Deletes the run that is overwritten, which
+        comes back if the manifest cannot be written."""
+        if self.begun:
+            return
+        if self._lock is None:
+            make_folder(self.directory)
+            self._lock = _locked(self.directory)
+            if problem := _why_not_new(self.directory):  # another process may have been faster
+                raise InputError(self.directory, "", problem)
+
+        aside = self.directory / _ASIDE
+        shutil.rmtree(aside, ignore_errors=True)
+        aside.mkdir()
+        old = [file for file in self.directory.iterdir() if file.name not in (LOCK, _ASIDE)]
+        old.sort(key=lambda file: file.name != MANIFEST)  # the manifest first: it makes a run
+        try:
+            for file in old:
+                file.rename(aside / file.name)
+            write_manifest(self.directory, self.manifest)
+        except BaseException:
+            for file in aside.iterdir():
+                file.replace(self.directory / file.name)
+            raise
+        finally:
+            shutil.rmtree(aside)
+        self.begun = True
+
+    def __exit__(self, *_: object) -> None:
+        if self._lock is not None:
+            self._lock.close()
 
 
-def _digest(manifest: Manifest) -> str:
-    """SHA-256 of a manifest without its scenario, which has a digest of its own."""
-    parts = (manifest.run, manifest.seed, dict(manifest.versions), vars(manifest.method))
-    return _sha256(json.dumps(parts, sort_keys=True))
+def _why_not_new(directory: Path) -> str:
+    """The reason why a directory cannot take a new run; empty if it can. Files of a process that
+    was killed in begin() do not count."""
+    if (directory / MANIFEST).exists():
+        return "holds a run already; to go on with it, use --resume (in Python, resume=True)"
+    ours = (LOCK, SCENARIO, _ASIDE, ".manifest.", ".scenario.", ".heights-")
+    names = [file.name for file in directory.iterdir()] if directory.is_dir() else []
+    is_new = all(name.startswith(ours) or RECORDED.fullmatch(name) for name in names)
+    return "" if is_new else "is not empty, expected a new directory"
 
 
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _name(given: object) -> str:
-    """Name of a function, class or instance. Outside this package it includes the module, and the
-    fields of a dataclass."""
-    kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
-    module = kind.__module__ or "__main__"  # code run by exec() has no module
-    if module.startswith("tetra_drake."):
-        return str(kind.__qualname__)
-    name = f"{module}.{kind.__qualname__}"
-    if not dataclasses.is_dataclass(given) or isinstance(given, type):
-        return name
-    fields = {field.name: getattr(given, field.name) for field in dataclasses.fields(given)}
-    return f"{name} {json.dumps(fields, default=lambda value: type(value).__name__)}"
+def _locked(directory: Path) -> BinaryIO:
+    """The lock file of a run, locked. The system unlocks it when this process ends. Raises
+    InputError if another process has the lock."""
+    check_file(directory / LOCK)  # opening a pipe would wait for a reader
+    with contextlib.ExitStack() as undo:
+        try:
+            lock = undo.enter_context((directory / LOCK).open("ab"))
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError(directory, "", "another process is at work on this run") from error
+        except OSError as error:
+            raise InputError(directory, "", f"cannot be locked: {error.strerror}") from error
+        undo.pop_all()
+    return lock

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry
+from tetra_drake.evolution.entries import REEVALUATIONS, EvaluationLine
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluator_of
 from tetra_drake.evolution.manifest import Method
@@ -63,8 +63,8 @@ def reevaluate(
     progress = progress or Progress()
     progress.stage(_TITLE, 0, len(missing))
     chosen = evaluator_of(evaluate, workers=workers, executor=executor, warn=progress.warn)
-    with chosen as evaluator:
-        for done, (task, evaluation) in enumerate(evaluate_all(evaluator, tasks), start=1):
-            files[task.trial].append([evaluation_entry(task, evaluation)])
+    with chosen as submit:
+        for done, (task, evaluation) in enumerate(evaluate_all(submit, tasks), start=1):
+            files[task.trial].append([EvaluationLine.of(task, evaluation)])
             progress.stage(_TITLE, done, len(missing))
     return load_run(run.directory)

@@ -1,13 +1,13 @@
-"""A recorded run as tables: `load_run`."""
+"""A recorded run as tables, and the gaits of a run or of a file for commands."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,29 +15,24 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import (
     EVALUATIONS,
     ITERATIONS,
+    LINES,
     REEVALUATIONS,
     REMEDY,
+    EvaluationLine,
     RecordFile,
 )
-from tetra_drake.evolution.manifest import Manifest, read_manifest
+from tetra_drake.evolution.manifest import MANIFEST, Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
-from tetra_drake.formatting import TextTable, heading_html, rounded
+from tetra_drake.formatting import Say, TextTable, heading_html, rounded, silent
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.robot.gait import Gait, ParameterSpace, Vector, load_gait
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.units import INCH
 
 if TYPE_CHECKING:
     import pandas
-
-_EMPTY = ["trial", "index", "iteration", "fitness", "failure", "wall_time_s", "distance_in"]
-"""Columns of a table without rows."""
-_NUMBERS = {*METRICS, "distance_in", "fitness", "best_fitness", "mean_fitness"}
-"""Columns of floating-point numbers; a missing number is NaN."""
-_INDICES = {"placed", "best_evaluation"}
-"""Columns of integers that may be missing."""
 
 
 @dataclass(frozen=True)
@@ -105,12 +100,31 @@ class Run:
     @cached_property
     def with_parameters(self) -> pandas.DataFrame:
         """The evaluations whose parameters are recorded: all, unless the run is thinned."""
-        return self.evaluations[self.evaluations.filter(self._columns).notna().all(axis=1)]
+        parameters = self.evaluations.filter(_parameters(self.scenario))
+        return self.evaluations[parameters.notna().all(axis=1)]
 
     @cached_property
     def statuses(self) -> list[TrialStatus]:
         """The state of each trial."""
-        return [self._status(trial) for trial in range(self.scenario.evolution.trials)]
+        statuses = []
+        for trial in range(self.scenario.evolution.trials):
+            rows = self.evaluations[self.evaluations["trial"] == trial]
+            status = TrialStatus(
+                trial,
+                self.scenario.evolution.evaluations,
+                units=self.scenario.units,
+                evaluations=len(rows),
+                failures=int(rows["failure"].notna().sum()),
+                wall_time=float(rows["wall_time_s"].sum()),
+            )
+            lines = self.iterations[self.iterations["trial"] == trial]
+            for last in lines.tail(1).to_dict("records"):
+                status.iteration, status.best_distance = last["iteration"], last["best_distance"]
+                status.stop = last["stop"] if isinstance(last["stop"], str) else None
+                if not math.isnan(last["best_fitness"]):
+                    status.best_fitness = last["best_fitness"]
+            statuses.append(status)
+        return statuses
 
     def best(self, count: int = 1) -> pandas.DataFrame:
         """The `count` fittest different gaits of each trial: rows of `evaluations`.
@@ -120,7 +134,8 @@ class Run:
         """
         walked = self.with_parameters.dropna(subset="fitness")
         ranked = walked.sort_values(["trial", "fitness", "index"], ascending=[True, False, True])
-        return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
+        different = ranked.drop_duplicates(["trial", *_parameters(self.scenario)])
+        return different.groupby("trial").head(count)
 
     def fittest(self) -> pandas.Series:
         """The row of the run's fittest gait. Raises InputError if no gait has a fitness yet."""
@@ -138,12 +153,14 @@ class Run:
 
     def best_gait(self) -> Gait:
         """The fittest gait of all trials. Raises InputError if no gait has a fitness yet."""
-        return self._gait_of(self.fittest())
+        best = self.fittest()
+        return self.gait(best["trial"], best["index"])
 
     def gaits(self, count: int = 1) -> list[Gait]:
         """The `count` fittest different gaits of each trial, in the order of best(). The name of
         each gait contains its trial and evaluation."""
-        return [self._gait_of(row) for _, row in self.best(count).iterrows()]
+        best = self.best(count)
+        return [self.gait(*key) for key in zip(best["trial"], best["index"], strict=True)]
 
     def file(self, name: str, trial: int | None = None) -> RecordFile:
         """A file of the run, or of one of its trials."""
@@ -159,33 +176,11 @@ class Run:
         if (trial, index) not in rows.index:
             problem = f"has no genome of trial {trial}, evaluation {index}"
             raise InputError(self.directory, "", problem)
-        return rows.loc[(trial, index), self._columns].to_numpy(dtype=np.float64)
+        return rows.loc[(trial, index), _parameters(self.scenario)].to_numpy(dtype=np.float64)
 
     def gait(self, trial: int, index: int) -> Gait:
         """The gait of an evaluation."""
         return self.manifest.gait(self.vector(trial, index), trial=trial, index=index)
-
-    def _gait_of(self, row: pandas.Series) -> Gait:
-        return self.gait(row["trial"], row["index"])
-
-    @property
-    def _columns(self) -> list[str]:
-        return _parameters(self.scenario)
-
-    def _status(self, trial: int) -> TrialStatus:
-        rows = self.evaluations[self.evaluations["trial"] == trial]
-        status = TrialStatus(
-            trial,
-            self.scenario.evolution.evaluations,
-            units=self.scenario.units,
-            evaluations=len(rows),
-            failures=int(rows["failure"].notna().sum()),
-            wall_time=float(rows["wall_time_s"].sum()),
-        )
-        lines = self.iterations[self.iterations["trial"] == trial]
-        for line in lines.tail(1).to_dict("records"):
-            status.complete(line, best_distance=line["best_distance"])
-        return status
 
 
 def gait_label(row: pandas.Series) -> str:
@@ -222,6 +217,37 @@ def load_run(path: str | Path) -> Run:
     return Run(directory, manifest, evaluations, iterations, reevaluations)
 
 
+def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
+    """The lines of one file of all trials, as a table."""
+    import pandas
+
+    parameters, bodies = _parameters(manifest.scenario), manifest.scenario.robot.body_names
+    rows = []
+    for trial in range(manifest.scenario.evolution.trials):
+        file = RecordFile.of(directory, manifest.run, name, trial=trial)
+        for number, line in enumerate(file.read()):
+            if not isinstance(line, EvaluationLine):
+                rows.append({"trial": trial, **line.content()})
+                continue
+            if line.genome is not None and len(line.genome) != len(parameters):
+                found = f"a genome of {len(line.genome)} numbers"
+                file.refuse(number, f"is damaged: found {found}, expected {len(parameters)}")
+            rows.append({"trial": trial, **line.row(parameters=parameters, bodies=bodies)})
+    types = LINES[name].column_types() | dict.fromkeys((*METRICS, "distance_in"), "float")
+    columns = None if rows else ["trial", *LINES[name].model_fields, *METRICS, "distance_in"]
+    table = pandas.DataFrame(rows, columns=columns)
+    kinds = {column: kind for column, kind in types.items() if column in table}
+    return table.astype(kinds).copy()  # copy() joins the blocks that astype() makes per column
+
+
+def _parameters(scenario: Scenario) -> list[str]:
+    """Names of the parameter columns, in the order of ParameterSpace.names."""
+    space = ParameterSpace.of(scenario)
+    others = [f"gain_{name}" for name in space.pathways] + ["tau_a_s", "tau_b_s"]
+    weights = len(space.names) - len(others)
+    return [f"weight_{number}" for number in range(1, weights + 1)] + others
+
+
 def _check_iterations(
     file: RecordFile, iterations: pandas.DataFrame, evaluations: pandas.DataFrame
 ) -> None:
@@ -241,44 +267,43 @@ def _check_iterations(
                 file.refuse(row, f"{problem}; {REMEDY}")
 
 
-def _parameters(scenario: Scenario) -> list[str]:
-    """Names of the parameter columns, in the order of ParameterSpace.names."""
-    space = ParameterSpace.of(scenario)
-    others = [f"gain_{name}" for name in space.pathways] + ["tau_a_s", "tau_b_s"]
-    weights = len(space.names) - len(others)
-    return [f"weight_{number}" for number in range(1, weights + 1)] + others
+@dataclass(frozen=True)
+class GaitSource:
+    """Gaits of a file or a run, and the scenario to simulate them on."""
+
+    scenario: Scenario
+    best: Gait
+    """The gait of the file, or the best gait of the run."""
+    gaits: dict[str, Gait]
+    """The gait of the file by its name, or the best gait of each trial by "trial 0" ..."""
 
 
-def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
-    """The lines of one file of all trials, as a table."""
-    import pandas
+def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent) -> GaitSource:
+    """Loads the gait of a file, or the best gaits of a run.
 
-    columns = _parameters(manifest.scenario)
-    bodies = manifest.scenario.robot.body_names
-    rows = []
-    for trial in range(manifest.scenario.evolution.trials):
-        file = RecordFile.of(directory, manifest.run, name, trial=trial)
-        for number, entry in enumerate(file.read()):
-            if len(entry.get("genome") or columns) != len(columns):
-                found = f"a genome of {len(entry['genome'])} numbers"
-                file.refuse(number, f"is damaged: found {found}, expected {len(columns)}")
-            rows.append({"trial": trial, **entry})
-            if "genome" in entry:
-                _flatten(rows[-1], columns, bodies)
-    table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
-    kinds = dict.fromkeys(_NUMBERS.intersection(table), "float")
-    kinds |= dict.fromkeys(_INDICES.intersection(table), "Int64")
-    return table.astype(kinds).copy()  # copy() joins the blocks that astype() makes per column
+    Args:
+        source: a gait file, or the folder of a run.
+        scenario: name or file of a scenario. By default the scenario of the run that contains the
+            gait; "thesis" if the gait is in no run.
+        warn: function that gets a warning if the gaits were made for another scenario.
 
-
-def _flatten(entry: dict[str, Any], columns: list[str], bodies: Sequence[str]) -> None:
-    """Makes a line a row of the table of evaluations: one column for each number."""
-    genome = entry.pop("genome") or [math.nan] * len(columns)
-    entry |= dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
-    for body, share in zip(bodies, entry.pop("lifted_shares", []), strict=False):
-        entry[f"lifted_{body}"] = share
-    entry["distance_in"] = entry["distance"] / INCH
-    if draws := entry.pop("draws", None):
-        entry |= {f"draws_{name}": numbers for name, numbers in draws.items()}
-        entry["worst_distance"] = min(draws["distance"])
-    entry |= zip(columns, genome, strict=True)
+    Raises:
+        InputError: if a file cannot be used.
+    """
+    folders = (source, *source.absolute().parents[:2])  # run/trial_00/best_gait.json
+    folder = next((each for each in folders if os.path.isfile(each / MANIFEST)), None)
+    if scenario is not None or folder is None:
+        chosen = load_scenario(scenario or "thesis")
+    else:
+        chosen = read_manifest(folder).scenario
+    if os.path.isdir(source):
+        run = load_run(source)
+        best, trials = run.best_gait(), run.best()["trial"]
+        gaits = {f"trial {trial}": gait for trial, gait in zip(trials, run.gaits(), strict=True)}
+    else:
+        best = load_gait(source, chosen)
+        gaits = {source.stem: best}
+    if best.scenario not in ("", chosen.name):
+        made = f"made for scenario {best.scenario}"
+        warn(f"{source}: {made}, simulated on scenario {chosen.name}")
+    return GaitSource(chosen, best, gaits)

@@ -1,19 +1,37 @@
-"""Trials of a run: each has an optimiser, a record and a state. Also the loop over all trials."""
+"""Trials of a run: each has an optimiser, a record and a state. Also the loop over all trials.
+
+Evaluations are recorded iteration by iteration, so their order does not depend on which simulation
+was finished first. A run is resumed by repeating it from the start, with recorded fitnesses in
+place of simulations. Every vector and every line must be as recorded. Therefore resuming needs the
+same versions of the packages and the same kind of processor.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
-from tetra_drake.evolution.evaluators import Evaluator, evaluate_all, finished, submitted
-from tetra_drake.evolution.run_record import RunRecord, TrialRecord
+from tetra_drake.evolution.entries import (
+    BEST_GAIT,
+    EVALUATIONS,
+    IN_PROGRESS,
+    ITERATIONS,
+    EvaluationLine,
+    IterationLine,
+    Line,
+    RecordFile,
+    first_problem,
+    trial_folder,
+)
+from tetra_drake.evolution.evaluators import Submit, evaluate_all, finished
+from tetra_drake.evolution.manifest import RunRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
 from tetra_drake.robot.gait import ParameterSpace, save_gait
@@ -23,6 +41,11 @@ _SHOW_PERIOD = 1.0  # s
 
 ALL_DONE = "all evaluations done"
 """Reason for the end of a trial whose optimiser did not stop earlier."""
+
+_NOT_REPEATED = (
+    "{} is not what scenario and seed lead to here; resume the run with the versions of the "
+    "packages and on the kind of processor it was begun with"
+)
 
 
 @dataclass
@@ -46,14 +69,31 @@ class TrialStatus:
     stop: str | None = None
     """Reason for the trial's end; None during the trial."""
 
-    def complete(self, line: Mapping[str, Any], *, best_distance: float) -> None:
-        """Updates the state with a line of iterations.jsonl and the distance of the best gait."""
-        self.iteration = line["iteration"]
-        self.stop = line["stop"] if isinstance(line["stop"], str) else None
-        best = line["best_fitness"]
-        # A line from a table has NaN in place of null.
-        self.best_fitness = -math.inf if best is None or math.isnan(best) else best
-        self.best_distance = best_distance
+
+class RepeatedFile:
+    """File of a trial when a run is repeated from its start. Lines that are recorded already are
+    checked, not written again."""
+
+    def __init__(self, run: RunRecord, trial: int, name: str) -> None:
+        self._run = run
+        self.file = RecordFile.of(run.directory, run.manifest.run, name, trial=trial)
+        self.lines: list[Any] = []
+        """Lines that were recorded before."""
+        if run.begun:
+            self.file.repair()
+            self.lines = list(self.file.read())
+
+    def write(self, lines: Sequence[Line], *, first: int) -> None:
+        """Writes lines from number `first` on. Raises InputError if a recorded line differs."""
+        recorded = self.lines[first:]
+        for row, (theirs, ours) in enumerate(zip(recorded, lines, strict=False), start=first):
+            then, now = theirs.content(), ours.content()
+            for key in then | now:
+                if then.get(key) != now.get(key):
+                    self.file.refuse(row, _NOT_REPEATED.format(key))
+        if missing := lines[len(recorded) :]:
+            self._run.begin()
+            self.file.append(missing)
 
 
 _Evaluated = tuple[Task, Evaluation]
@@ -77,7 +117,14 @@ class Trial:
         self.recalled: _Evaluated | None = None
         """The first recorded task with a fitness."""
         self._optimizer = optimizer
-        self._record = TrialRecord(run, number)
+        self._evaluations = RepeatedFile(run, number, EVALUATIONS)
+        self._iterations = RepeatedFile(run, number, ITERATIONS)
+        self._in_progress = RepeatedFile(run, number, IN_PROGRESS)
+        self._recorded: dict[int, tuple[RecordFile, int, EvaluationLine]] = {}
+        """File, number and line of each recorded evaluation, by its index."""
+        for repeated in (self._in_progress, self._evaluations):
+            for row, line in enumerate(repeated.lines):
+                self._recorded[line.index] = repeated.file, row, line
         self._results: dict[int, _Evaluated] = {}
         """Evaluated tasks of the current iteration, by index."""
         self._best: _Evaluated | None = None
@@ -90,7 +137,8 @@ class Trial:
         del self.unevaluated[task.index]
         self._add(task, evaluation)
         if self.unevaluated:
-            self._record.keep(task, evaluation)
+            lines = self._in_progress.lines
+            self._in_progress.write([EvaluationLine.of(task, evaluation)], first=len(lines))
             return False
         self._complete()
         self._advance()
@@ -98,17 +146,22 @@ class Trial:
 
     def _advance(self) -> None:
         """Runs recorded iterations, up to the first unrecorded vectors or the trial's end."""
-        while self.status.stop is None:
+        status = self.status
+        while status.stop is None:
             self._results = {}
-            first, trial = self.status.evaluations, self.status.number
-            iteration = self.status.iteration + 1
-            batch = self._optimizer.ask()[: self.status.evaluations_at_most - first]
+            first = status.evaluations
+            batch = self._optimizer.ask()[: status.evaluations_at_most - first]
             for index, vector in enumerate(batch, start=first):
-                task = self._manifest.task(vector, trial=trial, index=index, iteration=iteration)
-                evaluation = self._record.recall(index, vector)
-                if evaluation is None:
+                task = self._manifest.task(
+                    vector, trial=status.number, index=index, iteration=status.iteration + 1
+                )
+                if index not in self._recorded:
                     self.unevaluated[index] = task
                     continue
+                file, row, line = self._recorded[index]
+                if line.genome != vector.tolist():
+                    file.refuse(row, _NOT_REPEATED.format("the genome"))
+                evaluation = line.evaluation()
                 self._add(task, evaluation)
                 if self.recalled is None and evaluation.failure is None:
                     self.recalled = task, evaluation
@@ -116,7 +169,11 @@ class Trial:
                 break
             self._complete()
         else:
-            self._record.finish(self.status.evaluations)
+            if len(self._evaluations.lines) > status.evaluations:
+                problem = "the trial ends before this evaluation"
+                self._evaluations.file.refuse(status.evaluations, problem)
+            self._in_progress.file.path.unlink(missing_ok=True)
+
         if self._best is not None and self._best is not self._saved:
             task, _ = self._saved = self._best
             gait = self._manifest.gait(task.vector, trial=task.trial, index=task.index)
@@ -130,29 +187,43 @@ class Trial:
         status.wall_time += evaluation.wall_time
 
     def _complete(self) -> None:
-        """Ends an iteration: tells the optimiser its evaluations, and records it."""
-        results = [self._results[index] for index in sorted(self._results)]
+        """Ends an iteration: tells the optimiser its evaluations, and records it. Raises InputError
+        if an optimiser from Python reports what cannot be recorded."""
+        results, status = [self._results[index] for index in sorted(self._results)], self.status
         outcome = self._optimizer.tell([evaluation for _, evaluation in results])
         for task, evaluation in results:
-            if evaluation.fitness > (self._best[1].fitness if self._best else -math.inf):
+            if evaluation.fitness > status.best_fitness:
                 self._best = task, evaluation
-        status = self.status
+                status.best_fitness = evaluation.fitness
+                status.best_distance = evaluation.metrics.get("distance", math.nan)
+
         all_done = status.evaluations == status.evaluations_at_most
-        best_fitness, best_evaluation, distance = None, None, math.nan
-        if self._best is not None:
-            task, evaluation = self._best
-            best_fitness, best_evaluation = evaluation.fitness, task.index
-            distance = evaluation.metrics.get("distance", math.nan)
-        line = {
+        content = {
             "iteration": status.iteration + 1,
             "evaluations": status.evaluations,
-            "best_fitness": best_fitness,
-            "best_evaluation": best_evaluation,
+            "best_fitness": None if self._best is None else status.best_fitness,
+            "best_evaluation": None if self._best is None else self._best[0].index,
             "stop": ALL_DONE if all_done else outcome.stop,
             **outcome.report,
         }
-        self._record.complete(results, line, placed=outcome.placed)
-        status.complete(line, best_distance=distance)
+        placed: list[dict[str, Any]] = [{} for _ in results]
+        if outcome.placed is not None:
+            placed = [{"placed": member} for member in outcome.placed]
+        try:
+            iteration = IterationLine.model_validate(content)
+            evaluations = [
+                EvaluationLine.of(task, evaluation, **key)
+                for (task, evaluation), key in zip(results, placed, strict=True)
+            ]
+        except ValidationError as error:
+            raise InputError("optimizer", *first_problem(error)) from error
+
+        # The order matters: after a kill in between, a resumed run completes the files.
+        self._evaluations.write(evaluations, first=evaluations[0].index)
+        self._iterations.write([iteration], first=iteration.iteration)
+        if evaluations[-1].index >= len(self._evaluations.lines):
+            self._in_progress.file.path.unlink(missing_ok=True)
+        status.iteration, status.stop = iteration.iteration, iteration.stop
 
 
 def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
@@ -174,7 +245,7 @@ def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) ->
 
 def run_trials(
     trials: Sequence[Trial],
-    evaluator: Evaluator,
+    submit: Submit,
     *,
     show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
@@ -185,24 +256,25 @@ def run_trials(
     """
     statuses = [trial.status for trial in trials]
     show(statuses)
-    running = submitted(evaluator, [t for trial in trials for t in trial.unevaluated.values()])
+    tasks = [task for trial in trials for task in trial.unevaluated.values()]
+    running = {submit(task): task for task in tasks}
     while running:
         for task, evaluation in finished(running, _SHOW_PERIOD):
             trial = trials[task.trial]
             if trial.take(task, evaluation):
-                running |= submitted(evaluator, trial.unevaluated.values())
+                running |= {submit(new): new for new in trial.unevaluated.values()}
         show(statuses)
     return statuses
 
 
-def check_fitness(trials: Sequence[Trial], directory: Path, evaluator: Evaluator) -> None:
+def check_fitness(trials: Sequence[Trial], directory: Path, submit: Submit) -> None:
     """Evaluates the first recorded gait with a fitness again. Raises InputError if its fitness
     differs, so that a record never mixes two objectives."""
     recalled = [trial.recalled for trial in trials if trial.recalled is not None]
     if not recalled:
         return
     task, recorded = recalled[0]
-    ((_, again),) = evaluate_all(evaluator, [task])
+    ((_, again),) = evaluate_all(submit, [task])
     if again.fitness != recorded.fitness:
         outcome = again.failure or f"fitness {again.fitness!r}"
         found = f"{task} has fitness {recorded.fitness!r}, and evaluated again {outcome}"

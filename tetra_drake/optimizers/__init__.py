@@ -8,15 +8,15 @@ from typing import Any
 from tetra_drake.machine import check_package
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.optimizers.cma_es import CmaEsOptimizer
+from tetra_drake.optimizers.generational import Generational
 from tetra_drake.optimizers.quality_diversity import QualityDiversityOptimizer
-from tetra_drake.optimizers.random_search import RandomSearchOptimizer
 from tetra_drake.optimizers.steady_state import SteadyStateOptimizer
 from tetra_drake.scenario import optimizer_kinds as kinds
 
 OPTIMIZERS: dict[type, Any] = {
     kinds.SteadyState: SteadyStateOptimizer,
     kinds.CmaEs: CmaEsOptimizer,
-    kinds.RandomSearch: RandomSearchOptimizer,
+    kinds.RandomSearch: Generational,
     kinds.QualityDiversity: QualityDiversityOptimizer,
 }
 """Class of optimiser by kind. Its constructor takes the arguments of MakeOptimizer and

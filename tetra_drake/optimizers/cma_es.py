@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -63,32 +64,29 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
         self._current: Search | None = None
         """The search whose points are being evaluated; None for points of a random sample."""
 
-    def _begin(self, start: Vector) -> Search:
-        search = Search(self.settings.population, self._ranges, self.generator, start)
-        self._searches.append(search)
-        return search
-
     ask = _one_thread(Generational.ask)
     tell = _one_thread(Generational.tell)
 
     def _draw(self) -> Matrix:
-        self._current = self._unfinished()
-        if self._current is None:
-            if self.settings.sample:
-                return self._random(self.settings.sample)
-            middle = np.full(self._ranges.size, MIDDLE)
-            self._current = self._begin(self._random(1)[0] if self._searches else middle)
+        rising = [search for search in self._searches if not search.has_stalled]
+        on_trial = [search for search in rising if search.evaluations < TRYOUT]
+        if on_trial:
+            self._current = on_trial[0]
+        elif rising and len(self._searches) >= self._starts:
+            self._current = max(rising, key=lambda search: search.best)
+        elif self.settings.sample:
+            self._current = None
+            return self._ranges.random(self.settings.sample, self.generator)
+        elif self._searches:
+            self._current = self._begin(self._ranges.random(1, self.generator)[0])
+        else:
+            self._current = self._begin(np.full(self._ranges.size, MIDDLE))
         return self._current.draw()
 
-    def _unfinished(self) -> Search | None:
-        """The search that continues; None if a new one begins."""
-        rising = [search for search in self._searches if not search.has_stalled]
-        for search in rising:
-            if search.evaluations < TRYOUT:
-                return search
-        if len(self._searches) < self._starts or not rising:
-            return None
-        return max(rising, key=lambda search: search.best)
+    def _begin(self, start: Vector) -> Search:
+        search = Search(self.settings.population, self._ranges, self.generator, start)
+        self._searches.append(search)
+        return search
 
     def _learn(self, fitnesses: Vector) -> None:
         if self._current is not None:
@@ -105,11 +103,11 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
         return {"start": start, "restart": current.restarts, "sigma": current.sigma}
 
 
+@dataclass(frozen=True)
 class Box:
     """Points between 0 and 1. A root is an angle in half turns, so every root is a valid point."""
 
-    def __init__(self, size: int) -> None:
-        self.size = size
+    size: int
 
     def from_roots(self, roots: Matrix) -> Matrix:
         """Converts roots to points."""

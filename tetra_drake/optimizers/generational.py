@@ -1,4 +1,4 @@
-"""Common parts of optimisers that draw and learn from whole batches."""
+"""Random search, and the common parts of optimisers that learn from whole batches."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
 from tetra_drake.scenario.common_sections import EvolutionSection
 
 Matrix = npt.NDArray[np.float64]
+
+GAITS = 50
+"""Number of gaits in an iteration of random search."""
 
 MIDDLE = 0.5
 """Middle of a range, in units of the range."""
@@ -33,6 +36,11 @@ class Ranges:
         self._width = (space.high - space.low)[self._free]
         self.size = len(self._width)
         self.floors = (space.floors - space.low)[self._free] / self._width
+
+    def random(self, count: int, generator: np.random.Generator) -> Matrix:
+        """Scaled points of random gaits."""
+        vectors = np.array([self._space.random(generator) for _ in range(count)])
+        return (vectors - self._space.low)[:, self._free] / self._width
 
     def vector(self, point: Vector) -> Vector:
         """The parameter vector of a scaled point. Values below a floor are raised to it."""
@@ -55,17 +63,13 @@ class Ranges:
         roots = 2.0 * np.sqrt((MIDDLE - self.floors) * (points - self.floors))
         return np.where(np.isfinite(self.floors), roots, points)
 
-    def point(self, vector: Vector) -> Vector:
-        """The scaled point of a parameter vector."""
-        return (vector - self._space.low)[self._free] / self._width
-
 
 SettingsT = TypeVar("SettingsT")
 
 
 @dataclass(eq=False)
 class Generational(Generic[SettingsT]):
-    """Base class of optimisers that learn from a whole batch at once.
+    """Random search. Subclasses draw points in another way, and learn from a whole batch at once.
 
     A failure counts as worse than every success. A batch of failures teaches nothing. The report
     has mean_fitness over the successes.
@@ -98,14 +102,9 @@ class Generational(Generic[SettingsT]):
             self._learn(np.where(is_finite, fitnesses, least - abs(least) - 1.0))
         return Iteration(report)
 
-    def _random(self, count: int) -> Matrix:
-        """Points of random gaits."""
-        drawn = [self.space.random(self.generator) for _ in range(count)]
-        return np.array([self._ranges.point(vector) for vector in drawn])
-
     def _draw(self) -> Matrix:
         """Draws the points of the next batch."""
-        raise NotImplementedError
+        return self._ranges.random(GAITS, self.generator)
 
     def _learn(self, fitnesses: Vector) -> None:
         """Learns from the fitnesses of the points of the last batch. All are finite."""

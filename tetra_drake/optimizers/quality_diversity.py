@@ -49,35 +49,27 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
         super().__post_init__()
         self._roots: Matrix = np.empty((0, self._ranges.size))
         """Roots of the points that were drawn last; see Ranges.from_roots()."""
-        self._told: dict[str, npt.NDArray[Any]] = {}
-        """Arguments of the emitters' tell(): `solution` (roots), `objective`, `measures`. Empty if
-        no vector of the batch may enter the archive."""
-        self._added: dict[str, npt.NDArray[Any]] = {}
-        """The archive's rating of each vector: `status` and `value`."""
         self._archive = GridArchive(
             solution_dim=self._ranges.size,
             dims=self.settings.cells,
             ranges=[(low, high) for low, high in self.settings.measures.values()],
             threshold_min=FLOOR,
             learning_rate=LEARNING_RATE,
-            seed=self._seed(),
+            seed=int(self.generator.integers(2**63)),
         )
         self._emitters = [
             EvolutionStrategyEmitter(
                 self._archive,
-                x0=self._ranges.roots(self._random(1))[0],
+                x0=self._ranges.roots(self._ranges.random(1, self.generator))[0],
                 sigma0=SIGMA,
                 ranker="imp",
                 selection_rule="mu",
                 restart_rule="basic",
                 batch_size=BATCH,
-                seed=self._seed(),
+                seed=int(self.generator.integers(2**63)),
             )
             for _ in range(EMITTERS)
         ]
-
-    def _seed(self) -> int:
-        return int(self.generator.integers(2**63))
 
     def _draw(self) -> Matrix:
         self._roots = np.concatenate([emitter.ask() for emitter in self._emitters])
@@ -85,11 +77,9 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Adds a batch to the archive; then the emitters learn from it."""
-        count = len(evaluations)
         objective = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
         rows = [[e.metrics.get(name) for name in self.settings.measures] for e in evaluations]
         measures = np.array(rows, dtype=float)  # None becomes NaN
-        status, value = np.zeros(count, np.int32), np.zeros(count)
         if self._archive.empty:
             completed = measures[[bool(e.metrics) for e in evaluations]]
             for name, values in zip(self.settings.measures, completed.T, strict=True):
@@ -98,29 +88,33 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
                     problem = f"{found} ({METRICS[name].note}); the map would stay empty"
                     raise InputError("scenario", f"optimizer.measures.{name}", problem)
         enters = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
-        self._told = {}
         if enters.any():
-            added = self._archive.add(
-                solution=self._roots[:count][enters],
-                objective=objective[enters],
-                measures=measures[enters],
-            )
-            status[enters], value[enters] = added["status"], added["value"]
-            value[~enters] = np.min(added["value"]) - 1.0
-            objective[~enters] = np.min(objective[enters])
-            measures[~enters] = measures[enters][0]  # unused by the emitters
-            self._told = {"solution": self._roots, "objective": objective, "measures": measures}
-            self._added = {"status": status, "value": value}
+            self._add(objective, measures, enters)
         return super().tell(evaluations)
 
-    def _learn(self, fitnesses: Vector) -> None:
-        if self._archive.empty or not self._told:
+    def _add(self, objective: Vector, measures: Matrix, enters: npt.NDArray[np.bool_]) -> None:
+        """Adds the vectors that enter the archive. A whole batch then teaches the emitters."""
+        count = len(objective)
+        status, value = np.zeros(count, np.int32), np.zeros(count)
+        added = self._archive.add(
+            solution=self._roots[:count][enters],
+            objective=objective[enters],
+            measures=measures[enters],
+        )
+        if self._archive.empty or count < len(self._roots):
             return
+        status[enters], value[enters] = added["status"], added["value"]
+        value[~enters] = np.min(added["value"]) - 1.0
+        objective[~enters] = np.min(objective[enters])
+        measures[~enters] = measures[enters][0]  # unused by the emitters
         for i, emitter in enumerate(self._emitters):
             batch = slice(i * BATCH, (i + 1) * BATCH)
-            told = {key: values[batch] for key, values in self._told.items()}
-            added = {key: values[batch] for key, values in self._added.items()}
-            emitter.tell(**told, add_info=added)
+            emitter.tell(
+                solution=self._roots[batch],
+                objective=objective[batch],
+                measures=measures[batch],
+                add_info={"status": status[batch], "value": value[batch]},
+            )
 
     def _state(self) -> Mapping[str, Any]:
         return {"elites": len(self._archive)}

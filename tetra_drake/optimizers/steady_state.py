@@ -6,6 +6,7 @@ is at least 1 - p.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -44,22 +45,38 @@ class SteadyStateOptimizer:
 
     def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
+        settings, generator, space = self.settings, self.generator, self.space
         if not self._population:
-            count = self.settings.population
-            self._asked = [self.space.random(self.generator) for _ in range(count)]
+            self._asked = [space.random(generator) for _ in range(settings.population)]
         else:
-            self._asked = self._breed()
+            drawn = functools.partial(
+                select_parent, self._fitnesses, tournament=settings.tournament, generator=generator
+            )
+            parents = self._population[drawn()], self._population[drawn()]
+            swap, change = settings.crossover_probability, settings.mutation_probability
+            children = cross_over(*parents, probability=swap, generator=generator)
+            mutation = draw_mutation(self._steps, probability=change, generator=generator)
+            mutants = [mutate(each, mutation=mutation, floors=space.floors) for each in children]
+            self._asked = [space.repair(mutant) for mutant in mutants]
         return [vector.copy() for vector in self._asked]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the initial population, or places the two children one after the other."""
+        placed: list[int | None] = []
         if not self._population:
             self._population = self._asked
             self._fitnesses = np.array([e.fitness for e in evaluations], dtype=float)
-            placed: list[int | None] = list(range(len(evaluations)))
+            placed += range(len(evaluations))
         else:
-            children = zip(self._asked, evaluations, strict=False)  # the last batch may be cut
-            placed = [self._place(vector, evaluation) for vector, evaluation in children]
+            size, generator = self.settings.tournament, self.generator
+            # The last batch may be cut.
+            for vector, evaluation in zip(self._asked, evaluations, strict=False):
+                fitness = evaluation.fitness
+                member = find_place(self._fitnesses, fitness, tournament=size, generator=generator)
+                if member is not None:
+                    self._population[member], self._fitnesses[member] = vector, fitness
+                placed.append(member)
+
         mean = mean_fitness(self._fitnesses)
         self._means.append(mean)
         levelled_off = has_levelled_off(self._means, self.settings)
@@ -68,28 +85,6 @@ class SteadyStateOptimizer:
             placed=placed,
             stop="mean fitness levelled off" if levelled_off else None,
         )
-
-    def _breed(self) -> list[Vector]:
-        settings, generator = self.settings, self.generator
-        parents = self._select_parent(), self._select_parent()
-        swap, change = settings.crossover_probability, settings.mutation_probability
-        crossed = cross_over(*parents, probability=swap, generator=generator)
-        mutation = draw_mutation(self._steps, probability=change, generator=generator)
-        children = [mutate(each, mutation=mutation, floors=self.space.floors) for each in crossed]
-        return [self.space.repair(child) for child in children]
-
-    def _select_parent(self) -> Vector:
-        tournament, generator = self.settings.tournament, self.generator
-        chosen = select_parent(self._fitnesses, tournament=tournament, generator=generator)
-        return self._population[chosen]
-
-    def _place(self, vector: Vector, evaluation: Evaluation) -> int | None:
-        tournament, generator = self.settings.tournament, self.generator
-        fitness = evaluation.fitness
-        member = find_place(self._fitnesses, fitness, tournament=tournament, generator=generator)
-        if member is not None:
-            self._population[member], self._fitnesses[member] = vector, fitness
-        return member
 
 
 def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:

@@ -21,7 +21,7 @@ from pydantic import Field
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.source import load_source
+from tetra_drake.evolution.run import load_source
 from tetra_drake.files import (
     check_file,
     check_folder,

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 import pandas
 
-from tetra_drake.evolution.entries import ELITES, RecordFile
+from tetra_drake.evolution.entries import ELITES, EliteLine, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, gait_label, load_run
 from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
@@ -49,7 +49,8 @@ def elites(run: Run) -> pandas.DataFrame:
     disturbed robots). The last two are NaN if the gait was not simulated on disturbed robots.
     """
     table, kind = run.with_parameters, run.scenario.optimizer
-    judged = pandas.DataFrame(run.file(ELITES).read(), columns=[*_KEY, *_JUDGED])
+    lines = [line.content() for line in run.file(ELITES).read()]
+    judged = pandas.DataFrame(lines, columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
         low, high = np.array(list(kind.measures.values())).T
@@ -85,7 +86,7 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
     )
     table = by_gait(judgement)
     lines = [
-        {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}
+        EliteLine(trial=trial, index=index, kept=kept, mean_distance=json_number(mean))
         for (trial, index), kept, mean in zip(keys, table["kept"], table["mean"], strict=True)
     ]
     file.append(lines)
