@@ -254,7 +254,7 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
     import pandas
 
     columns = _parameters(manifest.scenario)
-    bodies = manifest.scenario.robot.body_names
+    bodies = manifest.scenario.robot.blueprint().bodies
     rows = []
     for trial in range(manifest.scenario.evolution.trials):
         file = RecordFile.of(directory, manifest.run, name, trial=trial)

@@ -99,11 +99,11 @@ def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | No
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
     signals = signals_at(robot, gait, times) / units.force
     names = [f"signal_{i + 1}" for i in range(robot.structure.signals)]
-    cables = zip(names, robot.structure.driven_cables, strict=True)
+    cables = [" + ".join(robot.structure.cable_names[i] for i in group) for group in robot.structure.groups]
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
         f"# time_s: time in s; signal_i: force in {units.force_name} that shortens the cables",
-        *(f"# {name}: {driven}" for name, driven in cables),
+        *(f"# {name}: {driven}" for name, driven in zip(names, cables, strict=True)),
         ",".join(["time_s", *names]),
     ]
     with whole_file(path) as temporary:

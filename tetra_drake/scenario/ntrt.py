@@ -23,7 +23,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.ntrt_assembly import Assembly, Place, Rule, TaggedPair
 from tetra_drake.scenario.ntrt_file import CLASSES, Builder
-from tetra_drake.scenario.robot_structure import Member, StructureFile, components
+from tetra_drake.scenario.robot_structure import StructureFile, components
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Tree
 
@@ -89,7 +89,7 @@ class _Translation:
         self.tree |= {"nodes": {}, "struts": {}, "cables": {}, "spheres": {}}
         parts = list(self._parts())
         solids = [(pair.nodes, made) for pair, made, _ in parts if made.kind != "cables"]
-        bodies = components(Member("", "", nodes) for nodes, _ in solids)
+        bodies = components(nodes for nodes, _ in solids)
         body_of = {node: number for number, nodes in enumerate(bodies) for node in nodes}
         dense = {body_of[first] for (first, _), made in solids if made.parameters.density}
         body_of = {node: body if body in dense else WORLD for node, body in body_of.items()}
