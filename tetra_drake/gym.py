@@ -44,8 +44,9 @@ import numpy as np
 from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.results.result import SimulationResult, poses_of
+from tetra_drake.robot.network import AMPLITUDE
 from tetra_drake.robot.readings import Readings, pitch_rates
-from tetra_drake.robot.robot import AMPLITUDE, Robot
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario
 from tetra_drake.scenario.metrics import pose_fitness
 from tetra_drake.scenario.scenario import Scenario

@@ -34,7 +34,7 @@ from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces
-from tetra_drake.robot.driven import DrivenByGait
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
@@ -61,7 +61,7 @@ def trajectory_of(robot: Robot, engine: str):
     """That of a robot that starts at rest, on an engine."""
     changes = {"engine": ENGINES[engine], "friction.stiffness": "0 N/m"}
     robot = dataclasses.replace(robot, scenario=robot.scenario.with_changes(changes))
-    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario, 3))
+    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, 3))
     return engine_of(robot.scenario).simulate(walk, record=True).trajectory
 
 

@@ -13,7 +13,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.driven import DrivenByGait
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
@@ -45,7 +45,7 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
 
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
     """Result and motion of a robot that walks by a seeded gait on the compiled engine."""
-    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario, seed))
+    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, seed))
     batch = LaneBatch([walk], places=1, record=True, threads=1)
     batch.advance()
     return batch.result(0), batch.motion(0)

@@ -7,9 +7,9 @@ import pytest
 
 from tetra_drake.errors import InputError
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.network import Weights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import raw_output
-from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 

@@ -15,11 +15,11 @@ from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import NORMAL
 from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.laws.rigid_motions import rigid_motions
-from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.struts import condensed
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 
 if TYPE_CHECKING:

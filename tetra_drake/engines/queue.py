@@ -15,7 +15,7 @@ from tetra_drake.engines.engine import Engine, engine_of
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Driver, driven_robot
-from tetra_drake.robot.driven import DrivenByGait, DrivenRobot
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
@@ -127,7 +127,7 @@ class _Robots:
             self._latest[id(scenario)] = robot  # keeps the scenario alive, so its id stays unique
             if len(self._latest) > _ROBOTS:
                 del self._latest[next(iter(self._latest))]
-        return DrivenByGait.of(robot, job.driver)
+        return DrivenRobot.of(robot, job.driver)
 
 
 class _Crew:

@@ -26,7 +26,6 @@ from tetra_drake.results.result import (
     save_result,
 )
 from tetra_drake.results.trajectory import DIMENSIONS, labels, save_dataset, with_indexes
-from tetra_drake.robot.command import robot_without_network
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
@@ -88,7 +87,7 @@ def load_result(folder: str | Path) -> SimulationResult:
     numbers = {name: math.nan if metrics[name] is None else metrics[name] for name in METRICS}
     shares = tuple(metrics["lifted_shares"])
     if file.gait is None:  # a command was played
-        gait, robot = None, robot_without_network(scenario)
+        gait, robot = None, Robot.of(scenario).without_network()
     else:
         gait, robot = load_gait(path, scenario, key="gait"), Robot.of(scenario)
     trajectory = _load_trajectory(folder / TRAJECTORY, robot.structure)

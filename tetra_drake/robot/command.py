@@ -10,9 +10,10 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.driven import DrivenByGait, DrivenRobot
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal, make_structure
+from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -37,13 +38,13 @@ Driver = Gait | Command
 def driven_robot(
     scenario: Scenario, driver: Driver, *, steering: SteeringSignal | None = None
 ) -> DrivenRobot:
-    """The robot of a scenario, driven by a gait or a command. Raises InputError if the command has
-    another number of cables."""
+    """The robot of a scenario, driven by a gait or a command. Raises InputError for a command
+    without samples, or for another number of cables."""
     if isinstance(driver, Gait):
-        return DrivenByGait.of(Robot.of(scenario), driver, steering=steering)
-    robot = robot_without_network(scenario)
+        return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
+    robot = Robot.of(scenario).without_network()
     driven = robot.driven
-    if driver.samples.shape[1:] != driven.shape:
+    if driver.samples.shape[1:] != driven.shape or not len(driver.samples):
         problem = f"is of shape {driver.samples.shape}, expected {driven.size} driven cables"
         raise InputError(f"command {driver.name}", "samples", problem)
     held = held_samples(driver, scenario.cpg.listing_step, scenario.simulation.duration)
@@ -55,21 +56,11 @@ def driven_robot(
 def controlled_robot(scenario: Scenario) -> Robot:
     """The robot of a scenario, with one signal for each driven cable. Its first signals let the
     actuators do at the start what they would do without a network."""
-    robot, actuation = robot_without_network(scenario), scenario.actuation
-    setpoints = actuation.commands(Robot.of(scenario).starting_cables())
+    by_network, actuation = Robot.of(scenario), scenario.actuation
+    setpoints = actuation.commands(by_network.starting_cables())
+    robot = by_network.without_network()
     law = CableLaw.of(robot.structure.cables[robot.driven])
     return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
-
-
-def robot_without_network(scenario: Scenario) -> Robot:
-    """The robot of a scenario, with one signal for each driven cable.
-
-    Actuators that imitate springs and dampers do not do so here, because the command contains their
-    effect.
-    """
-    without_law = scenario.actuation.plays_cable
-    structure = make_structure(scenario).with_oscillator_per_cable(without_law=without_law)
-    return Robot.of(scenario, structure)
 
 
 def held_samples(command: Command, step: float, duration: float) -> np.ndarray:

@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.feedback import Gains
-from tetra_drake.robot.weights import NEURONS, Weights
+from tetra_drake.robot.network import NEURONS, Weights
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section
@@ -43,7 +43,7 @@ class Gait:
 
     name: str
     weights: tuple[float, ...]
-    """Weights in the order of robot.weights.Weights.couplings (listing B.2)."""
+    """Weights in the order of robot.network.Weights.couplings (listing B.2)."""
     tau_a: float
     tau_b: float
     """Time constant of self-inhibition, in s."""

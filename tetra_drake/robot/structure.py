@@ -23,7 +23,6 @@ from pydrake.multibody.tree import (
 )
 
 from tetra_drake.laws import cable, kinematics
-from tetra_drake.laws.capsules import StrutSearch
 from tetra_drake.laws.model import WORLD, Couplings
 from tetra_drake.laws.node_forces import AnchorSprings, NodeLoads
 from tetra_drake.laws.struts import Struts
@@ -34,12 +33,6 @@ from tetra_drake.scenario.blueprint import Blueprint
 STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
 PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0)
 """Colours of struts, spheres and cables in Drake's SceneGraph and in files for simulators."""
-SKIN = 0.05
-"""Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
-pairs are near; with a smaller one, near pairs are searched more often."""
-PASSAGE = 0.5
-"""Distance that a step may carry a strut into another, as a share of the least radius. Struts pass
-through each other at four times this distance."""
 SLENDERNESS = 100.0
 """Size of a robot without struts, divided by the least radius that is shown."""
 
@@ -79,6 +72,18 @@ class Structure(Blueprint):
             q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (len(mass), 1)),
         )
 
+    def turned(self, slope: float) -> Self:
+        """The structure turned with an incline: the ground rises by `slope` (rad) along x, and the
+        bodies turn about the world's y axis."""
+        # Written out, because processors round a product of matrices differently.
+        s, c = math.sin(slope), math.cos(slope)
+        forward, left, up = self.p_WB.T
+        p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+        s, c = math.sin(slope / 2), math.cos(slope / 2)
+        w, x, y, z = self.q_WB.T
+        q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
+        return dataclasses.replace(self, p_WB=p_WB, q_WB=q_WB)
+
     @functools.cached_property
     def drivers(self) -> np.ndarray:
         """Index of the oscillator that drives each cable (cables,); PASSIVE if there is none."""
@@ -104,15 +109,6 @@ class Structure(Blueprint):
         first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
         length = np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1)
         return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
-
-    @property
-    def strut_search(self) -> StrutSearch:
-        """Distances of the search for struts that may touch; zeros if there are no struts."""
-        if not self.strut_radius.size:
-            return StrutSearch(0.0, drift=0.0, passage=0.0, lightest=self.mass.min())
-        skin = SKIN * self.strut_table.length.min()
-        near, passage = 2.0 * self.strut_radius.max() + skin, PASSAGE * self.strut_radius.min()
-        return StrutSearch(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
 
     @property
     def least_radius(self) -> float:
@@ -194,23 +190,6 @@ class Structure(Blueprint):
         """Lengths of the cables (cables,) in m at t = 0."""
         node_a, node_b = node_positions(self, self.initial_state)[self.cable_ends.T]
         return np.asarray(np.linalg.norm(node_b - node_a, axis=1))
-
-
-def turn_with_slope(
-    p_WB: np.ndarray, q_WB: np.ndarray, slope: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (bodies, 3) and quaternions (bodies, 4), w first, of bodies turned with an incline.
-
-    The ground rises by `slope` (rad) along x; bodies turn about the world's y axis.
-    """
-    # Written out, because processors round a product of matrices differently.
-    s, c = math.sin(slope), math.cos(slope)
-    forward, left, up = p_WB.T
-    turned_p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
-    s, c = math.sin(slope / 2), math.cos(slope / 2)
-    w, x, y, z = q_WB.T
-    turned_q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
-    return turned_p_WB, turned_q_WB
 
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:

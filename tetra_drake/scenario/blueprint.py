@@ -172,14 +172,14 @@ class Blueprint:
         """Index of the oscillator that drives the mirror image of each oscillator's cables (m);
         None if there is none."""
         ends = self.p_WN[self.cable_ends]
-        image_of_cable = []
+        image_of_cable: list[int] = []
         for mirrored, group in zip(ends * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
             forward = np.abs(ends - mirrored).max(axis=(1, 2))
             backward = np.abs(ends - mirrored[::-1]).max(axis=(1, 2))
             found = np.flatnonzero(np.minimum(forward, backward) <= self._least_distance).tolist()
             # Of parallel cables, the image is one of the same group.
             alike = [cable for cable in found if self.cable_groups[cable] == group]
-            image_of_cable.append(next(iter(alike or found), None))
+            image_of_cable.append(next(iter(alike or found), -1))
 
         groups = [set(cables) for cables in self.groups]
         images = [{image_of_cable[cable] for cable in cables} for cables in self.groups]

@@ -215,10 +215,14 @@ class StructureFile(Section):
         body_of |= {node: WORLD for node in fixed if node not in body_of}
         nodes = tuple(body_of)
         number = {node: index for index, node in enumerate(nodes)}
+        held = np.array([[axis in self.anchors.get(node, "") for axis in "xyz"] for node in nodes])
+        held[len(moving) :] = False
         touching = moving if self.contacts == "all" else self.contacts
+        radius, density, contact_radius = self._spheres(number, held)
 
         struts = sorted(_members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
+        ends = [[number[node] for node in strut.nodes] for strut in struts]
         cables = sorted(
             _members("cables", self.cables),
             key=lambda cable: sorted(body_of[node] for node in cable.nodes),
@@ -230,21 +234,20 @@ class StructureFile(Section):
             cable_ends.append([number[first], number[second]])
             cable_laws.append(self.cables[cable.group].law(float(np.linalg.norm(span))))
 
-        held = np.array([[axis in self.anchors.get(node, "") for axis in "xyz"] for node in nodes])
-        held[len(moving) :] = False
         return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
             node_names=nodes,
             first_node=np.append(0, np.cumsum([len(nodes) for nodes in bodies])),
             p_WF=np.zeros((len(bodies), 3)),
             p_FN=np.array([self.nodes[node] for node in nodes]),
-            struts=np.array(
-                [[number[node] for node in strut.nodes] for strut in struts], dtype=int
-            ).reshape(-1, 2),
+            struts=np.array(ends, dtype=int).reshape(-1, 2),
             strut_keys=tuple(strut.key for strut in struts),
             strut_radius=np.array([make.diameter / 2 for make in makes]),
             strut_density=np.array([make.density for make in makes]),
             strut_stiffness=np.array([make.axial_stiffness or math.inf for make in makes]),
+            node_radius=radius,
+            contact_radius=contact_radius,
+            node_density=density,
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
             anchor_stiffness=self.anchor_stiffness * held,
@@ -258,12 +261,11 @@ class StructureFile(Section):
             cable_laws=tuple(cable_laws),
             slack=True,
             contacts=np.array(sorted({number[node] for node in touching}), dtype=int),
-            **self._spheres(number, held),
         )
 
-    def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> dict[str, np.ndarray]:
-        """Spheres at the nodes, by the names of the blueprint's fields. A node has the sphere of
-        its first strut in the file, unless it has one of its own."""
+    def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
+        """Radii, densities and contact radii (3, nodes) of the spheres at the nodes. A node has the
+        sphere of its first strut in the file, unless it has one of its own."""
         spheres: list[tuple[list[str], StrutGroup | SphereGroup, float, float]] = []
         for bar in reversed(self.struts.values()):
             ends = [node for pair in bar.pairs for node in pair]
@@ -271,18 +273,13 @@ class StructureFile(Section):
         for own in self.spheres.values():
             spheres.append((own.nodes, own, own.diameter, own.diameter))
 
-        node_radius, node_density, contact_radius = np.zeros((3, len(number)))
+        made = np.zeros((3, len(number)))
         for names, make, diameter, foot in spheres:
-            nodes = [number[node] for node in names]
-            node_radius[nodes], node_density[nodes] = diameter / 2, make.density
-            contact_radius[nodes] = np.where(held[nodes, 2], 0.0, foot / 2)
-            if make.contact_radius is not None:
-                contact_radius[nodes] = make.contact_radius
-        return {
-            "node_radius": node_radius,
-            "node_density": node_density,
-            "contact_radius": contact_radius,
-        }
+            for node in (number[name] for name in names):
+                by_default = 0.0 if held[node, 2] else foot / 2
+                given = make.contact_radius
+                made[:, node] = diameter / 2, make.density, by_default if given is None else given
+        return made
 
     def _nodes_of_bodies(self) -> list[list[str]]:
         """Names of the nodes of each rigid body. Struts that share a node are one body."""
