@@ -96,7 +96,7 @@ class _Episodes:
         robot, count, start = simulation.robot, simulation.count, simulation.state
         by_network = Robot.of(self._scenario)
         structure = by_network.structure if grouped else robot.structure
-        self._groups = structure.drivers[robot.driven]  # the action of each driven cable
+        self._groups = structure.cables["signal"][robot.driven]  # the action of each driven cable
         self._cables, self._weight = by_network.starting_cables(), robot.weight
         self._start_lengths = start.lengths[:1]
         size = self._observe(start).shape[1]

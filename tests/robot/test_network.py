@@ -36,7 +36,7 @@ def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     weights = Weights.of(near)
     # Each junction's pair within (2 weights per kind of neuron), and to each neighbouring pair.
     assert len(weights.couplings) == 2 * (4 * 2 + 3 * 2 * 4)
-    junction = weights.blueprint.ahead[weights.couplings // 2]
+    junction = Robot.of(near).senses.ahead[weights.couplings // 2]
     assert (np.abs(np.diff(junction, axis=1)) <= 1).all()
     gait = seeded_gait(near)
     matrix = Robot.of(near).network(gait).inhibition

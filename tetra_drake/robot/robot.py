@@ -92,8 +92,16 @@ class Robot:
         Actuators that imitate springs and dampers do not do so here: a command contains their
         effect.
         """
-        without_law = self.scenario.actuation.plays_cable
-        structure = self.structure.with_oscillator_per_cable(without_law=without_law)
+        names, laws = self.structure.cable_names, [*self.structure.cable_laws]
+        if self.scenario.actuation.plays_cable:
+            for number in self.driven:
+                laws[number] = dict.fromkeys(laws[number], 0.0)
+        structure = dataclasses.replace(
+            self.structure,
+            cable_laws=tuple(laws),
+            oscillators=tuple(names[number] for number in self.driven),
+            groups=tuple((int(number),) for number in self.driven),
+        )
         model = self.model._replace(cables=cable.Cables.of(structure.cables))
         still = np.zeros(structure.signals)
         return dataclasses.replace(self, structure=structure, model=model, first_signals=still)
@@ -136,14 +144,16 @@ class Robot:
 
     def senses_of(self, pathways: Collection[str]) -> Senses:
         """As `senses`, for these pathways of feedback."""
-        drivers = self.structure.drivers
+        structure = self.structure
+        drivers, bodies = structure.cables["signal"], structure.carriers[structure.cable_ends]
+        last = [bodies[list(cables)].max() for cables in structure.groups]
         groups = drivers - cable.PASSIVE
         sizes = np.bincount(groups)[groups]  # of each cable's group
         neutral = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(
             drivers=drivers,
-            ahead=self.structure.ahead,
+            ahead=np.array(last, dtype=np.int64),
             carriers=self.ground.carriers,
             neutral_length=neutral,
             per_length=1.0 / (neutral * sizes),
@@ -188,17 +198,15 @@ class Robot:
     def starting_drives(self) -> np.ndarray:
         """States of the actuators at t = 0 (drives,); see laws.actuator and
         cables_of_drives."""
-        cables = self._at_start(self.cables_of_drives)
+        cables = self.starting_cables(self.cables_of_drives)
         return np.asarray(self.scenario.actuation.drives(cables))
 
-    def starting_cables(self) -> DrivenCables:
-        """Properties of the driven cables at t = 0."""
-        return self._at_start(self.driven)
-
-    def _at_start(self, indices: np.ndarray) -> DrivenCables:
-        cables, lengths = self.structure.cables[indices], self.structure.initial_lengths[indices]
-        law, signal = cable.CableLaw.of(cables), self.first_signals[cables["signal"]]
-        return DrivenCables.at_rest(law, lengths, signal)
+    def starting_cables(self, numbers: np.ndarray | None = None) -> DrivenCables:
+        """Properties at t = 0 of the cables of these numbers, by default of the driven ones."""
+        which = self.driven if numbers is None else numbers
+        cables, lengths = self.structure.cables[which], self.structure.initial_lengths[which]
+        signals = self.first_signals[cables["signal"]]
+        return DrivenCables.at_rest(cable.CableLaw.of(cables), lengths, signals)
 
     @functools.cached_property
     def starting_modes(self) -> np.ndarray:

@@ -85,19 +85,13 @@ class Structure(Blueprint):
         return dataclasses.replace(self, p_WB=p_WB, q_WB=q_WB)
 
     @functools.cached_property
-    def drivers(self) -> np.ndarray:
-        """Index of the oscillator that drives each cable (cables,); PASSIVE if there is none."""
-        drivers = np.full(len(self.cable_names), cable.PASSIVE)
-        for oscillator, cables in enumerate(self.groups):
-            drivers[list(cables)] = oscillator
-        return drivers
-
-    @functools.cached_property
     def cables(self) -> np.ndarray:
         """Cables with their constants: records (cables,) of dtype CABLE."""
         cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
-        cables["signal"] = self.drivers
+        cables["signal"] = cable.PASSIVE
+        for oscillator, driven in enumerate(self.groups):
+            cables["signal"][list(driven)] = oscillator
         for name in cable.CableLaw._fields:
             cables[name] = [law[name] for law in self.cable_laws]
         return cables

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -152,13 +153,6 @@ class Blueprint:
         """Number of actuation signals: one per oscillator."""
         return len(self.oscillators)
 
-    @property
-    def ahead(self) -> np.ndarray:
-        """Index of the last body that each oscillator's cables join (m,)."""
-        bodies = self.carriers[self.cable_ends]
-        last = [bodies[list(cables)].max() for cables in self.groups]
-        return np.array(last, dtype=np.int64)
-
     @functools.cached_property
     def sides(self) -> np.ndarray:
         """Side of each oscillator's cables (m,): 1.0 left, -1.0 right, 0.0 neither."""
@@ -198,24 +192,6 @@ class Blueprint:
         same = np.array([[a == b for b in joined] for a in joined]).reshape(count, count)
         steps = np.minimum(shortest_path(near, unweighted=True), count)
         return np.where(same, 0.0, steps)
-
-    def with_oscillator_per_cable(self, *, without_law: bool) -> Self:
-        """The robot with one oscillator for each driven cable, group by group.
-
-        With `without_law`, the constants of driven cables are 0, so the force of a cable is its
-        signal.
-        """
-        driven = [cable for group in self.groups for cable in group]
-        laws = [
-            dict.fromkeys(law, 0.0) if without_law and cable in driven else law
-            for cable, law in enumerate(self.cable_laws)
-        ]
-        return dataclasses.replace(
-            self,
-            cable_laws=tuple(laws),
-            oscillators=tuple(self.cable_names[cable] for cable in driven),
-            groups=tuple((cable,) for cable in driven),
-        )
 
     def with_oscillators(self, actuated: Mapping[str, Sequence[str]]) -> Self:
         """The robot with other oscillators.
@@ -262,7 +238,14 @@ class Blueprint:
             problem = f"the strut {name} is part of a rigid body of several struts"
             refuse(f"struts.{group}.axial_stiffness", problem)
 
-        if not any(map(self._can_move, range(len(self.bodies)))):
+        for first, end in itertools.pairwise(self.first_node):
+            p, held = self.p_WN[first:end], self.held[first:end]
+            motions = rigid_motions((p - p[0]) / (np.ptp(p, axis=0).max() or 1.0))
+            # The spin of a straight body does not count.
+            ways = np.linalg.matrix_rank(motions.reshape(-1, 6), tol=LEAST_DISTANCE)
+            if np.linalg.matrix_rank(motions[held], tol=LEAST_DISTANCE) < ways:
+                break
+        else:
             refuse("anchors", "hold every body, expected one that can move")
         if not self.contacts.size:
             refuse("contacts", "found none, expected one node at least")
@@ -348,15 +331,6 @@ class Blueprint:
                 expected = f"expected at most {most:.4g} N for '{self.cable_names[cable]}'"
                 problem = f"found {tension} N, {expected}, where its free length is 0"
                 refuse(f"cables.{self.cable_groups[cable]}.tension", problem)
-
-    def _can_move(self, body: int) -> bool:
-        """True if a body can move in spite of its anchors. The spin of a straight body does not
-        count."""
-        nodes = slice(*self.first_node[body : body + 2])
-        p = self.p_WN[nodes]
-        motions = rigid_motions((p - p[0]) / (np.ptp(p, axis=0).max() or 1.0))
-        free = np.linalg.matrix_rank(motions.reshape(-1, 6), tol=LEAST_DISTANCE)
-        return bool(np.linalg.matrix_rank(motions[self.held[nodes]], tol=LEAST_DISTANCE) < free)
 
     @property
     def shortest(self) -> float:
