@@ -145,7 +145,8 @@ class Robot:
     def senses_of(self, pathways: Collection[str]) -> Senses:
         """As `senses`, for these pathways of feedback."""
         structure = self.structure
-        drivers, bodies = structure.cables["signal"], structure.carriers[structure.cable_ends]
+        drivers = structure.cables["signal"].copy()
+        bodies = structure.carriers[structure.cable_ends]
         last = [bodies[list(cables)].max() for cables in structure.groups]
         groups = drivers - cable.PASSIVE
         sizes = np.bincount(groups)[groups]  # of each cable's group
