@@ -73,7 +73,12 @@ def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenari
     assert robot.starting_drives().tolist() == list(range(8))
 
 
-@pytest.mark.parametrize("cables", [7, 24])
-def test_a_command_for_other_cables_is_refused(scenario, cables, refused):
-    with refused("command counting", "samples", "expected 8 driven cables"):
-        driven_robot(scenario, counting(cables))
+OTHERS = [(7, 3, "expected 8 driven cables"), (24, 3, "expected 8"), (8, 0, "none")]
+
+
+@pytest.mark.parametrize(("cables", "samples", "fact"), OTHERS)
+def test_a_command_for_other_cables_or_without_samples_is_refused(
+    scenario, cables, samples, fact, refused
+):
+    with refused("command counting", "samples", fact):
+        driven_robot(scenario, counting(cables, samples))

@@ -44,8 +44,10 @@ def driven_robot(
         return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
     robot = Robot.of(scenario).without_network()
     driven = robot.driven
-    if driver.samples.shape[1:] != driven.shape or not len(driver.samples):
+    problem = "" if len(driver.samples) else "has none, expected one at least"
+    if driver.samples.shape[1:] != driven.shape:
         problem = f"is of shape {driver.samples.shape}, expected {driven.size} driven cables"
+    if problem:
         raise InputError(f"command {driver.name}", "samples", problem)
     held = held_samples(driver, scenario.cpg.listing_step, scenario.simulation.duration)
     signals = scenario.actuation.signals(held, CableLaw.of(robot.structure.cables[driven]))
@@ -54,8 +56,9 @@ def driven_robot(
 
 
 def controlled_robot(scenario: Scenario) -> Robot:
-    """The robot of a scenario, with one signal for each driven cable. Its first signals let the
-    actuators do at the start what they would do without a network."""
+    """The robot of a scenario for a controller: one signal for each driven cable.
+
+    With its first signals, the actuators start as they do with a network."""
     by_network, actuation = Robot.of(scenario), scenario.actuation
     setpoints = actuation.commands(by_network.starting_cables())
     robot = by_network.without_network()
@@ -64,7 +67,7 @@ def controlled_robot(scenario: Scenario) -> Robot:
 
 
 def held_samples(command: Command, step: float, duration: float) -> np.ndarray:
-    """The setpoints of a command at multiples of `step` (s), until after `duration` (s).
+    """Setpoints of a command at multiples of `step` (s), until after `duration` (s).
 
     Signals are linear between these times. A change of setpoint begins at its time and takes one
     step.

@@ -41,7 +41,7 @@ class DrivenRobot:
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
-        """A robot whose signals the network of a gait makes."""
+        """A robot driven by the network of a gait."""
         none = np.zeros((0, robot.structure.signals))
         return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)
 
@@ -57,7 +57,7 @@ class DrivenRobot:
 
     @property
     def is_controlled(self) -> bool:
-        """True if a controller gives further signals."""
+        """True if a controller sets the signals while the robot moves."""
         return len(self.samples) == 1
 
     @property
@@ -84,8 +84,8 @@ class DrivenRobot:
 
     @property
     def changes(self) -> dict[float, np.ndarray]:
-        """Signals (m,) in N after each change, by the time (s) at which it begins: one of the
-        marks."""
+        """Signals (m,) in N after each change of the given signals, by the time (s) at which the
+        change begins."""
         begins = self.robot.scenario.cpg.listing_step * self._changing
         after = self.samples[self._changing + 1]
         return dict(zip(begins.round(MARK_DECIMALS).tolist(), after, strict=True))
@@ -108,7 +108,7 @@ class DrivenRobot:
 
     @property
     def network(self) -> Network:
-        """The network that makes the signals; one without neurons if they are given."""
+        """Network that makes the signals. It has no neurons if the signals are given."""
         if self.gait is not None:
             return self.robot.network(self.gait)
         return Network.of(np.zeros((0, 0)), tau_a=1.0, tau_b=1.0, self_inhibition_weight=0.0)
@@ -126,5 +126,5 @@ class DrivenRobot:
 
     @property
     def turns(self) -> np.ndarray:
-        """Turns of the network's steering; see Robot.turns()."""
+        """Steering, -1 to 1, at multiples of `cpg.listing_step`; see Robot.turns()."""
         return self.robot.turns(self.gait, self.steering) if self.gait else np.zeros(1)

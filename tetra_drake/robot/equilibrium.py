@@ -78,10 +78,10 @@ class Equilibrium(NamedTuple):
 
 
 class Unactuated:
-    """A robot without actuation, with memory for its forces."""
+    """A robot without actuation, and arrays for the forces on it."""
 
     def __init__(self, model: Model) -> None:
-        """The robot of a model, with all cables passive."""
+        """Makes all cables of a model passive."""
         cables = model.cables._replace(signal=np.full_like(model.cables.signal, cable.PASSIVE))
         self.model = model._replace(cables=cables)
         self.forces = Forces.of(model)
@@ -157,7 +157,7 @@ class _Descent:
         self._arrive(start, force_at_rest(robot, start))
 
     def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
-        """Takes a state. Its forces were computed last."""
+        """Makes a state the current one. Its forces must have been computed last."""
         self.state, self.force = state, force
         if not np.isfinite(force).all():
             return
@@ -184,8 +184,8 @@ class _Descent:
         return bool(np.abs(self.force).max() <= self._rounding)
 
     def step(self) -> bool:
-        """Goes a step downhill. Returns False if there is none: at rest, the energy is at a
-        minimum."""
+        """Goes a step downhill in energy. Returns False if there is none, as in a stable
+        equilibrium."""
         if self.is_balanced() and self._factor(self._stiffness, self._doubt) is not None:
             return False
         while self._reach > SHORTEST_REACH * self._robot.radius and np.isfinite(self.force).all():

@@ -39,7 +39,7 @@ _MOST_COLUMNS = 8
 
 @dataclass(frozen=True)
 class Gait:
-    """Gait: the parameters of an oscillator network."""
+    """Parameters of an oscillator network."""
 
     name: str
     weights: tuple[float, ...]
@@ -116,7 +116,7 @@ class Gait:
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """Parameter space of a scenario's gaits, for a search of your own.
+    """Parameter space of a scenario's gaits, for your own search algorithm.
 
     A vector has the weights, the feedback gains (if the scenario has feedback), tau_A and tau_B
     (s).
@@ -184,7 +184,7 @@ class ParameterSpace:
         )
 
     def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
-        """The gait with the parameters of a vector. Raises InputError for a vector of another size,
+        """Gait with the parameters of a vector. Raises InputError for a vector of another size,
         a number that is not finite, a weight below 0, or a time constant that is not above 0."""
         vector = self._numbers(vector)
         first_gain = len(self.names) - 2 - len(self.pathways)
@@ -200,8 +200,8 @@ class ParameterSpace:
         )
 
     def vector(self, gait: Gait) -> Vector:
-        """The vector of a gait. If weights are mirrored, the first of each pair is used. Raises
-        InputError if the gait has another number of weights."""
+        """Parameter vector of a gait. If weights are mirrored, the first of each pair is used.
+        Raises InputError if the gait has another number of weights."""
         if len(gait.weights) != len(self.weights):
             problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
             raise InputError("ParameterSpace", f"gait {gait.name}", problem)
@@ -211,7 +211,7 @@ class ParameterSpace:
         return np.concatenate([weights, gains, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:
-        """A random vector: uniform between the bounds, with tau_B = 2 tau_A."""
+        """Random parameter vector: uniform between the bounds, with tau_B = 2 tau_A."""
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
@@ -325,7 +325,7 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
 
 
 class HasBestGait(Protocol):
-    """An object with a best gait, such as a run."""
+    """Object with a best gait, such as a run."""
 
     def best_gait(self) -> Gait: ...
 

@@ -45,7 +45,7 @@ def lift(scenario: Scenario, placed: Structure) -> float:
 
 
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:
-    """The ground of a scenario, under a structure.
+    """Ground of a scenario below a structure, in the form of the kernels.
 
     Raises InputError if the terrain cannot be made, or if the structure starts outside the terrain
     or with a contact node in the ground.
@@ -83,7 +83,7 @@ def make_surface(
     terrain_kind: Relief,
     grid: Grid | None = None,
 ) -> Ground:
-    """The ground with these laws and this terrain, without contact nodes. `grid` has the terrain's
+    """Ground with the given laws and terrain, without contact nodes. `grid` has the terrain's
     heights; by default the terrain begins at the origin."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     rows, columns = grid.heights.shape

@@ -27,7 +27,7 @@ SteeringSignal = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Weights:
-    """The weights between the oscillators of a robot."""
+    """Weights of the connections between the oscillators of a robot."""
 
     blueprint: Blueprint
     reach: int | None
@@ -35,7 +35,7 @@ class Weights:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
-        """The weights of a scenario's gaits."""
+        """Connections of the oscillators in a scenario."""
         return cls(scenario.robot.blueprint(), scenario.cpg.reach)
 
     @functools.cached_property
@@ -67,8 +67,8 @@ def constant_steering(turn: float) -> SteeringSignal:
 
 
 def checked_turn(turn: float, *, time: float) -> float:
-    """The turn, if it is between -1 and 1. Raises InputError otherwise; `time` (s) is for the
-    message."""
+    """Turn as a number, if it is between -1 and 1. Raises InputError otherwise, naming the `time`
+    (s)."""
     if not isinstance(turn, numbers.Real) or not abs(turn) <= 1.0:
         raise InputError("steering", f"at {time:g} s", f"found {turn!r:.60}, expected -1 to 1")
     return float(turn)

@@ -108,8 +108,8 @@ class Robot:
 
     @property
     def driven(self) -> np.ndarray:
-        """Indices of the driven cables, oscillator by oscillator in the order of the scenario.
-        Commands, actions and loads have this order."""
+        """Indices of the cables that have actuators, in the order of the oscillators. Commands,
+        actions and loads have this order."""
         groups = self.structure.groups
         return np.array([number for group in groups for number in group], dtype=np.int64)
 
@@ -143,7 +143,7 @@ class Robot:
         return self.senses_of(self.scenario.cpg.feedback)
 
     def senses_of(self, pathways: Collection[str]) -> Senses:
-        """As `senses`, for these pathways of feedback."""
+        """Constants of the oscillators' sensors for some pathways of feedback."""
         structure = self.structure
         drivers = structure.cables["signal"].copy()
         bodies = structure.carriers[structure.cable_ends]
@@ -162,7 +162,7 @@ class Robot:
         )
 
     def network(self, gait: Gait) -> Network:
-        """The network of a gait. Raises InputError if the gait does not fit the scenario."""
+        """Oscillator network of a gait. Raises InputError if the gait does not fit the scenario."""
         cpg = self.scenario.cpg
         weights = Weights(self.structure, cpg.reach)
         check_gait(gait, self.scenario, weights, source=f"gait {gait.name}")
@@ -178,7 +178,7 @@ class Robot:
         )
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-        """The turns at multiples of `cpg.listing_step`. A single value without `steering`.
+        """Steering, -1 to 1, at multiples of `cpg.listing_step`; one value without `steering`.
 
         Raises InputError if a turn is not between -1 and 1, or if the robot cannot be steered.
         """
@@ -203,7 +203,11 @@ class Robot:
         return np.asarray(self.scenario.actuation.drives(cables))
 
     def starting_cables(self, numbers: np.ndarray | None = None) -> DrivenCables:
-        """Properties at t = 0 of the cables of these numbers, by default of the driven ones."""
+        """Lengths and constants of driven cables at t = 0.
+
+        Args:
+            numbers: indices of the cables, by default all driven ones.
+        """
         which = self.driven if numbers is None else numbers
         cables, lengths = self.structure.cables[which], self.structure.initial_lengths[which]
         signals = self.first_signals[cables["signal"]]
@@ -276,7 +280,7 @@ def equilibrium_of(
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
-    """Constants of a structure and its laws, in the form of the kernels."""
+    """Constants of a robot for the kernels: of its structure and of its physical laws."""
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,

@@ -98,7 +98,7 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def strut_table(self) -> Struts:
-        """The struts in the form of the kernels."""
+        """Struts as arrays for the kernels."""
         node_a, node_b = self.struts.T
         first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
         length = np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1)
@@ -106,8 +106,8 @@ class Structure(Blueprint):
 
     @property
     def least_radius(self) -> float:
-        """Radius (m) of the thinnest strut. What is shown is as thick at least, also if there are
-        no struts."""
+        """Radius (m) of the thinnest strut, or a hundredth of the size of a robot without struts.
+        Shapes that are drawn have at least this radius."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return float(self.strut_radius.min()) if self.strut_radius.size else size / SLENDERNESS
 
@@ -137,7 +137,7 @@ class Structure(Blueprint):
 
     @property
     def anchors(self) -> AnchorSprings:
-        """The anchors of the bodies' nodes. They hold the nodes where the blueprint has them."""
+        """Springs that hold nodes of bodies at their positions in the settings."""
         nodes = np.flatnonzero(self.anchor_stiffness.any(axis=1))
         return AnchorSprings(
             nodes,

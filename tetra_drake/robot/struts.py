@@ -37,7 +37,7 @@ ELONGATION = 1e-6
 
 
 def strut_contact_law(scenario: Scenario, structure: Structure) -> StrutContactLaw:
-    """The contact of a structure's struts in the form of the kernels."""
+    """Constants of the contact between struts for the kernels."""
     lightest, radii = structure.mass.min(), structure.strut_radius
     if not radii.size:
         search = StrutSearch(0.0, drift=0.0, passage=0.0, lightest=lightest)

@@ -144,7 +144,8 @@ class Blueprint:
 
     @property
     def scale(self) -> float:
-        """Factor on lengths that suit robots of USUAL_SIZES; 1 for these."""
+        """Factor by which lengths such as margins of figures grow or shrink with the robot; 1 for
+        robots of USUAL_SIZES."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return size / min(max(size, USUAL_SIZES[0]), USUAL_SIZES[1]) or 1.0  # a point has no size
 
@@ -194,7 +195,7 @@ class Blueprint:
         return np.where(same, 0.0, steps)
 
     def with_oscillators(self, actuated: Mapping[str, Sequence[str]]) -> Self:
-        """The robot with other oscillators.
+        """The robot with other oscillators, given by the names of their cables.
 
         Args:
             actuated: names of the cables that each oscillator drives, such as "side a1 b1", with

@@ -102,7 +102,7 @@ class SphereGroup(Section):
 
 
 class CableGroup(CableConstants):
-    """Cables of one make, which never push."""
+    """Cables with the same constants. They never push."""
 
     pairs: Pairs
     """The nodes that each cable joins."""
@@ -121,8 +121,8 @@ class CableGroup(CableConstants):
         return self
 
     def law(self, distance: float) -> dict[str, float]:
-        """Constants of a cable by the names of laws.cable.CableLaw. Its nodes are at this distance
-        (m) in the file."""
+        """Constants of a cable whose nodes are at a distance (m) in the file, by the names of
+        laws.cable.CableLaw."""
         free_length = self.free_length
         if free_length is None:
             law = CableLaw(**self.constants(stiffness=self.stiffness, free_length=distance))
@@ -405,7 +405,7 @@ def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterato
 
 
 def components(pairs: Iterable[Sequence[str]]) -> list[list[str]]:
-    """Groups of nodes that pairs connect, in the order of the pairs."""
+    """Connected components of a graph of nodes, whose edges are the pairs; in their order."""
     first_node: dict[str, str] = {}
     for pair in pairs:
         start, joined = (first_node.setdefault(node, node) for node in pair)

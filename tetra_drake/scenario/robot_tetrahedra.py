@@ -77,7 +77,7 @@ Spacing = Annotated[float, *quantity("m", balanced=0.0)]
 
 
 class Tetrahedra(Section):
-    """The tetrahedra with their initial positions (thesis section 2.1, appendix C.1)."""
+    """Row of nested tetrahedra with its initial positions (thesis section 2.1, appendix C.1)."""
 
     unit: ClassVar[None] = None
     """Unit of coordinates; it has none."""
