@@ -39,10 +39,10 @@ _LOG = logging.getLogger("tetra_drake")
 def ntrt_tree(file: Path, *, unit: float) -> Tree:
     """Content of a structure file that stands for a file of NTRT.
 
-    `unit` is the length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z (up). A
-    substructure's nodes are named "SUBSTRUCTURE/NODE", groups by their tags joined by slashes, as
-    dots separate keys. What is left out is noted in the log. Raises InputError that names file and
-    key, for substructures too.
+    `unit` is the length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z
+    (up). A substructure's nodes are named "SUBSTRUCTURE/NODE", groups by their tags joined by
+    slashes, as dots separate keys. What is left out is noted in the log. Raises InputError that
+    names file and key, for substructures too.
     """
     whole = Assembly()
     for name, (_, _, tag) in CLASSES.items():
