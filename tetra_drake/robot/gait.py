@@ -154,15 +154,9 @@ class ParameterSpace:
         scenario = given_scenario(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
         weight_names, pathways = weights.names, tuple(scenario.cpg.feedback)
-        shared = np.arange(len(weight_names))  # the first weight of each pair of mirror images
+        shared = np.arange(len(weight_names))
         if bounds.mirrored:
-            images = enumerate(weights.blueprint.images)
-            oscillators = [k if image is None else image for k, image in images]
-            neurons = np.add.outer(2 * np.array(oscillators, dtype=int), [0, 1]).ravel()
-            index = {pair: i for i, pair in enumerate(map(tuple, weights.couplings.tolist()))}
-            pairs = map(tuple, neurons[weights.couplings].tolist())
-            mirrored = [index.get(pair, i) for i, pair in enumerate(pairs)]
-            shared = np.minimum(shared, mirrored)
+            shared = np.minimum(shared, weights.images)
         chosen, parameters = np.unique(shared, return_inverse=True)
         names = [f"weight {weight_names[i]}" for i in chosen]
         names += [f"gain {name}" for name in pathways]

@@ -51,6 +51,16 @@ class Weights:
             coupled &= np.kron(self.blueprint.distances, np.ones((2, 2))) <= self.reach
         return np.argwhere(coupled)
 
+    @functools.cached_property
+    def images(self) -> np.ndarray:
+        """Index of the mirror image of each weight (weights,); the weight itself if it has none."""
+        images = self.blueprint.images
+        opposite = [k if image is None else image for k, image in enumerate(images)]
+        neurons = np.add.outer(2 * np.array(opposite, dtype=int), [0, 1]).ravel()
+        index = {(i, j): weight for weight, (i, j) in enumerate(self.couplings.tolist())}
+        pairs = neurons[self.couplings].tolist()
+        return np.array([index.get((i, j), w) for w, (i, j) in enumerate(pairs)], dtype=int)
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the weights: "3->1 extensor" is from oscillator 3 onto 1, counted from 1."""
