@@ -26,7 +26,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from tetra_drake.laws.kinematics import P_WN, V_WN
-from tetra_drake.robot.robot import Robot, make_structure
+from tetra_drake.robot.robot import Robot, make_model
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_nodes
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS, TOP
 from tetra_drake.scenario.scenario import Scenario
@@ -90,10 +90,10 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
         contacts=np.array(BASE),
         markers=row.markers[:2],
     )
-    start = make_structure(scenario)
+    start = Robot.of(scenario).structure
     p_WB, q_WB = -p_FN[TRAILING, 2] * start_axes(start)[None, 2], start.q_WB[:1]
     tetrahedron = dataclasses.replace(Structure.of(blueprint), p_WB=p_WB, q_WB=q_WB)
-    return Robot.of(scenario, tetrahedron)
+    return Robot(scenario, tetrahedron, make_model(scenario, tetrahedron), np.zeros(0))
 
 
 def start_axes(structure: Structure) -> np.ndarray:

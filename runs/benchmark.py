@@ -36,9 +36,9 @@ from tetra_drake.formatting import TextTable, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, controlled_robot
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -182,7 +182,7 @@ def held_gait(scenario: Scenario, gait: Gait) -> Command:
     robot, period = Robot.of(scenario), scenario.simulation.control_period
     times = np.arange(0.0, scenario.simulation.duration, period)
     of_cable = robot.structure.cables["signal"][robot.driven]
-    return Command(gait.name, period, signals_at(robot, gait, times)[:, of_cable])
+    return Command(gait.name, period, DrivenRobot.of(robot, gait).signals_at(times)[:, of_cable])
 
 
 def step_through(simulation: Simulation, actions: np.ndarray) -> None:

@@ -21,8 +21,10 @@ from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.robot import Robot, axial_forces_at_rest
+from tetra_drake.robot.equilibrium import Unactuated
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.struts import axial_forces
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
@@ -104,7 +106,9 @@ def simplex(self_stress: float) -> Scenario:
     while abs(wanted - compression) > 0.1:
         lengthening += SOFTNESS * (wanted - compression)
         scenario = lengthened_simplex(lengthening)
-        compression = -axial_forces_at_rest(scenario, Robot.of(scenario).structure).mean()
+        robot = Robot.of(scenario)
+        forces = axial_forces(robot.structure, Unactuated(robot.model), robot.equilibrium.state)
+        compression = -forces.mean()
     return scenario
 
 

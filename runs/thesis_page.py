@@ -32,9 +32,9 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_json, read_text, write_whole
 from tetra_drake.formatting import fixed, ranged, rounded
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.measures import dominant_frequency
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.section import flattened, written
 from tetra_drake.settings.units import INCH, POUND_FORCE, plainest
@@ -114,7 +114,7 @@ def trials_numbers(run: Run) -> dict[str, Any]:
     wall_time = load_times(HERE)[run.directory.name]["evolution"]["wall_s"]
     seconds = wall_time / iterations.sum()
     times = np.arange(STEADY, duration, run.scenario.simulation.sample_period)
-    signals = [signals_at(robot, gait, times)[:, 0] for gait in run.gaits()]
+    signals = [DrivenRobot.of(robot, gait).signals_at(times)[:, 0] for gait in run.gaits()]
     hertz = pandas.Series([dominant_frequency(times, signal) for signal in signals])
     pairs = pandas.DataFrame({t: two_best(run, t) for t in best.index}).T
     return {

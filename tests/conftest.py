@@ -9,7 +9,7 @@ from helpers.analytic import BOWL, record_run, small_scenario
 
 from tetra_drake.engines.preparation import prepare
 from tetra_drake.errors import InputError
-from tetra_drake.robot.robot import Robot, make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -32,7 +32,7 @@ def scenario() -> Scenario:
 @pytest.fixture
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
-    return make_structure(scenario)
+    return Robot.of(scenario).structure
 
 
 @pytest.fixture

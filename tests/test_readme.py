@@ -153,7 +153,7 @@ def test_the_scenarios_and_the_gait_of_the_pages_load(work: Path) -> None:
             assert td.load_scenario(f"{name}.yaml").name == name
         elif "struts:" in file:
             (work / "structure.yaml").write_text(file)
-            assert len(read_structure("structure.yaml").bodies) == 3
+            assert read_structure("structure.yaml").body_count == 3
     assert td.load_scenario("snake.yaml").oscillators == 12  # three groups at four junctions
     (gait,) = snippets("json", SCENARIOS)
     (work / "gait.json").write_text(gait)

@@ -44,8 +44,9 @@ import numpy as np
 from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.results.result import SimulationResult, poses_of
+from tetra_drake.robot.network import AMPLITUDE
 from tetra_drake.robot.readings import Readings, pitch_rates
-from tetra_drake.robot.robot import AMPLITUDE, Robot
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario
 from tetra_drake.scenario.metrics import pose_fitness
 from tetra_drake.scenario.scenario import Scenario
@@ -95,7 +96,7 @@ class _Episodes:
         robot, count, start = simulation.robot, simulation.count, simulation.state
         by_network = Robot.of(self._scenario)
         structure = by_network.structure if grouped else robot.structure
-        self._groups = structure.drivers[robot.driven]  # the action of each driven cable
+        self._groups = structure.cables["signal"][robot.driven]  # the action of each driven cable
         self._cables, self._weight = by_network.starting_cables(), robot.weight
         self._start_lengths = start.lengths[:1]
         size = self._observe(start).shape[1]

@@ -22,7 +22,7 @@ from tetra_drake.engines.engine import engine_of
 from tetra_drake.laws.actuator import Actuation, TensionMotor, Winch
 from tetra_drake.laws.cable import PASSIVE
 from tetra_drake.laws.inertia import XX
-from tetra_drake.robot.driven import DrivenByGait
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
@@ -67,7 +67,7 @@ def swaying(actuation: Actuation, *, damping: float) -> Scenario:
 
 
 def trajectory_of(robot: Robot) -> xarray.Dataset:
-    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario))
+    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario))
     return engine_of(robot.scenario).simulate(walk, record=True).trajectory
 
 

@@ -18,7 +18,7 @@ from tetra_drake.laws.terrain import Rough, Steps
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.measures import path_of_centre
-from tetra_drake.robot.robot import make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
@@ -82,7 +82,7 @@ def test_the_path_is_that_of_the_trajectory(scenario, engine):
     beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3, 1, 6)]
     short = shortly(scenario, 1.0, **{"robot.offsets": beside, "engine": engine})
     result = simulate(scenario=short, gait=seeded_gait(short), record=True)
-    path, whole = result.path, path_of_centre(result.trajectory, make_structure(short))
+    path, whole = result.path, path_of_centre(result.trajectory, Robot.of(short).structure)
     assert path.times.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
     np.testing.assert_allclose(path.centre, whole.centre[::25], atol=1e-9)
     np.testing.assert_allclose(path.heading, whole.heading[::25], atol=1e-9)

@@ -13,7 +13,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.terrain import Incline, Rough
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import ground_frames
-from tetra_drake.robot.robot import Robot, make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -37,7 +37,7 @@ def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction):
     simulator: Simulator = MakeSimulator(diagram, robot, CONVERGED["drake"])
     simulator.AdvanceTo(0.3)
     state = diagram.GetOutputPort("state").Eval(simulator.get_context())
-    level = node_positions(make_structure(short), state)
+    level = node_positions(Robot.of(short).structure, state)
     turned = level @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     np.testing.assert_allclose(up_the_slope, turned, atol=1e-6)
 

@@ -32,7 +32,7 @@ from tetra_drake.engines.engine import engine_of
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces
-from tetra_drake.robot.driven import DrivenByGait
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, moved_nodes
@@ -52,7 +52,7 @@ def trajectory_of(robot: Robot, engine: str):
     """The trajectory of a robot that starts at rest, on an engine."""
     changes = {"engine": ACCURATE[engine], "friction.stiffness": "0 N/m"}
     robot = dataclasses.replace(robot, scenario=robot.scenario.with_changes(changes))
-    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario, 3))
+    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, 3))
     return engine_of(robot.scenario).simulate(walk, record=True).trajectory
 
 

@@ -12,7 +12,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.feedback import PATHWAYS
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
-from tetra_drake.robot.weights import Weights
+from tetra_drake.robot.network import Weights
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario

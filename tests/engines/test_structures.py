@@ -33,7 +33,7 @@ from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.report import run_page
 from tetra_drake.report.result_folder import save_result
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import Robot, make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -106,9 +106,9 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
     # inertia are general, too, 1e-10 m, and 8e-8 m on the thesis's friction, which enlarges that.
     row = Robot.of(load_scenario(scenario_name).on_engine("compiled").with_changes(BRIEF))
     written = row.scenario.with_sections(robot=row_as_kind(row))
-    structure = make_structure(written)  # at rest; the row starts where it is balanced
+    alike = Robot.of(written)  # at rest; the row starts where it is balanced
     start = {"p_WB": row.structure.p_WB, "q_WB": row.structure.q_WB}
-    alike = Robot.of(written, dataclasses.replace(structure, **start))
+    alike = dataclasses.replace(alike, structure=dataclasses.replace(alike.structure, **start))
     assert alike.model.isotropic
     general = dataclasses.replace(alike, model=alike.model._replace(isotropic=False))
     expected = poses_of(simulated(row)[1].states)

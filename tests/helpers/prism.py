@@ -8,7 +8,7 @@ import xarray
 from helpers.structures import SIDES_ALONE
 from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Robot, make_model
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -26,7 +26,8 @@ def make_prism() -> Robot:
     # Spheres without mass, so that the middle of a bar is its centre of mass.
     spheres = {"node_radius": np.array(RADII), "node_density": np.full(6, 1e-9)}
     blueprint = dataclasses.replace(StructureFile.model_validate(tree).blueprint(), **spheres)
-    return Robot.of(load_scenario("coulomb"), Structure.of(blueprint))
+    scenario, structure = load_scenario("coulomb"), Structure.of(blueprint)
+    return Robot(scenario, structure, make_model(scenario, structure), np.zeros(3))
 
 
 def slide_prism(robot: Robot, *, duration: float = 8.0) -> xarray.Dataset:

@@ -6,7 +6,7 @@ from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
 from tetra_drake.laws.forces import Forces, add_ground_forces, move_contacts
 from tetra_drake.laws.mode_change import mode_margin, time_to_mode_change
-from tetra_drake.robot.robot import make_model, make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 REST = (0.0, 0.0, 0.0)
@@ -22,8 +22,8 @@ class RobotOnGround:
     """
 
     def __init__(self, scenario: Scenario, R: np.ndarray) -> None:
-        self.structure, self.R = make_structure(scenario), R
-        self.model = make_model(scenario, self.structure)
+        robot = Robot.of(scenario)
+        self.structure, self.model, self.R = robot.structure, robot.model, R
         self.modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
 
     def state(self, v=REST, p=TOUCHING) -> np.ndarray:

@@ -13,11 +13,10 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.driven import DrivenByGait
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario import robot_structure
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -45,7 +44,7 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
 
 def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
     """Result and motion of a robot that walks by a seeded gait on the compiled engine."""
-    walk = DrivenByGait.of(robot, seeded_gait(robot.scenario, seed))
+    walk = DrivenRobot.of(robot, seeded_gait(robot.scenario, seed))
     batch = LaneBatch([walk], places=1, record=True, threads=1)
     batch.advance()
     return batch.result(0), batch.motion(0)
@@ -75,15 +74,14 @@ def unit_inertias(structure: Structure) -> np.ndarray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
 
 
-def joined_nodes(given: robot_structure.StructureFile) -> dict[str, np.ndarray]:
+def joined_nodes(given: StructureFile) -> dict[str, np.ndarray]:
     """The nodes of a structure file and what joins them, as statics takes them."""
-    number = {node: place for place, node in enumerate(given.nodes)}
-    held = [[axis in given.anchors.get(node, "") for axis in "xyz"] for node in given.nodes]
+    blueprint = given.blueprint()
     return {
-        "p_WN": np.array(list(given.nodes.values())),
-        "body_of_node": np.array([given.body_of_node[node] for node in given.nodes]),
-        "cable_ends": np.array([[number[n] for n in cable.nodes] for cable in given.all_cables]),
-        "held": np.array(held),
+        "p_WN": blueprint.p_WN,
+        "body_of_node": blueprint.carriers,
+        "cable_ends": blueprint.cable_ends,
+        "held": blueprint.held,
     }
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.report.summary import result_text
+from tetra_drake.robot.remarks import sinking_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import fitting
@@ -40,7 +41,7 @@ def test_a_robot_that_sinks_into_its_ground_is_told_a_stiffness(tmp_path, result
     assert told in result_text(dataclasses.replace(result, robot=study.robot))
     assert "would bear it" not in result_text(result)
     floating = load_scenario(file).with_changes({"terrain": "!Nothing", "robot.gravity": 0.0})
-    assert not Robot.of(floating).sinking_remark()
+    assert not sinking_remark(Robot.of(floating))
 
 
 def test_lengths_that_are_round_in_no_unit_are_shown_in_metric_units():

@@ -6,12 +6,7 @@ from helpers.actuations import MOTOR, WINCH
 
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.prototype.command_file import command_columns
-from tetra_drake.robot.command import (
-    Command,
-    driven_robot,
-    held_samples,
-    robot_without_network,
-)
+from tetra_drake.robot.command import Command, driven_robot, held_samples
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 
@@ -53,7 +48,7 @@ def test_commands_have_the_order_of_the_oscillators_and_drives_that_of_the_cable
     robot = Robot.of(prism.with_changes(WINCH))
     given = [name for names in prism.robot.actuated.values() for name in names]
     assert command_columns(robot) == [f"{name} free_length_mm" for name in given]
-    assert list(robot_without_network(prism).structure.oscillators) == given
+    assert list(Robot.of(prism).without_network().structure.oscillators) == given
     assert (np.diff(robot.driven) < 0).any()
     free = robot.structure.cables["free_length"]
     assert len(set(free)) > 1
@@ -78,7 +73,12 @@ def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenari
     assert robot.starting_drives().tolist() == list(range(8))
 
 
-@pytest.mark.parametrize("cables", [7, 24])
-def test_a_command_for_other_cables_is_refused(scenario, cables, refused):
-    with refused("command counting", "samples", "expected 8 driven cables"):
-        driven_robot(scenario, counting(cables))
+OTHERS = [(7, 3, "expected 8 driven cables"), (24, 3, "expected 8"), (8, 0, "none")]
+
+
+@pytest.mark.parametrize(("cables", "samples", "fact"), OTHERS)
+def test_a_command_for_other_cables_or_without_samples_is_refused(
+    scenario, cables, samples, fact, refused
+):
+    with refused("command counting", "samples", fact):
+        driven_robot(scenario, counting(cables, samples))

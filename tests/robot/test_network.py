@@ -7,11 +7,9 @@ import pytest
 
 from tetra_drake.errors import InputError
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.network import Weights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import raw_output
-from tetra_drake.robot.weights import Weights
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.settings.units import INCH
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
@@ -36,7 +34,7 @@ def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     weights = Weights.of(near)
     # Each junction's pair within (2 weights per kind of neuron), and to each neighbouring pair.
     assert len(weights.couplings) == 2 * (4 * 2 + 3 * 2 * 4)
-    junction = weights.blueprint.ahead[weights.couplings // 2]
+    junction = Robot.of(near).senses.ahead[weights.couplings // 2]
     assert (np.abs(np.diff(junction, axis=1)) <= 1).all()
     gait = seeded_gait(near)
     matrix = Robot.of(near).network(gait).inhibition
@@ -90,25 +88,3 @@ def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
     gait = dataclasses.replace(seeded_gait(scenario), weights=(1.0,) * 23)
     with refused(f"gait {gait.name}", "weights", "expected"):
         robot.network(gait)
-
-
-GAINS = [("thesis", "0.05 N", "0.0048"), ("thesis", "2 lbf", "")]
-GAINS += [("winch", "900 N", "-25 mm"), ("motors", "90 N", "22.5 N")]
-
-
-@pytest.mark.parametrize(("name", "gain", "problem"), GAINS)
-def test_a_gain_that_hardly_acts_or_asks_too_much_is_named(name, gain, problem):
-    remark = Robot.of(load_scenario(name).with_changes({"cpg.gain": gain})).gain_remark()
-    assert bool(remark) == bool(problem)
-    assert problem in remark
-
-
-def test_a_robot_that_walks_less_than_a_tenth_of_its_length_is_named():
-    robot = Robot.of(load_scenario("thesis").with_changes({"cpg.gain": "1 lbf"}))
-    # From T1's base to T5's tip: four spacings of 2.94 in, and 4.9 in of a tetrahedron.
-    tenth = 0.1 * (4 * 2.94 + 4.899) * INCH
-    assert not robot.stillness_remark(-1.01 * tenth)
-    # Signals of 0.25 lbf (half of u0 = 0.5) stretch cables of 0.2 lbf/in by 1.25 in.
-    assert "1.25 in" in robot.stillness_remark(0.99 * tenth)
-    turning = robot.scenario.with_changes({"objective": {"heading_change": "1 /rad"}})
-    assert not Robot.of(turning).stillness_remark(0.0)

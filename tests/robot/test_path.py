@@ -9,7 +9,7 @@ from helpers.prism import make_prism
 
 from tetra_drake.laws.curves import curvature
 from tetra_drake.robot.measures import follow
-from tetra_drake.robot.robot import make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 
 RADIUS = 0.2  # m
@@ -73,7 +73,7 @@ def poses(headings, pitch=0.3, bodies=3):
 
 @pytest.mark.parametrize("turns", [1.7, -1.7])
 def test_the_heading_of_a_row_counts_whole_turns_and_its_centre_is_that_of_mass(turns):
-    row = make_structure(load_scenario("thesis").with_changes({"robot.tetrahedra": 3}))
+    row = Robot.of(load_scenario("thesis").with_changes({"robot.tetrahedra": 3})).structure
     headings = np.linspace(0.4, 0.4 + turns * TURN, 30)
     path = follow(np.arange(30.0), poses(headings), row)
     np.testing.assert_allclose(path.heading, headings, atol=1e-12)

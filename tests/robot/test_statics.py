@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.structures import joined_nodes
 
-from tetra_drake.robot.robot import make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.statics import cable_wrenches, find_statics
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
@@ -34,7 +34,7 @@ def prism(n: int, twist: float, *, radius: float = 1.0, height: float = 1.5) -> 
 def nested_tetrahedra(spacing: float) -> Joined:
     """Two tetrahedra of the thesis and the cables between them: three outer, three inner ones."""
     changes = {"robot.tetrahedra": 2, "robot.spacing": f"{spacing} m"}
-    structure = make_structure(load_scenario("thesis").with_changes(changes))
+    structure = Robot.of(load_scenario("thesis").with_changes(changes)).structure
     return {
         "p_WN": node_positions(structure, structure.initial_state),
         "body_of_node": structure.carriers,
@@ -89,11 +89,10 @@ def test_tensions_of_a_prism() -> None:
 
 @pytest.mark.parametrize("name", ["mast", "pair"])
 def test_the_shipped_spines_balance_without_weight(name: str) -> None:
-    given, joined = read_structure(name), shipped(name)
-    stiffness = [given.cables[cable.group].stiffness for cable in given.all_cables]
+    blueprint, joined = read_structure(name).blueprint(), shipped(name)
+    laws = np.array([[law["stiffness"], law["free_length"]] for law in blueprint.cable_laws])
     spans = joined["p_WN"][joined["cable_ends"]]
-    lengths = np.linalg.norm(spans[:, 1] - spans[:, 0], axis=1)
-    tensions = stiffness * (lengths - given.free_lengths)
+    tensions = laws[:, 0] * (np.linalg.norm(spans[:, 1] - spans[:, 0], axis=1) - laws[:, 1])
     assert tensions.min() > 1.0
     assert np.abs(forces_on_bodies(joined, tensions)).max() < 0.02 * tensions.min()
 

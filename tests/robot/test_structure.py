@@ -8,7 +8,7 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 
 from tetra_drake.laws.kinematics import V_WN
-from tetra_drake.robot.robot import Robot, make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import NODES, STRUTS
@@ -20,7 +20,7 @@ IN = 0.0254
 def row(request, scenario) -> Structure:
     """A structure of some number of tetrahedra."""
     scenario = scenario.with_changes({"robot.tetrahedra": request.param})
-    structure = make_structure(scenario)
+    structure = Robot.of(scenario).structure
     assert len(structure.bodies) == request.param
     return structure
 
@@ -108,7 +108,7 @@ def test_the_ground_touches_all_bottom_nodes_and_the_lead_tip(row):
 @pytest.mark.parametrize("name", ["thesis", "prism", "mast"])
 def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(name):
     # This needs the plant's state to run body by body, in the structure's order.
-    structure = make_structure(load_scenario(name))
+    structure = Robot.of(load_scenario(name)).structure
     plant = MultibodyPlant(time_step=0.0)
     bodies = AddBodies(plant, structure)
     frames = AddNodes(plant, structure, bodies)

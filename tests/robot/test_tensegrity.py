@@ -7,7 +7,7 @@ from helpers.structures import driven_as_recorded, recorded_structure, unit_iner
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import NORMAL
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
-from tetra_drake.robot.robot import Robot, make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 
@@ -39,7 +39,7 @@ def distances(p_WN: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_bars_have_the_mass_and_the_moments_of_the_independent_simulation(name, data):
-    recorded, structure = recorded_structure(data, name), make_structure(load_scenario(name))
+    recorded, structure = recorded_structure(data, name), Robot.of(load_scenario(name)).structure
     np.testing.assert_allclose(structure.mass, recorded["bar_mass"], rtol=1e-12)
     across, axial = recorded["moment_across"], recorded["moment_axial"]
     for mass, inertia in zip(structure.mass, unit_inertias(structure), strict=True):
@@ -49,7 +49,7 @@ def test_bars_have_the_mass_and_the_moments_of_the_independent_simulation(name, 
 
 def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
     scenario = load_scenario("mast").with_changes({"robot.masses": {"v2_front_low": "35 g"}})
-    structure, group = make_structure(scenario), scenario.robot.struts["v2"]
+    structure, group = Robot.of(scenario).structure, scenario.robot.struts["v2"]
     nodes = np.flatnonzero(structure.carriers == 1)
     radius, ball_radius = group.diameter / 2, group.node_diameter / 2
     parts = []  # of mass, place of the centre, inertia about it
@@ -79,4 +79,4 @@ def test_nodes_placed_in_the_ground_are_refused(refused):
     scenario = load_scenario("prism")
     sunk = scenario.with_changes({"robot.nodes.n1": ["-5 cm", "8.66 cm", "-1 mm"]})
     with refused("prism", "robot.nodes.n1", "0.1 cm below"):
-        make_structure(sunk)
+        Robot.of(sunk)

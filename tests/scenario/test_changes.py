@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.robot.robot import make_structure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.load import load_scenario
@@ -26,7 +26,7 @@ STIFF = "cables: {outer_stiffness: 0.4 lbf/in}"
 
 def axial_force(scenario: Scenario) -> float:
     """Of the cables between two tetrahedra as they start, relative to that of the outer ones."""
-    structure = make_structure(scenario)
+    structure = Robot.of(scenario).structure
     p_WN = structure.p_WB[structure.carriers] + structure.p_BN
     cables = structure.cables[:6]
     spans = p_WN[cables["node_b"]] - p_WN[cables["node_a"]]

@@ -71,9 +71,9 @@ def test_a_prism_in_decimetres(tmp_path: Path) -> None:
     assert (side.stiffness, side.damping, side.tension) == pytest.approx((800.0, 5.0, 120.0))
     default = given.cables["horizontal/string"]
     assert (default.stiffness, default.damping, default.tension) == (1000.0, 10.0, 0.0)
-    names = {cable.name for cable in given.all_cables}
-    assert names > {"horizontal/string low1 low2", "vertical/string low1 high1"}
-    assert len(given.bodies) == 3
+    names = {"horizontal/string low1 low2", "vertical/string low1 high1"}
+    assert names < {*given.blueprint().cable_names}
+    assert given.body_count == 3
     statics = find_statics(**joined_nodes(given))
     assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
 
@@ -81,15 +81,16 @@ def test_a_prism_in_decimetres(tmp_path: Path) -> None:
 def test_a_spine_by_substructures(tmp_path: Path) -> None:
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     given = read(write(tmp_path, SPINE))
-    assert given.body_names == ("v1", "v2", "v3")
+    blueprint = given.blueprint()
+    assert blueprint.bodies == ("v1", "v2", "v3")
     rod = given.struts["rod"]  # by the default builder
     assert (rod.diameter, rod.density) == pytest.approx((0.1, 1000.0))
     assert given.nodes["v1/front"] == pytest.approx([0.1, 0.1, 0.2])
     assert given.nodes["v2/front"] == pytest.approx([0.05, -0.1, 0.2])
     assert given.nodes["v3/left"] == pytest.approx([0.4, -0.1, 0.0])
-    names = [cable.name for cable in given.all_cables]
-    assert len(names) == 8
-    assert names[:5:4] == ["string v1/front v2/front", "string v2/front v3/front"]
+    assert len(blueprint.cable_names) == 8
+    first_cables = ("string v1/front v2/front", "string v2/front v3/front")
+    assert blueprint.cable_names[:5:4] == first_cables
 
 
 BALL = """
@@ -125,7 +126,7 @@ def test_a_bond_of_nodes_and_edges_moves_the_second_part_and_replaces_cables(tmp
         middle = (p[f"b/low{i}"] + p[f"b/low{j}"]) / 2.0
         assert 2.0 * (middle - centre) == pytest.approx(p[f"a/high{i}"] - centre)
     assert min(p["b/high1"] - p["a/high1"]) > -0.2 < p["b/high1"][2] - 0.3, "b stands on a"
-    pairs = [set(cable.nodes) for cable in given.all_cables]
+    pairs = [{*name.split()[1:]} for name in given.blueprint().cable_names]
     assert len(pairs) == 2 * 9 - 6 + 6
     assert {"b/low1", "a/high1"} in pairs and {"a/high1", "b/low2"} in pairs
     assert {"b/low1", "b/low2"} not in pairs and {"a/high1", "a/high2"} not in pairs
@@ -148,9 +149,11 @@ def test_boxes_spheres_on_cables_bodies_held_in_space_and_names_of_places(tmp_pa
     given = read(write(tmp_path, KINDS))
     assert given.anchors == {"u": "xyz", "v": "xyz"}, "of density 0"
     assert given.nodes["u"][2] == pytest.approx(1.2), "where something is held, y = 0 is the ground"
-    assert (given.bodies, len(given.all_cables)) == ((("a", "b"), ("w",)), 4)
+    blueprint = given.blueprint()
+    assert (blueprint.bodies, len(blueprint.cable_names)) == (("bar", "w"), 4)
+    assert blueprint.node_names[:3] == ("a", "b", "w")
     box, ball = 0.7 * 4.0 * 0.4 * 0.2, 3.0 * 4.0 / 3.0 * math.pi * 1.5**3  # kg
-    assert Structure.of(given.blueprint()).mass == pytest.approx([box, ball])
+    assert Structure.of(blueprint).mass == pytest.approx([box, ball])
     assert "spare" not in given.nodes
     assert all(name in caplog.text for name in (": spare", ": ceiling", ": bar", ": u v, a b"))
 
@@ -199,8 +202,8 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
         bond_groups: {a/b/node_node: {string: [[v3.right, right]]}}
     """
     given = read(write(tmp_path, text))
-    names = ["string b/left a/v2/left", "string b/front a/v3/back", "string a/v3/right b/right"]
-    assert [cable.name for cable in given.all_cables[8:]] == names
+    names = ("string b/left a/v2/left", "string b/front a/v3/back", "string a/v3/right b/right")
+    assert given.blueprint().cable_names[8:] == names
     string = given.cables["string"]
     assert (string.stiffness, string.tension) == (7.0, 0.0), "no pretension unless it says so"
     builder = "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 9}}}"

@@ -7,7 +7,7 @@ import pytest
 from helpers.structure_file import FILE
 
 from tetra_drake.scenario.changes import merged
-from tetra_drake.scenario.robot_structure import Member, StructureFile
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import parse_yaml
 from tetra_drake.settings.section import Tree
@@ -30,18 +30,19 @@ def test_a_structure_has_what_its_file_says_in_si() -> None:
     assert (side.stiffness, side.damping, side.free_length) == (200.0, 3.0, 0.02)
     assert (given.masses, given.gravity) == ({"g": 0.02}, 9.80665)
     # Bodies are what struts connect; a node has the sphere of its first strut.
-    assert given.bodies == (("b", "a", "c"), ("d", "e"), ("f", "g"))
-    assert given.body_names == ("b a c", "d e", "bar")
-    assert [given.body_of_node[node] for node in "abcdefg"] == [0, 0, 0, 1, 1, 2, 2]
-    assert [given.sphere_of_node[node].diameter for node in "abcf"] == [0.016, 0.016, 0, 0.01]
+    blueprint = given.blueprint()
+    assert blueprint.node_names == tuple("bacdefg")
+    assert blueprint.body_of_node == ("b a c",) * 3 + ("d e",) * 2 + ("bar",) * 2
+    assert blueprint.node_radius == pytest.approx([8e-3, 8e-3, 0.0, 8e-3, 8e-3, 5e-3, 5e-3])
     # Cables are named by group and nodes; a tension gives the free length.
-    assert [cable.name for cable in given.all_cables] == ["side b d", "side c d", "long e f"]
-    assert given.all_cables[1] == Member("cables.side.pairs[1]", "side", ("c", "d"))
-    assert given.cables_of_oscillator == {"left": (0, 2), "right": (1,)}
+    assert blueprint.cable_names == ("side b d", "side c d", "long e f")
+    assert blueprint.cable_keys[1] == "cables.side.pairs[1]"
+    assert (blueprint.oscillators, blueprint.groups) == (("left", "right"), ((0, 2), (1,)))
     length = np.hypot(0.07, 0.10)
-    assert given.free_lengths == pytest.approx([0.02, 0.02, length - 2 / 100])
-    assert given.contact_nodes == ("g", "a")
-    assert structure("contacts: all").contact_nodes == tuple("gabcdef")
+    free_lengths = [law["free_length"] for law in blueprint.cable_laws]
+    assert free_lengths == pytest.approx([0.02, 0.02, length - 2 / 100])
+    assert [blueprint.node_names[node] for node in blueprint.contacts] == ["a", "g"]
+    assert structure("contacts: all").blueprint().contacts.tolist() == list(range(7))
 
 
 def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
@@ -56,7 +57,7 @@ def test_a_node_of_no_strut_that_the_world_holds_is_fixed() -> None:
     assert blueprint.held[-1].all()
     assert blueprint.p_WN[-1] == pytest.approx([0.01, 0.01, 0.09])
     assert blueprint.cable_names[0] == "up a h"
-    assert "h" not in given.contact_nodes
+    assert blueprint.contacts.tolist() == list(range(7)), "all but h"
     a, g = blueprint.node_names.index("a"), blueprint.node_names.index("g")
     assert blueprint.held[a].tolist() == [True, False, True]
     assert blueprint.anchor_damping[a] == pytest.approx(1e-3 * blueprint.anchor_stiffness[a])
@@ -73,8 +74,9 @@ def test_a_node_that_nothing_uses_is_left_out_with_a_note(tmp_path, caplog) -> N
 
 def test_cables_of_two_groups_may_join_the_same_nodes() -> None:
     given = structure("cables: {long: {pairs: [[e, f], [d, b]]}}\nactuated: {left: [long b d]}")
-    assert [one.name for one in given.all_cables[:3]] == ["side b d", "side c d", "long d b"]
-    assert given.cables_of_oscillator["left"] == (2,)
+    blueprint = given.blueprint()
+    assert blueprint.cable_names[:3] == ("side b d", "side c d", "long d b")
+    assert blueprint.groups[0] == (2,)
 
 
 TWO_FIXED = "nodes: {h: [1, 1, 1], i: [1, 1, 2]}\nanchors: {h: xyz, i: xyz}\n"

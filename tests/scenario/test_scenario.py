@@ -8,6 +8,7 @@ import pytest
 from record import EXPERIMENTS
 
 from tetra_drake.errors import InputError
+from tetra_drake.robot.remarks import start_up_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios
@@ -124,7 +125,7 @@ def test_a_duration_is_shortened_by_one_key(name):
         changed = shipped.with_changes({"simulation.duration": f"{duration} s"})
         assert changed.simulation.settling_time == min(3.0, duration / 4.0)
         is_idle = duration <= changed.cpg.start_up
-        assert ("cpg.start_up" in Robot.of(changed).start_up_remark()) == is_idle
+        assert ("cpg.start_up" in start_up_remark(Robot.of(changed))) == is_idle
 
 
 def test_differences_are_keys_and_readable_values(scenario):

@@ -17,7 +17,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.experiment import fit
 from tetra_drake.formatting import silent
 from tetra_drake.prototype.command_file import command_text, load_command, table_text
-from tetra_drake.robot.command import Command, robot_without_network
+from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -213,7 +213,7 @@ def write_log(file: Path, times: np.ndarray, p_WN: np.ndarray) -> None:
 
 def write_pulls(file: Path, scenario: Scenario, *, period: float, share: float, rate: float):
     """A command of 40 samples that pulls the cables in turn, around 1 N."""
-    robot = robot_without_network(scenario)
+    robot = Robot.of(scenario).without_network()
     phases = rate * period * np.arange(40)[:, np.newaxis] + 2.0 * np.arange(robot.driven.size)
     pulls = Command("pulls", period, 1.0 + share * np.sin(phases))
     file.write_text(command_text(robot, pulls))

@@ -25,7 +25,7 @@ from tetra_drake.kernels.packed import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
-from tetra_drake.robot.driven import MARK_DECIMALS, DrivenByGait, DrivenRobot
+from tetra_drake.robot.driven import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.speed_limit import speed_limit
@@ -71,7 +71,7 @@ class _DiagramRobot(LoneRobot):
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self.driven, self._record, self._viewer = driven, record, viewer
         robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
-        if isinstance(driven, DrivenByGait):
+        if driven.gait is not None:
             diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
         else:
             diagram = MakeTensegrityDiagram(robot, None, controller=HeldSignals(robot))

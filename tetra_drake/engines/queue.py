@@ -15,7 +15,7 @@ from tetra_drake.engines.engine import Engine, engine_of
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Driver, driven_robot
-from tetra_drake.robot.driven import DrivenByGait, DrivenRobot
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
@@ -122,7 +122,7 @@ class SimulationQueue:
             self._robots[id(scenario)] = robot  # keeps the scenario alive, so its id stays unique
             if len(self._robots) > _ROBOTS:
                 del self._robots[next(iter(self._robots))]
-        return DrivenByGait.of(robot, driver)
+        return DrivenRobot.of(robot, driver)
 
 
 class _Crew:

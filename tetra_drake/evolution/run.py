@@ -221,7 +221,8 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
     """The lines of one file of all trials, as a table."""
     import pandas
 
-    parameters, bodies = _parameters(manifest.scenario), manifest.scenario.robot.body_names
+    parameters = _parameters(manifest.scenario)
+    bodies = manifest.scenario.robot.blueprint().bodies
     rows = []
     for trial in range(manifest.scenario.evolution.trials):
         file = RecordFile.of(directory, manifest.run, name, trial=trial)

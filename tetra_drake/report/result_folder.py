@@ -34,7 +34,6 @@ from tetra_drake.formatting import Say, silent
 from tetra_drake.machine import versions
 from tetra_drake.results.result import IntegratorWork, SimulationResult
 from tetra_drake.results.trajectory import VARIABLES, labels, save_dataset, with_indexes
-from tetra_drake.robot.command import robot_without_network
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.measures import CentrePath
 from tetra_drake.robot.robot import Robot
@@ -165,7 +164,7 @@ def load_result(folder: str | Path) -> SimulationResult:
     numbers = {name: math.nan if metrics[name] is None else metrics[name] for name in METRICS}
     shares = tuple(metrics["lifted_shares"])
     if file.gait is None:  # a command was played
-        gait, robot = None, robot_without_network(scenario)
+        gait, robot = None, Robot.of(scenario).without_network()
     else:
         gait, robot = load_gait(path, scenario, key="gait"), Robot.of(scenario)
     times, *centre, heading = (np.array(column, dtype=float) for _, column in file.path)

@@ -10,6 +10,7 @@ from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import TextTable, fixed, rounded, sentence
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.remarks import sinking_remark, start_up_remark, stillness_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.metrics import METRICS, UNITS, headline_metric, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
@@ -75,8 +76,8 @@ def result_text(result: SimulationResult) -> str:
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
-    still = robot.stillness_remark(metrics.distance) if result.gait else ""
-    remarks = robot.start_up_remark() or still, robot.sinking_remark()
+    still = stillness_remark(robot, metrics.distance) if result.gait else ""
+    remarks = start_up_remark(robot) or still, sinking_remark(robot)
     lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]
@@ -102,7 +103,7 @@ def run_text(run: Run) -> str:
         best = run.fittest()
         gaits = [run.initial_best(best["trial"]), best]
         texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
-        if still := Robot.of(run.scenario).stillness_remark(best["distance"]):
+        if still := stillness_remark(Robot.of(run.scenario), best["distance"]):
             texts.append(sentence(still))
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():

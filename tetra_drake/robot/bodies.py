@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import TypeAlias
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -29,7 +30,7 @@ def strut_pose(p_BA: np.ndarray, p_BC: np.ndarray) -> RigidTransform:
 def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Masses (bodies,), centres of mass in the frames F of the blueprint (bodies, 3), and unit
     inertias (bodies, 6) as in Structure."""
-    made: dict[tuple[bytes, ...], SpatialInertia] = {}  # equal bodies share one
+    made: dict[tuple[bytes, ...], Inertia] = {}  # equal bodies share one
     inertias = []
     node_a = blueprint.struts[:, 0]
     for first, end in itertools.pairwise(blueprint.first_node.tolist()):
@@ -45,18 +46,28 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
         )
         key = tuple(part.tobytes() for part in parts)
         if key not in made:
-            made[key] = _body_inertia(parts)
+            made[key] = _body_inertia(*parts)
         inertias.append(made[key])
-    empty = np.array([inertia.get_mass() for inertia in inertias])
-    mass = empty + blueprint.payload  # a point mass at the centre of mass
-    centres, units = zip(*map(_central, inertias), strict=True)
-    return mass, np.array(centres), (empty / mass)[:, np.newaxis] * np.array(units)
+    masses, centres, units = (np.array(values) for values in zip(*inertias, strict=True))
+    mass = masses + blueprint.payload  # a point mass at the centre of mass
+    return mass, centres, (masses / mass)[:, np.newaxis] * units
 
 
-def _body_inertia(parts: tuple[np.ndarray, ...]) -> SpatialInertia:
-    """Spatial inertia M_BFo_F of a body: struts, and spheres and point masses at its nodes. Struts
-    are solid cylinders."""
-    p_FN, struts, strut_radius, strut_density, node_radius, node_density, node_mass = parts
+Inertia: TypeAlias = tuple[float, np.ndarray, np.ndarray]
+"""Mass, centre of mass (3,), and unit inertia (6,) about it."""
+
+
+def _body_inertia(
+    p_FN: np.ndarray,
+    struts: np.ndarray,
+    strut_radius: np.ndarray,
+    strut_density: np.ndarray,
+    node_radius: np.ndarray,
+    node_density: np.ndarray,
+    node_mass: np.ndarray,
+) -> Inertia:
+    """Inertia of a body: struts, and spheres and point masses at its nodes. Struts are solid
+    cylinders. Rounding errors become 0."""
     total, along = SpatialInertia.Zero(), [0.0, 0.0, 1.0]
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
         if density > 0.0:
@@ -70,16 +81,12 @@ def _body_inertia(parts: tuple[np.ndarray, ...]) -> SpatialInertia:
             total += SpatialInertia(mass, p, UnitInertia.PointMass(p))
         elif mass > 0.0:
             total += SpatialInertia.SolidSphereWithMass(mass, radius or POINT_RADIUS).Shift(-p)
-    return total
 
-
-def _central(M_BFo_F: SpatialInertia) -> tuple[np.ndarray, np.ndarray]:
-    """Centre of mass (3,), and unit inertia (6,) about it. Rounding errors become 0."""
-    centre, unit = M_BFo_F.get_com(), M_BFo_F.get_unit_inertia()
+    centre, unit = total.get_com(), total.get_unit_inertia()
     size = np.sqrt(unit.get_moments().max())
     centre = np.where(np.abs(centre) > ROUNDING * size, centre, 0.0)
     if centre.any():
-        unit = M_BFo_F.Shift(centre).get_unit_inertia()
+        unit = total.Shift(centre).get_unit_inertia()
     moments, products = unit.get_moments(), unit.get_products()
     products = np.where(np.abs(products) > ROUNDING * moments.max(), products, 0.0)
-    return centre, np.concatenate([moments, products])
+    return total.get_mass(), centre, np.concatenate([moments, products])

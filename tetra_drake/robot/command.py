@@ -10,9 +10,10 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.driven import DrivenByGait, DrivenRobot
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal, make_structure
+from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -37,14 +38,16 @@ Driver = Gait | Command
 def driven_robot(
     scenario: Scenario, driver: Driver, *, steering: SteeringSignal | None = None
 ) -> DrivenRobot:
-    """The robot of a scenario, driven by a gait or a command. Raises InputError if the command has
-    another number of cables."""
+    """The robot of a scenario, driven by a gait or a command. Raises InputError for a command
+    without samples, or for another number of cables."""
     if isinstance(driver, Gait):
-        return DrivenByGait.of(Robot.of(scenario), driver, steering=steering)
-    robot = robot_without_network(scenario)
+        return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
+    robot = Robot.of(scenario).without_network()
     driven = robot.driven
+    problem = "" if len(driver.samples) else "has none, expected one at least"
     if driver.samples.shape[1:] != driven.shape:
         problem = f"is of shape {driver.samples.shape}, expected {driven.size} driven cables"
+    if problem:
         raise InputError(f"command {driver.name}", "samples", problem)
     held = held_samples(driver, scenario.cpg.listing_step, scenario.simulation.duration)
     signals = scenario.actuation.signals(held, CableLaw.of(robot.structure.cables[driven]))
@@ -53,27 +56,18 @@ def driven_robot(
 
 
 def controlled_robot(scenario: Scenario) -> Robot:
-    """The robot of a scenario, with one signal for each driven cable. Its first signals let the
-    actuators do at the start what they would do without a network."""
-    robot, actuation = robot_without_network(scenario), scenario.actuation
-    setpoints = actuation.commands(Robot.of(scenario).starting_cables())
+    """The robot of a scenario for a controller: one signal for each driven cable.
+
+    With its first signals, the actuators start as they do with a network."""
+    by_network, actuation = Robot.of(scenario), scenario.actuation
+    setpoints = actuation.commands(by_network.starting_cables())
+    robot = by_network.without_network()
     law = CableLaw.of(robot.structure.cables[robot.driven])
     return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
 
 
-def robot_without_network(scenario: Scenario) -> Robot:
-    """The robot of a scenario, with one signal for each driven cable.
-
-    Actuators that imitate springs and dampers do not do so here, because the command contains their
-    effect.
-    """
-    without_law = scenario.actuation.plays_cable
-    structure = make_structure(scenario).with_oscillator_per_cable(without_law=without_law)
-    return Robot.of(scenario, structure)
-
-
 def held_samples(command: Command, step: float, duration: float) -> np.ndarray:
-    """The setpoints of a command at multiples of `step` (s), until after `duration` (s).
+    """Setpoints of a command at multiples of `step` (s), until after `duration` (s).
 
     Signals are linear between these times. A change of setpoint begins at its time and takes one
     step.

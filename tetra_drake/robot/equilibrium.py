@@ -77,10 +77,10 @@ class Equilibrium(NamedTuple):
 
 
 class Unactuated:
-    """A robot without actuation, with memory for its forces."""
+    """A robot without actuation, and arrays for the forces on it."""
 
     def __init__(self, model: Model) -> None:
-        """The robot of a model, with all cables passive."""
+        """Makes all cables of a model passive."""
         cables = model.cables._replace(signal=np.full_like(model.cables.signal, cable.PASSIVE))
         self.model = model._replace(cables=cables)
         self.forces = Forces.of(model)
@@ -116,7 +116,7 @@ def find_equilibrium(
     descent = _Descent(robot, start)
     most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
     announce_at, count = math.inf, 0
-    while count < most and not descent.is_at_rest() and descent.step():
+    while count < most and descent.step():
         count += 1
         now = time.perf_counter()
         if count == 1:  # kernels are compiled by now
@@ -156,7 +156,7 @@ class _Descent:
         self._arrive(start, force_at_rest(robot, start))
 
     def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
-        """Takes a state. Its forces were computed last."""
+        """Makes a state the current one. Its forces must have been computed last."""
         self.state, self.force = state, force
         if not np.isfinite(force).all():
             return
@@ -182,14 +182,13 @@ class _Descent:
         """True if no force is left, except for rounding errors."""
         return bool(np.abs(self.force).max() <= self._rounding)
 
-    def is_at_rest(self) -> bool:
-        """True if no force is left and the energy is at a minimum."""
-        return self.is_balanced() and self._factor(self._stiffness, self._doubt) is not None
-
     def step(self) -> bool:
-        """Goes a step downhill. Returns False if there is none."""
+        """Goes a step downhill in energy. Returns False if there is none, as in a stable
+        equilibrium."""
+        if self.is_balanced() and self._factor(self._stiffness, self._doubt) is not None:
+            return False
         while self._reach > SHORTEST_REACH * self._robot.radius and np.isfinite(self.force).all():
-            step, expected = self._fall() if self.is_balanced() else self._newton_step()
+            step, expected = self._longest_step()
             length = np.abs(step).max()
             moved, force, step, gain = self._corrected(step, expected)
             if gain > LEAST_GAIN:
@@ -201,9 +200,20 @@ class _Descent:
             self._reach = 0.5 * length
         return False
 
-    def _newton_step(self) -> tuple[np.ndarray, float]:
-        """Displacements (6 n,) with the least shift, and twice the energy that they set free by the
-        stiffness."""
+    def _longest_step(self) -> tuple[np.ndarray, float]:
+        """Displacements (6 n,) within reach, and twice the energy that they set free by the
+        stiffness: Newton's step with the least shift, or a step out of a balance that is not
+        stable."""
+        if self.is_balanced():
+            shift = self._least
+            while (factor := self._factor(self._stiffness, shift)) is None:
+                shift *= 2.0
+            step = np.cos(np.arange(self.force.size))  # any direction
+            for _ in range(POWER_STEPS):
+                step = self._solved(factor, step)
+                step *= self._reach / np.abs(step).max()
+            return step, float(-step @ self._stiffness @ step)
+
         self._shift = max(self._shift, self._least)
         while True:
             factor = self._factor(self._stiffness, self._shift)
@@ -216,22 +226,11 @@ class _Descent:
                 return step, float(self.force @ step + self._shift * step @ step)
             self._shift *= min(max(2.0, 0.7 * excess), 100.0)
 
-    def _fall(self) -> tuple[np.ndarray, float]:
-        """As _newton_step(), for a step out of a balance that is not stable."""
-        shift = self._least
-        while (factor := self._factor(self._stiffness, shift)) is None:
-            shift *= 2.0
-        step = np.cos(np.arange(self.force.size))  # any direction
-        for _ in range(POWER_STEPS):
-            step = self._solved(factor, step)
-            step *= self._reach / np.abs(step).max()
-        return step, float(-step @ self._stiffness @ step)
-
     def _corrected(
         self, step: np.ndarray, expected: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         """State, force, displacements and gain (see LEAST_GAIN) of a step that is led back to the
-        floor of the valley. `expected` is in J, as by _newton_step()."""
+        floor of the valley. `expected` is in J, as by _longest_step()."""
         longest = 0.5 * np.abs(step).max()
         moved = displaced(self._robot, self.state, step)
         for count in range(CORRECTIONS + 1):

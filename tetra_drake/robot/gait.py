@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.feedback import Gains
-from tetra_drake.robot.weights import NEURONS, Weights
+from tetra_drake.robot.network import NEURONS, Weights
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section
@@ -39,11 +39,11 @@ _MOST_COLUMNS = 8
 
 @dataclass(frozen=True)
 class Gait:
-    """Gait: the parameters of an oscillator network."""
+    """Parameters of an oscillator network."""
 
     name: str
     weights: tuple[float, ...]
-    """Weights in the order of robot.weights.Weights.couplings (listing B.2)."""
+    """Weights in the order of robot.network.Weights.couplings (listing B.2)."""
     tau_a: float
     tau_b: float
     """Time constant of self-inhibition, in s."""
@@ -116,7 +116,7 @@ class Gait:
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """Parameter space of a scenario's gaits, for a search of your own.
+    """Parameter space of a scenario's gaits, for your own search algorithm.
 
     A vector has the weights, the feedback gains (if the scenario has feedback), tau_A and tau_B
     (s).
@@ -153,11 +153,11 @@ class ParameterSpace:
         """
         scenario = given_scenario(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
-        images = np.arange(len(weights.images))
-        if bounds.mirrored:
-            images = np.minimum(images, weights.images)
-        chosen, parameters = np.unique(images, return_inverse=True)
         weight_names, pathways = weights.names, tuple(scenario.cpg.feedback)
+        shared = np.arange(len(weight_names))
+        if bounds.mirrored:
+            shared = np.minimum(shared, weights.images)
+        chosen, parameters = np.unique(shared, return_inverse=True)
         names = [f"weight {weight_names[i]}" for i in chosen]
         names += [f"gain {name}" for name in pathways]
 
@@ -178,7 +178,7 @@ class ParameterSpace:
         )
 
     def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
-        """The gait with the parameters of a vector. Raises InputError for a vector of another size,
+        """Gait with the parameters of a vector. Raises InputError for a vector of another size,
         a number that is not finite, a weight below 0, or a time constant that is not above 0."""
         vector = self._numbers(vector)
         first_gain = len(self.names) - 2 - len(self.pathways)
@@ -194,8 +194,8 @@ class ParameterSpace:
         )
 
     def vector(self, gait: Gait) -> Vector:
-        """The vector of a gait. If weights are mirrored, the first of each pair is used. Raises
-        InputError if the gait has another number of weights."""
+        """Parameter vector of a gait. If weights are mirrored, the first of each pair is used.
+        Raises InputError if the gait has another number of weights."""
         if len(gait.weights) != len(self.weights):
             problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
             raise InputError("ParameterSpace", f"gait {gait.name}", problem)
@@ -205,7 +205,7 @@ class ParameterSpace:
         return np.concatenate([weights, gains, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:
-        """A random vector: uniform between the bounds, with tau_B = 2 tau_A."""
+        """Random parameter vector: uniform between the bounds, with tau_B = 2 tau_A."""
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
@@ -319,7 +319,7 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
 
 
 class HasBestGait(Protocol):
-    """An object with a best gait, such as a run."""
+    """Object with a best gait, such as a run."""
 
     def best_gait(self) -> Gait: ...
 

@@ -17,13 +17,35 @@ from tetra_drake.settings.units import INCH
 STEP_AHEAD = 1.0 * INCH
 """Distance from the foremost contact node of a robot of usual size to a terrain that begins in
 front of it; see Blueprint.scale."""
+DEEPEST = 1e-3
+"""Largest depth of a node in the ground at the start, as a share of the structure's height."""
 START_DEPTH = 1e-6
 """Tolerance (m) for the depth of a foot in the ground at the start, of a robot of usual size. A
 foot may also be as deep as the weight would press it, because a robot may start in equilibrium."""
 
 
+def lift(scenario: Scenario, placed: Structure) -> float:
+    """Distance (m) to move a structure up so that its feet stand on the ground. A structure that is
+    held along z or without ground is not moved; one with other anchors is not moved down. Raises
+    InputError if a contact node, or a foot of a structure that is held along z, is clearly below
+    the ground."""
+    if not placed.contacts.size:
+        return 0.0
+    stays, shown, heights = placed.held[:, 2].any(), scenario.units.shown, placed.p_WN[:, 2]
+    radius, depths = placed.contact_radius[placed.contacts], -heights[placed.contacts]
+    below = radius + depths if stays else depths
+    i = below.argmax()
+    if below[i] > DEEPEST * (np.ptp(heights) or radius.max()):
+        key = f"robot.nodes.{placed.node_names[placed.contacts[i]]}"
+        what = f"a foot of radius {shown(radius[i], 'm')}" if stays and radius[i] else "it"
+        found = f"{what} starts {shown(below[i], 'm')} below the ground"
+        raise InputError(scenario.name, key, f"{found}, expected on it or above")
+    lift = 0.0 if stays else float((radius + depths).max())
+    return max(0.0, lift) if placed.held.any() else lift
+
+
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:
-    """The ground of a scenario, under a structure.
+    """Ground of a scenario below a structure, in the form of the kernels.
 
     Raises InputError if the terrain cannot be made, or if the structure starts outside the terrain
     or with a contact node in the ground.
@@ -61,7 +83,7 @@ def make_surface(
     terrain_kind: Relief,
     grid: Grid | None = None,
 ) -> Ground:
-    """The ground with these laws and this terrain, without contact nodes. `grid` has the terrain's
+    """Ground with the given laws and terrain, without contact nodes. `grid` has the terrain's
     heights; by default the terrain begins at the origin."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     rows, columns = grid.heights.shape

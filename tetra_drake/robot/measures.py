@@ -44,12 +44,12 @@ class CentrePath:
 
 
 def follow(times: np.ndarray, poses: np.ndarray, structure: Structure) -> CentrePath:
-    """The path of a robot, from the poses (k, n, 7) of its n bodies at times (k,) in s.
+    """Path of a robot's centre of mass, from the poses of its bodies.
 
-    A pose is a quaternion, w first, and the position of the body's origin in m. The heading of a
-    row of tetrahedra is the horizontal direction of the sum of the bodies' x axes, which point
-    forward. Other structures have no heading: they may roll over, and bars may spin about their
-    axes.
+    The poses (k, n, 7) are of n bodies at times (k,) in s. A pose is a quaternion, w first, and the
+    position of the body's origin in m. The heading of a row of tetrahedra is the horizontal
+    direction of the sum of the bodies' x axes, which point forward. Other structures have no
+    heading: they may roll over, and bars may spin about their axes.
     """
     # The shares are exactly 1 if all bodies have the same mass.
     shares = structure.mass / structure.mass[0]

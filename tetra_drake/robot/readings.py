@@ -43,7 +43,7 @@ class Readings(NamedTuple):
 
     @classmethod
     def empty(cls, structure: Structure, count: int) -> Self:
-        """Memory for the readings of a number of robots."""
+        """Readings of a number of robots, not filled yet."""
         sizes = {
             "robots": count,
             "cables": len(structure.cables),
@@ -79,7 +79,7 @@ class Readings(NamedTuple):
         )
 
     def rows(self, which: int | slice) -> Self:
-        """The readings of one robot, or of several. The arrays are views."""
+        """Readings of one robot, or of several, as views of the arrays."""
         return type(self)(*(values[which] for values in self))
 
     def copied(self) -> Self:

@@ -66,7 +66,7 @@ def _add_pose(parent: Element, X: RigidTransform) -> None:
 
 
 def _add_shape(link: Element, purpose: str, shape: Shape, kind: str) -> Element:
-    """Adds a shape of this kind, or a sphere if it has no length."""
+    """Adds a solid of the given kind, or a sphere for a shape without length."""
     element = add_element(link, purpose, name=shape.name)
     _add_pose(element, shape.X_BS)
     solid = add_element(add_element(element, "geometry"), kind if shape.length else "sphere")

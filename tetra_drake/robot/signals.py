@@ -15,7 +15,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.laws.oscillator import make_neurons, network_output
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
+from tetra_drake.robot.network import SteeringSignal, initial_neurons
+from tetra_drake.robot.robot import Robot
 
 
 def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
@@ -58,14 +59,6 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
     return robot.scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
 
-def signals_at(
-    robot: Robot, gait: Gait, times: np.ndarray, *, steering: SteeringSignal | None = None
-) -> np.ndarray:
-    """Signals of the cables (times, m) in N at `times` (s); zero before the start-up time."""
-    samples, cpg = signal_samples(robot, gait, steering), robot.scenario.cpg
-    return interpolated(samples, times, step=cpg.listing_step, start_up=cpg.start_up)
-
-
 def interpolated(
     samples: np.ndarray, times: np.ndarray, *, step: float, start_up: float
 ) -> np.ndarray:
@@ -97,15 +90,17 @@ def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | No
         raise InputError("rate", "", problem)
     period = cpg.listing_step if rate is None else 1.0 / rate
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
-    signals = signals_at(robot, gait, times) / units.force
+    samples = signal_samples(robot, gait)
+    signals = interpolated(samples, times, step=cpg.listing_step, start_up=cpg.start_up)
     names = [f"signal_{i + 1}" for i in range(robot.structure.signals)]
-    cables = zip(names, robot.structure.driven_cables, strict=True)
+    cables = np.array(robot.structure.cable_names)
+    driven = [" + ".join(cables[list(group)]) for group in robot.structure.groups]
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
         f"# time_s: time in s; signal_i: force in {units.force_name} that shortens the cables",
-        *(f"# {name}: {driven}" for name, driven in cables),
+        *(f"# {name}: {cables_of}" for name, cables_of in zip(names, driven, strict=True)),
         ",".join(["time_s", *names]),
     ]
     with whole_file(path) as temporary:
-        columns, top = np.column_stack([times, signals]), "\n".join(header)
+        columns, top = np.column_stack([times, signals / units.force]), "\n".join(header)
         np.savetxt(temporary, columns, delimiter=",", header=top, comments="", fmt="%.12g")

@@ -52,11 +52,20 @@ def find_statics(
     allowed = null_space(motions[held], TOLERANCE)
     self_stresses = null_space(allowed.T @ wrenches, TOLERANCE)
     rank = len(cable_ends) - self_stresses.shape[1]
-    idle = _spins(p_WN, body_of_node)
+
+    idle = []  # spins of straight bodies about their axes; of points about all axes
+    for body in range(bodies):
+        p = p_WN[body_of_node == body]
+        _, sizes, axes = np.linalg.svd(p - p[0])
+        if sizes[1:].max(initial=0.0) > TOLERANCE:
+            continue
+        for axis in axes[:1] if len(p) > 1 else axes:
+            spin = np.zeros((bodies, 6))
+            spin[body] = np.concatenate([axis, np.cross(p[0], axis)])
+            idle.append(spin.ravel())
     if not held.any():
-        whole = np.tile(np.eye(6), (idle.shape[0] // 6, 1))
-        idle = np.hstack([idle, whole])  # a structure on one line spins as its bodies do
-    uncounted = np.linalg.matrix_rank(idle, tol=TOLERANCE) if idle.size else 0
+        idle += [*np.tile(np.eye(6), bodies)]  # a structure on one line spins as its bodies do
+    uncounted = np.linalg.matrix_rank(np.array(idle), tol=TOLERANCE) if idle else 0
     return Statics(self_stresses.T, mechanisms=int(allowed.shape[1] - rank - uncounted))
 
 
@@ -90,20 +99,3 @@ def cable_wrenches(
     wrenches[body_of_node[node_a], :, cables] = wrench
     wrenches[body_of_node[node_b], :, cables] = -wrench
     return wrenches[:bodies].reshape(6 * bodies, len(cables))
-
-
-def _spins(p_WN: np.ndarray, body_of_node: np.ndarray) -> np.ndarray:
-    """Spins (6 B, spins) of the straight ones of B bodies about their axes; of points about all
-    axes."""
-    bodies = body_of_node.max() + 1
-    spins = []
-    for body in range(bodies):
-        p = p_WN[body_of_node == body]
-        _, sizes, axes = np.linalg.svd(p - p[0])
-        if sizes[1:].max(initial=0.0) > TOLERANCE:
-            continue
-        for axis in axes[:1] if len(p) > 1 else axes:
-            spin = np.zeros((bodies, 6))
-            spin[body] = np.concatenate([axis, np.cross(p[0], axis)])
-            spins.append(spin.ravel())
-    return np.array(spins).reshape(-1, 6 * bodies).T

@@ -23,7 +23,6 @@ from pydrake.multibody.tree import (
 )
 
 from tetra_drake.laws import cable, kinematics
-from tetra_drake.laws.capsules import StrutSearch
 from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
@@ -33,12 +32,6 @@ from tetra_drake.scenario.blueprint import Blueprint
 STRUT_COLOUR, NODE_COLOUR = (0.33, 0.55, 0.72, 1.0), (0.13, 0.15, 0.18, 1.0)
 PASSIVE_COLOUR, ACTUATED_COLOUR = (0.0, 0.62, 0.45, 1.0), (0.76, 0.09, 0.36, 1.0)
 """Colours of struts, spheres and cables in Drake's SceneGraph and in files for simulators."""
-SKIN = 0.05
-"""Gap at which two struts count as near, as a share of the shortest strut. With a larger one, more
-pairs are near; with a smaller one, near pairs are searched more often."""
-PASSAGE = 0.5
-"""Distance that a step may carry a strut into another, as a share of the least radius. Struts pass
-through each other at four times this distance."""
 SLENDERNESS = 100.0
 """Size of a robot without struts, divided by the least radius that is shown."""
 
@@ -78,45 +71,42 @@ class Structure(Blueprint):
             q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (len(mass), 1)),
         )
 
-    @functools.cached_property
-    def drivers(self) -> np.ndarray:
-        """Index of the oscillator that drives each cable (cables,); PASSIVE if there is none."""
-        drivers = np.full(len(self.cable_names), cable.PASSIVE)
-        for oscillator, cables in enumerate(self.groups):
-            drivers[list(cables)] = oscillator
-        return drivers
+    def turned(self, slope: float) -> Self:
+        """The structure turned with an incline: the ground rises by `slope` (rad) along x, and the
+        bodies turn about the world's y axis."""
+        # Written out, because processors round a product of matrices differently.
+        s, c = math.sin(slope), math.cos(slope)
+        forward, left, up = self.p_WB.T
+        p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+        s, c = math.sin(slope / 2), math.cos(slope / 2)
+        w, x, y, z = self.q_WB.T
+        q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
+        return dataclasses.replace(self, p_WB=p_WB, q_WB=q_WB)
 
     @functools.cached_property
     def cables(self) -> np.ndarray:
         """Cables with their constants: records (cables,) of dtype CABLE."""
         cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
-        cables["signal"] = self.drivers
+        cables["signal"] = cable.PASSIVE
+        for oscillator, driven in enumerate(self.groups):
+            cables["signal"][list(driven)] = oscillator
         for name in cable.CableLaw._fields:
             cables[name] = [law[name] for law in self.cable_laws]
         return cables
 
     @functools.cached_property
     def strut_table(self) -> Struts:
-        """The struts in the form of the kernels."""
+        """Struts as arrays for the kernels."""
         node_a, node_b = self.struts.T
         first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
         length = np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1)
         return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
 
     @property
-    def strut_search(self) -> StrutSearch:
-        """Distances of the search for struts that may touch; zeros if there are no struts."""
-        if not self.strut_radius.size:
-            return StrutSearch(0.0, drift=0.0, passage=0.0, lightest=self.mass.min())
-        skin = SKIN * self.strut_table.length.min()
-        near, passage = 2.0 * self.strut_radius.max() + skin, PASSAGE * self.strut_radius.min()
-        return StrutSearch(near, drift=0.25 * skin, passage=passage, lightest=self.mass.min())
-
-    @property
     def least_radius(self) -> float:
-        """Radius (m) of the thinnest strut. What is shown is as thick at least, also if there are
-        no struts."""
+        """Radius (m) of the thinnest strut, or a hundredth of the size of a robot without struts.
+        Shapes that are drawn have at least this radius."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return float(self.strut_radius.min()) if self.strut_radius.size else size / SLENDERNESS
 
@@ -146,7 +136,7 @@ class Structure(Blueprint):
 
     @property
     def anchors(self) -> AnchorSprings:
-        """The anchors of the bodies' nodes. They hold the nodes where the blueprint has them."""
+        """Springs that hold nodes of bodies at their positions in the settings."""
         nodes = np.flatnonzero(self.anchor_stiffness.any(axis=1))
         return AnchorSprings(
             nodes,
@@ -193,23 +183,6 @@ class Structure(Blueprint):
         """Lengths of the cables (cables,) in m at t = 0."""
         node_a, node_b = node_positions(self, self.initial_state)[self.cable_ends.T]
         return np.asarray(np.linalg.norm(node_b - node_a, axis=1))
-
-
-def turn_with_slope(
-    p_WB: np.ndarray, q_WB: np.ndarray, slope: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (bodies, 3) and quaternions (bodies, 4), w first, of bodies turned with an incline.
-
-    The ground rises by `slope` (rad) along x; bodies turn about the world's y axis.
-    """
-    # Written out, because processors round a product of matrices differently.
-    s, c = math.sin(slope), math.cos(slope)
-    forward, left, up = p_WB.T
-    turned_p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
-    s, c = math.sin(slope / 2), math.cos(slope / 2)
-    w, x, y, z = q_WB.T
-    turned_q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
-    return turned_p_WB, turned_q_WB
 
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:

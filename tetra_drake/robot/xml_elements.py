@@ -23,5 +23,5 @@ def xml_text(root: Element) -> str:
 
 
 def _written(value: Any) -> str:
-    """Numbers with all their digits; a text as it is."""
+    """Text of an attribute: numbers with all their digits."""
     return value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))

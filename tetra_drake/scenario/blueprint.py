@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+import itertools
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
 
+from tetra_drake.laws.cable import CableLaw, elastic_tension
+from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.model import WORLD
+from tetra_drake.settings.refusals import hint, refuse
 
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
@@ -18,6 +23,19 @@ TOLERANCE = 1e-6
 USUAL_SIZES = 0.1, 1.0
 """Least and greatest size (m) of robots for which areas of terrain, margins of figures and other
 lengths are chosen. They grow and shrink with other robots. See Blueprint.scale."""
+
+LONGEST, SHORTEST = 1e4, 1e-6
+"""Limits for the length of a strut, in m. The first is also the largest coordinate of a node."""
+
+THINNEST = 1e-5
+"""Least diameter of a strut, as a share of its length. In thinner struts the moment of inertia
+about the axis would be too small beside the others."""
+
+LIGHTEST = 1e-12
+"""Least mass of a strut, in kg."""
+
+LEAST_DISTANCE = 1e-3
+"""Least distance between two nodes, as a share of the shortest strut."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +60,8 @@ class Blueprint:
     """Positions of the nodes (nodes, 3) in the frames F; of fixed nodes in the world."""
     struts: np.ndarray
     """Indices of the two nodes of each strut (struts, 2)."""
+    strut_keys: tuple[str, ...]
+    """Settings of the struts, such as "struts.bar.pairs[0]", for messages."""
     strut_radius: np.ndarray
     """Radii of the struts (struts,)."""
     strut_density: np.ndarray
@@ -65,23 +85,27 @@ class Blueprint:
     """Damping (nodes, 3) beside `anchor_stiffness`."""
     payload: np.ndarray
     """Point masses at the centres of mass (bodies,)."""
+    offsets: np.ndarray
+    """Displacements (bodies, 3) of the bodies at the start."""
     cable_names: tuple[str, ...]
     """Names of the cables, such as "T1-T2 outer bottom_left", in the order of pairs of bodies.
     Cables from fixed nodes come first."""
     cable_groups: tuple[str, ...]
     """Group of each cable, such as "outer"."""
+    cable_keys: tuple[str, ...]
+    """Settings of the cables, such as "cables.side.pairs[0]", for messages."""
     cable_ends: np.ndarray
     """Indices of the two nodes of each cable (cables, 2), from the lower body to the higher."""
     cable_laws: tuple[Mapping[str, float], ...]
     """Constants of each cable, by the names of laws.cable.CableLaw."""
     slack: bool
     """True if cables go slack instead of pushing."""
-    oscillators: tuple[str, ...]
-    """Names of the m oscillators, such as "T1-T2"."""
-    groups: tuple[tuple[int, ...], ...]
-    """Indices of the cables that each oscillator drives (m)."""
     contacts: np.ndarray
     """Indices of the nodes that the ground can touch (contacts,), ascending."""
+    oscillators: tuple[str, ...] = ()
+    """Names of the m oscillators, such as "T1-T2"."""
+    groups: tuple[tuple[int, ...], ...] = ()
+    """Indices of the cables that each oscillator drives (m)."""
     markers: np.ndarray = field(default_factory=lambda: np.array([], dtype=int))
     """Indices of the nodes whose motion is shown (markers,), in the order of the bodies. Empty if
     the motion of the centre of mass is shown."""
@@ -120,7 +144,8 @@ class Blueprint:
 
     @property
     def scale(self) -> float:
-        """Factor on lengths that suit robots of USUAL_SIZES; 1 for these."""
+        """Factor by which lengths such as margins of figures grow or shrink with the robot; 1 for
+        robots of USUAL_SIZES."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return size / min(max(size, USUAL_SIZES[0]), USUAL_SIZES[1]) or 1.0  # a point has no size
 
@@ -129,23 +154,10 @@ class Blueprint:
         """Number of actuation signals: one per oscillator."""
         return len(self.oscillators)
 
-    @property
-    def driven_cables(self) -> tuple[str, ...]:
-        """Names of each oscillator's cables, such as "T1-T2 outer top + T1-T2 inner top"."""
-        names = self.cable_names
-        return tuple(" + ".join(names[cable] for cable in group) for group in self.groups)
-
-    @property
-    def ahead(self) -> np.ndarray:
-        """Index of the last body that each oscillator's cables join (m,)."""
-        bodies = self.carriers[self.cable_ends]
-        last = [bodies[list(cables)].max() for cables in self.groups]
-        return np.array(last, dtype=np.int64)
-
     @functools.cached_property
     def sides(self) -> np.ndarray:
         """Side of each oscillator's cables (m,): 1.0 left, -1.0 right, 0.0 neither."""
-        y, least = self._ends.mean(axis=1)[:, 1], self._least_distance
+        y, least = self.p_WN[self.cable_ends].mean(axis=1)[:, 1], self._least_distance
         is_left = [(y[list(cables)] > least).all() for cables in self.groups]
         is_right = [(y[list(cables)] < -least).all() for cables in self.groups]
         return np.array(is_left, dtype=float) - np.array(is_right, dtype=float)
@@ -154,9 +166,18 @@ class Blueprint:
     def images(self) -> tuple[int | None, ...]:
         """Index of the oscillator that drives the mirror image of each oscillator's cables (m);
         None if there is none."""
+        ends = self.p_WN[self.cable_ends]
+        image_of_cable: list[int] = []
+        for mirrored, group in zip(ends * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
+            forward = np.abs(ends - mirrored).max(axis=(1, 2))
+            backward = np.abs(ends - mirrored[::-1]).max(axis=(1, 2))
+            found = np.flatnonzero(np.minimum(forward, backward) <= self._least_distance).tolist()
+            # Of parallel cables, the image is one of the same group.
+            alike = [cable for cable in found if self.cable_groups[cable] == group]
+            image_of_cable.append(next(iter(alike or found), -1))
+
         groups = [set(cables) for cables in self.groups]
-        image = self._images_of_cables()
-        images = [{image[cable] for cable in cables} for cables in self.groups]
+        images = [{image_of_cable[cable] for cable in cables} for cables in self.groups]
         return tuple(groups.index(cables) if cables in groups else None for cables in images)
 
     @property
@@ -173,42 +194,156 @@ class Blueprint:
         steps = np.minimum(shortest_path(near, unweighted=True), count)
         return np.where(same, 0.0, steps)
 
-    def with_oscillator_per_cable(self, *, without_law: bool) -> Self:
-        """The robot with one oscillator for each driven cable, group by group.
+    def with_oscillators(self, actuated: Mapping[str, Sequence[str]]) -> Self:
+        """The robot with other oscillators, given by the names of their cables.
 
-        With `without_law`, the constants of driven cables are 0, so the force of a cable is its
-        signal.
+        Args:
+            actuated: names of the cables that each oscillator drives, such as "side a1 b1", with
+                the two nodes in either order.
+
+        Raises:
+            InputError: names the key in `actuated` of an unknown cable, or of one that has an
+                oscillator already.
         """
-        driven = [cable for group in self.groups for cable in group]
-        laws = [
-            dict.fromkeys(law, 0.0) if without_law and cable in driven else law
-            for cable, law in enumerate(self.cable_laws)
-        ]
-        return dataclasses.replace(
-            self,
-            cable_laws=tuple(laws),
-            oscillators=tuple(self.cable_names[cable] for cable in driven),
-            groups=tuple((cable,) for cable in driven),
-        )
+        numbers: dict[str, int] = {}
+        for number, name in enumerate(self.cable_names):
+            group, first, second = name.split()
+            numbers[name] = numbers[f"{group} {second} {first}"] = number
+
+        drivers: dict[int, str] = {}
+        for oscillator, names in actuated.items():
+            for i, name in enumerate(names):
+                key = f"actuated.{oscillator}[{i}]"
+                if name not in numbers:
+                    refuse(key, f"found unknown cable '{name}'; {hint(name, numbers)}")
+                cable = numbers[name]
+                if cable in drivers:
+                    found = f"found '{self.cable_names[cable]}', which '{drivers[cable]}' drives"
+                    refuse(key, f"{found}, expected it once")
+                drivers[cable] = oscillator
+
+        groups = tuple(tuple(numbers[name] for name in names) for names in actuated.values())
+        return dataclasses.replace(self, oscillators=tuple(actuated), groups=groups)
+
+    def check(self) -> None:
+        """Raises InputError, naming the key, for a robot that the laws cannot compute."""
+        self.check_struts()
+        self._check_bodies()
+        self._check_cables()
+
+        sizes = np.diff(self.first_node)
+        is_bent = sizes[self.carriers[self.struts[:, 0]]] > 2
+        for strut in np.flatnonzero(is_bent & np.isfinite(self.strut_stiffness)):
+            _, group, _ = self.strut_keys[strut].split(".")
+            name = " ".join([group, *(self.node_names[node] for node in self.struts[strut])])
+            problem = f"the strut {name} is part of a rigid body of several struts"
+            refuse(f"struts.{group}.axial_stiffness", problem)
+
+        for first, end in itertools.pairwise(self.first_node):
+            p, held = self.p_WN[first:end], self.held[first:end]
+            motions = rigid_motions((p - p[0]) / (np.ptp(p, axis=0).max() or 1.0))
+            # The spin of a straight body does not count.
+            ways = np.linalg.matrix_rank(motions.reshape(-1, 6), tol=LEAST_DISTANCE)
+            if np.linalg.matrix_rank(motions[held], tol=LEAST_DISTANCE) < ways:
+                break
+        else:
+            refuse("anchors", "hold every body, expected one that can move")
+        if not self.contacts.size:
+            refuse("contacts", "found none, expected one node at least")
+        self.check_lists()
+
+    def check_struts(self) -> None:
+        """Raises InputError for a strut whose size is too extreme for the computation of forces."""
+        lengths, diameters = self._distances(self.struts), 2.0 * self.strut_radius
+        masses = math.pi * self.strut_radius**2 * lengths * self.strut_density
+        struts = zip(self.strut_keys, lengths, diameters, masses, strict=True)
+        for key, length, diameter, mass in struts:
+            if not SHORTEST <= length <= LONGEST:
+                refuse(key, f"is {length:.3g} m long, expected {SHORTEST:g} m to {LONGEST:g} m")
+            if diameter < THINNEST * length:
+                thick = f"is {diameter:.3g} m thick and {length:.3g} m long"
+                refuse(key, f"{thick}, expected a diameter of at least {THINNEST:g} of the length")
+            if 0.0 < mass < LIGHTEST:
+                refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
+
+    def check_lists(self) -> None:
+        """Raises InputError for a list of settings that does not have one item per body."""
+        bodies = len(self.bodies)
+        for key, items in (("offsets", self.offsets), ("payload", self.payload)):
+            if len(items) != bodies:
+                expected = f"expected none or {bodies}, one for each body"
+                refuse(key, f"found {len(items)} items, {expected}")
+
+    def _check_bodies(self) -> None:
+        """Refuses bodies of hardly any mass, and nodes at one place.
+
+        The point masses of a body with several nodes do not count, as they have no inertia about
+        the line between two of them.
+        """
+        sizes, moving = np.diff(self.first_node), self.first_node[-1]
+        of_struts = math.pi * self.strut_radius**2 * self.strut_density
+        of_struts *= self._distances(self.struts)
+        of_nodes = 4.0 / 3.0 * math.pi * self.node_radius**3 * self.node_density
+        of_nodes[:moving] += np.where(np.repeat(sizes, sizes) == 1, self.node_mass[:moving], 0.0)
+        mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
+        np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
+        if mass.min() < LIGHTEST:
+            node = self.first_node[mass.argmin()]
+            without = "" if self.node_mass[node] else "without point masses "
+            problem = f"is on a body whose mass {without}is {mass.min():.3g} kg"
+            expected = f"expected at least {LIGHTEST:g} kg"
+            refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
+
+        p_WN, least = self.p_WN, LEAST_DISTANCE * self.shortest
+        for node in range(1, len(p_WN)):
+            distances = np.linalg.norm(p_WN[:node] - p_WN[node], axis=1)
+            if distances.min() < least:
+                problem = f"found the place of '{self.node_names[distances.argmin()]}'"
+                expected = f"expected nodes {least:.3g} m apart"
+                refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
+
+    def _check_cables(self) -> None:
+        """Refuses cables that join no two bodies, bodies that no cables join to the others, and
+        tensions without a free length."""
+        pairs = self.carriers[self.cable_ends]
+        for key, (first, second) in zip(self.cable_keys, pairs.tolist(), strict=True):
+            if first == second == WORLD:
+                refuse(key, "joins two fixed nodes, expected a node of a strut")
+            if first == second:
+                problem = f"joins the body '{self.bodies[first]}' to itself"
+                refuse(key, f"{problem}, expected nodes of two bodies")
+
+        joined = np.arange(len(self.bodies) + 1)  # equal numbers if joined; the last: the world
+        anchored = self.carriers[self.held.any(axis=1)]
+        for first, second in [*pairs, *((WORLD, body) for body in anchored)]:
+            joined[joined == joined[first]] = joined[second]
+        apart = np.flatnonzero(joined[:WORLD] != joined[0])
+        if apart.size:
+            problem = (
+                f"no cables lead from the body '{self.bodies[apart[0]]}' to '{self.bodies[0]}'"
+            )
+            refuse("cables", f"{problem}, expected all bodies to be joined")
+
+        for cable, length in enumerate(self._distances(self.cable_ends)):
+            law = CableLaw(**self.cable_laws[cable])
+            if law.free_length < 0.0:
+                tension = round(elastic_tension(length - law.free_length, law), 12)
+                most = elastic_tension(length, law._replace(free_length=0.0))
+                expected = f"expected at most {most:.4g} N for '{self.cable_names[cable]}'"
+                problem = f"found {tension} N, {expected}, where its free length is 0"
+                refuse(f"cables.{self.cable_groups[cable]}.tension", problem)
 
     @property
-    def _ends(self) -> np.ndarray:
-        """Positions of the two ends of each cable (cables, 2, 3)."""
-        return self.p_WN[self.cable_ends]
+    def shortest(self) -> float:
+        """Length (m) of the shortest strut, or of the shortest cable if there are no struts."""
+        pairs = self.struts if len(self.struts) else self.cable_ends
+        return float(self._distances(pairs).min()) if len(pairs) else 0.0
+
+    def _distances(self, pairs: np.ndarray) -> np.ndarray:
+        """Distances (pairs,) in m of two nodes each (pairs, 2)."""
+        ends = self.p_WN[pairs]
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     @property
     def _least_distance(self) -> float:
         return TOLERANCE * float(np.linalg.norm(np.ptp(self.p_WN, axis=0)))
-
-    def _images_of_cables(self) -> list[int]:
-        """Index of the mirror image of each cable; -1 if there is none."""
-        placed, least = self._ends, self._least_distance
-        images: list[int] = []
-        for ends, group in zip(placed * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
-            forward = np.abs(placed - ends).max(axis=(1, 2))
-            backward = np.abs(placed - ends[::-1]).max(axis=(1, 2))
-            found = np.flatnonzero(np.minimum(forward, backward) <= least).tolist()
-            # Of parallel cables, the image is one of the same group.
-            alike = [cable for cable in found if self.cable_groups[cable] == group]
-            images.append(next(iter(alike or found), -1))
-        return images

@@ -23,7 +23,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.ntrt_assembly import Assembly, Place, Rule, TaggedPair
 from tetra_drake.scenario.ntrt_file import CLASSES, Builder
-from tetra_drake.scenario.robot_structure import Member, StructureFile, components
+from tetra_drake.scenario.robot_structure import StructureFile, components
 from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Tree
 
@@ -37,12 +37,12 @@ _LOG = logging.getLogger("tetra_drake")
 
 
 def ntrt_tree(file: Path, *, unit: float) -> Tree:
-    """The tree of a structure file for a file of NTRT.
+    """Content of a structure file that stands for a file of NTRT.
 
-    unit: length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z (up). A
-    substructure's nodes are named "SUBSTRUCTURE/NODE", groups by their tags joined by slashes, as
-    dots separate keys. What is left out is noted in the log. Raises InputError that names file and
-    key, for substructures too.
+    `unit` is the length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z
+    (up). A substructure's nodes are named "SUBSTRUCTURE/NODE", groups by their tags joined by
+    slashes, as dots separate keys. What is left out is noted in the log. Raises InputError that
+    names file and key, for substructures too.
     """
     whole = Assembly()
     for name, (_, _, tag) in CLASSES.items():
@@ -81,7 +81,7 @@ class _Translation:
     """What is left out or changed: names by texts."""
 
     def add_all(self) -> None:
-        """Adds what moves, and what it hangs on."""
+        """Adds all parts that move, and the fixed nodes that cables join to them."""
         ignored = [name for rule in self.whole.rules for name in rule.builder.ignored]
         for name in ignored:
             self._note("not used, as the scenario has its own", name)
@@ -89,7 +89,7 @@ class _Translation:
         self.tree |= {"nodes": {}, "struts": {}, "cables": {}, "spheres": {}}
         parts = list(self._parts())
         solids = [(pair.nodes, made) for pair, made, _ in parts if made.kind != "cables"]
-        bodies = components(Member("", "", nodes) for nodes, _ in solids)
+        bodies = components(nodes for nodes, _ in solids)
         body_of = {node: number for number, nodes in enumerate(bodies) for node in nodes}
         dense = {body_of[first] for (first, _), made in solids if made.parameters.density}
         body_of = {node: body if body in dense else WORLD for node, body in body_of.items()}
@@ -115,7 +115,7 @@ class _Translation:
                 self._note("left out, as nothing uses them", name)
 
     def _effective(self, parts: list[_Part], body_of: dict[str, int]) -> Iterator[_Part]:
-        """Parts that have an effect. `body_of` has the body of each node of one."""
+        """Parts without those that have no effect. `body_of` is the body of each node."""
         dense = {frozenset(pair.nodes) for pair, made, _ in parts if made.parameters.density}
         for pair, builder, at in parts:
             (first, second), is_cable = pair.nodes, builder.kind == "cables"
@@ -134,8 +134,7 @@ class _Translation:
 
     @functools.cached_property
     def _one_of(self) -> dict[str, str]:
-        """The node that stands for each node: the first one at its place. Nodes of pairs come
-        first."""
+        """The first node with the same coordinates, for each node. Nodes of pairs come first."""
         ends = (end for pair in self.whole.pairs for end in pair.nodes)
         names = list(dict.fromkeys([*ends, *self.whole.nodes]))
         p = np.array([self.whole.nodes[name] for name in names]).reshape(-1, 3)

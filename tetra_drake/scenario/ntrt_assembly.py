@@ -31,7 +31,7 @@ Ends = tuple[str, str]
 
 
 class Place(NamedTuple):
-    """Place in a file, for messages."""
+    """File and key, for error messages."""
 
     file: Path
     key: str
@@ -158,7 +158,7 @@ class Assembly:
             self.pairs.append(one._replace(nodes=(first, second)))
 
     def _numbered(self, shared: TaggedPair, pairs: list[Pair]) -> Iterator[tuple[Pair, TaggedPair]]:
-        """Pairs of a list, with what they share and their own places."""
+        """Pairs of a list, each with its tags and its key in the file."""
         _check_size(len(self.pairs) + len(pairs), MOST_PAIRS, shared.place)
         for number, pair in enumerate(pairs):
             place = shared.place._replace(key=f"{shared.place.key}[{number}]")
@@ -221,7 +221,7 @@ class Assembly:
 
 
 def _shared(tags: str, part: str, place: Place) -> TaggedPair:
-    """What the pairs of a list share. `tags` is its key."""
+    """Tags and place that the pairs of a list have in common. `tags` is the key of the list."""
     return TaggedPair(" ".join(tags.split()), _tags(tags), part, place)
 
 
@@ -233,7 +233,7 @@ def _check_size(count: int, most: int, place: Place) -> None:
 
 
 def _least_nested(names: Iterable[str], part: str, tags: str, place: Place, what: str) -> str:
-    """The least nested name inside a part with all tags. `what` tells what is missing."""
+    """The least nested name inside a part that has all tags. `what` is for the error message."""
     inside = [name for name in names if name.startswith(part) and name != part]
     fitting = [name for name in inside if _tags(tags) <= _tags(_last(name))]
     if not fitting or not tags:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
@@ -56,43 +55,6 @@ def tetrahedron_nodes(strut_length: float) -> np.ndarray:
     return np.array([*base, [3 * height / 4, 0.0, 0.0]])
 
 
-def cable_nodes(junction: int, cable: str) -> tuple[int, int]:
-    """Indices of the two nodes of a junction's cable. Each tetrahedron has 4 nodes."""
-    role, name = cable.split()
-    front = NODES.index(name)
-    rear = front if role == "outer" else TIP
-    return 4 * junction + rear, 4 * (junction + 1) + front
-
-
-def check_one_per_body(key: str, items: Sequence[object], bodies: int) -> None:
-    """Refuses a list that is not empty and does not have one item per body."""
-    if len(items) not in (0, bodies):
-        refuse(key, f"found {len(items)} items, expected none or {bodies}, one for each body")
-
-
-LONGEST, SHORTEST = 1e4, 1e-6
-"""Limits for the length of a strut, in m. The first is also the largest coordinate of a node."""
-
-THINNEST = 1e-5
-"""Least diameter of a strut, as a share of its length. In thinner struts the moment of inertia
-about the axis would be too small beside the others."""
-
-LIGHTEST = 1e-12
-"""Least mass of a strut, in kg."""
-
-
-def check_strut(key: str, *, length: float, diameter: float, density: float) -> None:
-    """Refuses a strut with a size (SI units) that is too extreme for the computation of forces."""
-    if not SHORTEST <= length <= LONGEST:
-        refuse(key, f"is {length:.3g} m long, expected {SHORTEST:g} m to {LONGEST:g} m")
-    if diameter < THINNEST * length:
-        thick = f"is {diameter:.3g} m thick and {length:.3g} m long"
-        refuse(key, f"{thick}, expected a diameter of at least {THINNEST:g} of the length")
-    mass = 0.25 * math.pi * diameter**2 * length * density
-    if density and mass < LIGHTEST:
-        refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
-
-
 class RowCables(CableConstants):
     """The cables of a row (Table 3)."""
 
@@ -115,15 +77,13 @@ Spacing = Annotated[float, *quantity("m", balanced=0.0)]
 
 
 class Tetrahedra(Section):
-    """The tetrahedra with their initial positions (thesis section 2.1, appendix C.1)."""
+    """Row of nested tetrahedra with its initial positions (thesis section 2.1, appendix C.1)."""
 
     unit: ClassVar[None] = None
     """Unit of coordinates; it has none."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
     """Properties that some metrics need and this robot does not have."""
-    ignored: ClassVar[None] = None
-    """See StructureFile; a row is not imported."""
 
     tetrahedra: int = Field(ge=2, le=200)
     """Number of tetrahedra; T1 is the rearmost."""
@@ -160,16 +120,6 @@ class Tetrahedra(Section):
         return self.tetrahedra
 
     @property
-    def body_names(self) -> tuple[str, ...]:
-        """Names of the bodies; T1 is the rearmost."""
-        return tuple(f"T{i + 1}" for i in range(self.tetrahedra))
-
-    @property
-    def slack(self) -> bool:
-        """True if the cables never push."""
-        return self.cables.slack
-
-    @property
     def size(self) -> float:
         """Spacing of the tetrahedra (m); the unit of `disturbances.start`."""
         return self.spacing
@@ -180,18 +130,23 @@ class Tetrahedra(Section):
         Base triangles are vertical, with two nodes at height 0. The base of T1 is at x = 0. Tips
         point forward (+x) into the next tetrahedron.
         """
-        n, junctions, bodies = self.tetrahedra, self.tetrahedra - 1, self.body_names
+        n, junctions = self.tetrahedra, self.tetrahedra - 1
+        bodies = tuple(f"T{i + 1}" for i in range(n))
         p_FN = tetrahedron_nodes(self.strut_length)
         x, _, z = p_FN[BOTTOM_LEFT]
         bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
         thesis = [*bottom, 4 * (n - 1) + TIP]
         struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
         names = [f"{rear}-{front}" for rear, front in itertools.pairwise(bodies)]
-        ends = [cable_nodes(junction, cable) for junction in range(junctions) for cable in CABLES]
+        ends = []
+        for cable in CABLES:
+            role, name = cable.split()
+            front = NODES.index(name)
+            ends.append([front if role == "outer" else TIP, 4 + front])
         several = len(self.actuation) > 1
         labels = [f" {' + '.join(group)}" if several else "" for group in self.actuation]
         driven = [[CABLES.index(cable) for cable in group] for group in self.actuation]
-        first_cables = range(0, len(ends), len(CABLES))  # of the junctions
+        first_cables = range(0, len(CABLES) * junctions, len(CABLES))
         return Blueprint(
             bodies=bodies,
             node_names=tuple(f"{body} {node}" for body in bodies for node in NODES),
@@ -199,6 +154,7 @@ class Tetrahedra(Section):
             p_WF=np.array([[i * self.spacing - x, 0.0, -z] for i in range(n)]),
             p_FN=np.tile(p_FN, (n, 1)),
             struts=np.array(struts),
+            strut_keys=("strut_length",) * len(struts),
             strut_radius=np.full(len(struts), self.strut_diameter / 2),
             strut_stiffness=np.full(len(struts), math.inf),
             strut_density=np.full(len(struts), self.density),
@@ -210,11 +166,13 @@ class Tetrahedra(Section):
             anchor_stiffness=np.zeros((4 * n, 3)),
             anchor_damping=np.zeros((4 * n, 3)),
             payload=np.array(self.payload or [0.0] * n),
+            offsets=np.array(self.offsets or np.zeros((n, 3))),
             cable_names=tuple(f"{name} {cable}" for name in names for cable in CABLES),
             cable_groups=tuple(cable.split()[0] for cable in CABLES) * junctions,
-            cable_ends=np.array(ends),
+            cable_keys=("cables",) * (len(CABLES) * junctions),
+            cable_ends=np.vstack([np.add(ends, 4 * junction) for junction in range(junctions)]),
             cable_laws=tuple(self.cables.law(cable) for cable in CABLES) * junctions,
-            slack=self.slack,
+            slack=self.cables.slack,
             oscillators=tuple(name + label for name in names for label in labels),
             groups=tuple(tuple(i + k for k in group) for i in first_cables for group in driven),
             contacts=np.array(thesis if self.contacts == "thesis" else range(4 * n)),
@@ -230,8 +188,11 @@ class Tetrahedra(Section):
         or cables changed and no spacing was given."""
         if not isinstance(base, Tetrahedra) or "spacing" in changes:
             return {}
-        is_other = _deciding_numbers(self) != _deciding_numbers(base)
-        return {"spacing": "balanced"} if is_other else {}
+        deciding = []  # strut length, and all constants of cables at rest
+        for robot in (self, base):
+            laws = [robot.cables.law(cable) for cable in ("outer top", "inner top")]
+            deciding.append([robot.strut_length, *(law | {"damping": 0.0} for law in laws)])
+        return {"spacing": "balanced"} if deciding[0] != deciding[1] else {}
 
     @field_validator("spacing")
     @classmethod
@@ -242,10 +203,9 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        sizes = {"length": self.strut_length, "diameter": self.strut_diameter}
-        check_strut("strut_length", **sizes, density=self.density)
-        check_one_per_body("offsets", self.offsets, self.tetrahedra)
-        check_one_per_body("payload", self.payload, self.tetrahedra)
+        blueprint = self.blueprint()
+        blueprint.check_struts()
+        blueprint.check_lists()
         cables = [cable for group in self.actuation for cable in group]
         for cable in cables:
             if cables.count(cable) > 1:
@@ -280,9 +240,3 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
         else:
             near = middle
     return far
-
-
-def _deciding_numbers(robot: Tetrahedra) -> tuple[object, ...]:
-    """Numbers that determine the balanced spacing: all constants of the law of a cable at rest."""
-    laws = [robot.cables.law(cable) | {"damping": 0.0} for cable in ("outer top", "inner top")]
-    return robot.strut_length, *laws

@@ -78,11 +78,11 @@ def with_structure(tree: Tree, source: object) -> Tree:
 
 
 def _structure(content: Any, file: Path) -> StructureFile:
-    """The structure of a file's content. Nodes that are left out are noted in the log."""
+    """Structure from the content of a file. Nodes that are left out are noted in the log."""
     structure = StructureFile.from_tree(content, file)
-    if structure.unused:
-        names = ", ".join(structure.unused)
-        _LOG.warning("%s: nodes that nothing uses are left out: %s", file, names)
+    used = structure.blueprint().node_names
+    if unused := [node for node in structure.nodes if node not in used]:
+        _LOG.warning("%s: nodes that nothing uses are left out: %s", file, ", ".join(unused))
     return structure
 
 

@@ -23,12 +23,13 @@ from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.kinematics import FORCE, rigid_motions
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.results.trajectory import Motion, make_dataset
-from tetra_drake.robot.elastic_struts import condensed
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.ground import START_DEPTH
-from tetra_drake.robot.robot import BEARS, Robot, equilibrium_of, overlaps, undisturbed_structure
+from tetra_drake.robot.remarks import BEARS, sinking_remark
+from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.struts import condensed, overlaps
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
@@ -166,7 +167,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     friction = given.friction.without_bristles()
     scenario = given.with_sections(friction=friction, engine=Mujoco())
     try:
-        robot = Robot.of(scenario, undisturbed_structure(scenario, may_overlap=True))
+        robot = Robot.of(scenario, at_rest=True)
         if is_scenario:
             return robot
         p_WN = node_positions(robot.structure, robot.structure.initial_state)
@@ -176,7 +177,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
             return robot
         damping = given.ground.damping * least / given.ground.stiffness
         firm = scenario.with_numbers({"ground.stiffness": least, "ground.damping": damping})
-        return Robot.of(firm, undisturbed_structure(firm, may_overlap=True))
+        return Robot.of(firm, at_rest=True)
     except InputError as error:
         key = error.key if is_scenario else error.key.removeprefix("robot.")
         raise InputError(name_or_file, key, error.problem) from error
@@ -232,7 +233,7 @@ def _faults(study: EquilibriumStudy) -> list[str]:
     that cannot touch it, and struts that overlap."""
     robot, structure, units = study.robot, study.robot.structure, study.robot.scenario.units
     allowed = START_DEPTH * structure.scale + robot.weight / robot.scenario.ground.stiffness
-    lines = [sentence(robot.sinking_remark())] if robot.sinking_remark() else []
+    lines = [sentence(remark)] if (remark := sinking_remark(robot)) else []
     low = study.nodes["z"][study.nodes["z"] < -allowed]
     if structure.contacts.size and len(low):
         depths = [f"{node} ({units.shown(-z, 'm')})" for node, z in low.items()]

@@ -15,7 +15,8 @@ from pydrake.trajectories import PiecewisePolynomial
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
+from tetra_drake.robot.network import SteeringSignal, initial_neurons
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import AddBodies, AddNodes, Structure
 from tetra_drake.scenario.engine_kinds import Drake

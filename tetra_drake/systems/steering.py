@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.robot.robot import checked_turn
+from tetra_drake.robot.network import checked_turn
 
 
 class Steering(LeafSystem):

@@ -9,7 +9,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import make_model
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -34,7 +34,7 @@ def test_extreme_settings_come_to_an_end(compiled, setting, value, failure):
 def test_cables_in_no_order_of_the_bodies_that_they_join_are_refused(scenario, structure):
     structure.cable_ends[[0, 6]] = structure.cable_ends[[6, 0]]  # of T1-T2 and of T2-T3
     with pytest.raises(ValueError):
-        Robot.of(scenario, structure)
+        make_model(scenario, structure)
 
 
 @pytest.mark.parametrize(("lengthwise", "isotropic"), [(1.0 + 1e-14, True), (1.0 + 1e-9, False)])

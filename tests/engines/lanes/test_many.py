@@ -31,7 +31,7 @@ from tetra_drake.laws.friction import Coulomb
 from tetra_drake.laws.terrain import Rough
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.driven import DrivenByGait
+from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.common_sections import Disturbances
@@ -80,12 +80,12 @@ def short(scenario: Scenario) -> Scenario:
 Ending = tuple[SimulationResult | SimulationFailure, Motion]
 
 
-def batch_of(first: DrivenByGait) -> LaneBatch:
+def batch_of(first: DrivenRobot) -> LaneBatch:
     """A batch of one thread for robots like the first one."""
     return LaneBatch([first], places=processor_lanes(), record=True, threads=1)
 
 
-def endings(walks: list[DrivenByGait]) -> list[Ending]:
+def endings(walks: list[DrivenRobot]) -> list[Ending]:
     """Outcomes and motions in a batch whose places take the next gait when one has ended."""
     batch = batch_of(max(walks, key=lambda walk: walk.robot.ground.heights.size))
     batch.stop(0)
@@ -105,9 +105,9 @@ def endings(walks: list[DrivenByGait]) -> list[Ending]:
     return [found[i] for i in range(len(walks))]
 
 
-def walk_of(robot: Robot, seed: int = 0) -> DrivenByGait:
+def walk_of(robot: Robot, seed: int = 0) -> DrivenRobot:
     """A robot that walks by a seeded gait."""
-    return DrivenByGait.of(robot, seeded_gait(robot.scenario, seed))
+    return DrivenRobot.of(robot, seeded_gait(robot.scenario, seed))
 
 
 def same(a: Ending, b: Ending) -> bool:

@@ -18,7 +18,7 @@ from tetra_drake.laws.forces import sizes_of
 from tetra_drake.laws.oscillator import make_neurons
 from tetra_drake.results.result import motion_times
 from tetra_drake.robot.driven import MARK_DECIMALS, DrivenRobot
-from tetra_drake.robot.robot import initial_neurons
+from tetra_drake.robot.network import initial_neurons
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Compiled
 

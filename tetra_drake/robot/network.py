@@ -1,23 +1,33 @@
-"""Weights of a network: which oscillators inhibit each other, and names of the weights."""
+"""Network of a gait: which oscillators inhibit each other, its state at the start, its steering."""
 
 from __future__ import annotations
 
 import functools
+import numbers
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
+from tetra_drake.errors import InputError
+from tetra_drake.laws.oscillator import CpgSection
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.scenario import Scenario
 
 NEURONS = "extensor", "flexor"
 """Kinds of neurons, by index modulo 2."""
 
+AMPLITUDE = 0.5
+"""Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""
+
+SteeringSignal = Callable[[float], float]
+"""Function from time (s) to the turn, -1 to 1."""
+
 
 @dataclass(frozen=True)
 class Weights:
-    """The weights between the oscillators of a robot."""
+    """Weights of the connections between the oscillators of a robot."""
 
     blueprint: Blueprint
     reach: int | None
@@ -25,7 +35,7 @@ class Weights:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
-        """The weights of a scenario's gaits."""
+        """Connections of the oscillators in a scenario."""
         return cls(scenario.robot.blueprint(), scenario.cpg.reach)
 
     @functools.cached_property
@@ -46,7 +56,7 @@ class Weights:
         """Index of the mirror image of each weight (weights,); the weight itself if it has none."""
         images = self.blueprint.images
         opposite = [k if image is None else image for k, image in enumerate(images)]
-        neurons = (2 * np.array(opposite, dtype=int)[:, np.newaxis] + [0, 1]).ravel()
+        neurons = np.add.outer(2 * np.array(opposite, dtype=int), [0, 1]).ravel()
         index = {(i, j): weight for weight, (i, j) in enumerate(self.couplings.tolist())}
         pairs = neurons[self.couplings].tolist()
         return np.array([index.get((i, j), w) for w, (i, j) in enumerate(pairs)], dtype=int)
@@ -56,3 +66,27 @@ class Weights:
         """Names of the weights: "3->1 extensor" is from oscillator 3 onto 1, counted from 1."""
         pairs = self.couplings.tolist()
         return tuple(f"{j // 2 + 1}->{i // 2 + 1} {NEURONS[i % 2]}" for i, j in pairs)
+
+
+def constant_steering(turn: float) -> SteeringSignal:
+    """Steering with a constant turn. Raises InputError if it is not a number."""
+    if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
+        expected = "a number from -1 to 1, or a function of the time in s"
+        raise InputError("steering", "", f"found {turn!r}, expected {expected}")
+    return lambda time: turn
+
+
+def checked_turn(turn: float, *, time: float) -> float:
+    """Turn as a number, if it is between -1 and 1. Raises InputError otherwise, naming the `time`
+    (s)."""
+    if not isinstance(turn, numbers.Real) or not abs(turn) <= 1.0:
+        raise InputError("steering", f"at {time:g} s", f"found {turn!r:.60}, expected -1 to 1")
+    return float(turn)
+
+
+def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
+    """State of the neurons at t = 0 (4n,): u of all neurons, then v (Table 4)."""
+    inner_state, extensor_self_inhibition, flexor_self_inhibition = cpg.initial_state
+    u = np.full(2 * oscillators, inner_state)
+    v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)
+    return np.concatenate([u, v])

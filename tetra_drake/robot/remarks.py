@@ -1,0 +1,88 @@
+"""Remarks on settings with which a robot hardly moves, sinks in, or asks too much of actuators.
+
+Each remark is a text without a full stop; it is empty if there is nothing to remark.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.laws import cable
+from tetra_drake.robot.network import AMPLITUDE
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.metrics import looks_for_distance
+
+LEAST_MOTION = 0.01
+"""Least change of a cable's length that signals should cause, as a share of the length."""
+STILL = 0.1
+"""Distance that a robot should walk, as a share of its length."""
+SINKS, BEARS = 0.03, 0.01
+"""Depths of a robot in its ground, as shares of its height: too deep, and as deep as in a ground
+that bears it."""
+
+
+def gain_remark(robot: Robot) -> str:
+    """Remark on a `cpg.gain` whose signals hardly move the cables, or exceed the limits of the
+    actuators."""
+    cpg, driven = robot.scenario.cpg, robot.structure.cables[robot.driven]
+    if not driven.size:
+        return ""
+    signal, stretch = _usual_signal(robot)
+    share = np.max(stretch / robot.structure.initial_lengths[robot.driven])
+    if share < LEAST_MOTION:
+        problem = f"move no cable by more than {share:.2g} of its length"
+    else:
+        least = np.min(driven["free_length"] - stretch)
+        problem = robot.scenario.actuation.excess(signal, free_length=least)
+    return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
+
+
+def stillness_remark(robot: Robot, distance: float) -> str:
+    """Remark on a robot that was to walk, and has walked a `distance` (m) of less than a tenth of
+    its length."""
+    scenario, units = robot.scenario, robot.scenario.units
+    length = np.ptp(robot.structure.p_WN, axis=0).max()
+    if not looks_for_distance(scenario.objective) or not abs(distance) < STILL * length:
+        return ""
+    _, stretch = _usual_signal(robot)
+    signals = f"signals with cpg.gain {units.shown(scenario.cpg.gain, 'N')}"
+    way = f"walks {units.shown(distance, 'm')}, less than a tenth of its length"
+    most = units.shown(stretch.max(initial=0.0), "m")
+    return f"the robot {way}; {signals} stretch cables by {most} at most"
+
+
+def start_up_remark(robot: Robot) -> str:
+    """Remark on a simulation that ends before the cables are actuated."""
+    start_up, duration = robot.scenario.cpg.start_up, robot.scenario.simulation.duration
+    if start_up < duration:
+        return ""
+    return f"within {duration:g} s no cable is actuated, as cpg.start_up is {start_up:g} s"
+
+
+def sinking_remark(robot: Robot) -> str:
+    """Remark on a robot that at rest is in its ground by more than SINKS of its height, with a
+    stiffness that would bear it. A robot without an equilibrium gets none."""
+    structure, units, ground = robot.structure, robot.scenario.units, robot.scenario.ground
+    if not structure.contacts.size:
+        return ""
+    try:
+        z = node_positions(structure, robot.equilibrium.state)[:, 2]
+    except InputError:
+        return ""
+    radius, contacts = structure.contact_radius, structure.contacts
+    depth = (radius - z)[contacts].max()
+    height = (z + radius).max() - (z - radius).min() or 2.0 * structure.least_radius
+    if depth <= SINKS * height:
+        return ""
+    needed = units.shown(ground.stiffness * depth / (BEARS * height), "N/m")
+    sinks = f"the robot sinks into its ground by {units.shown(depth, 'm')}"
+    return f"{sinks}; a ground.stiffness of {needed} would bear it"
+
+
+def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:
+    """Typical amplitude (N) of the signals, and by how much (m) it stretches each driven cable."""
+    cpg, law = robot.scenario.cpg, cable.CableLaw.of(robot.structure.cables[robot.driven])
+    signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
+    return signal, np.asarray(cable.elastic_stretch(signal, law))
