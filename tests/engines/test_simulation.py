@@ -142,6 +142,7 @@ def test_after_an_interrupt_a_reset_makes_the_robots_whole(
     expected = go(two, actions)[-1]
     two.reset()
     two.step(actions[0])
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in jobs of a script
 
     def interrupted(*arguments, **options):
         call(*arguments, **options)
