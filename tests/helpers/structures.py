@@ -13,9 +13,9 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure

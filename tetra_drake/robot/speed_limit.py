@@ -9,7 +9,7 @@ import numpy as np
 
 from tetra_drake.laws.actuator import Limits
 from tetra_drake.laws.cable import CableLaw, elastic_energy, elastic_tension
-from tetra_drake.robot.driven import DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import node_positions
 
 LEAST_LIMIT = 10.16
