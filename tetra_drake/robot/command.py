@@ -1,4 +1,4 @@
-"""Robots without a network: commands for actuators, and what controllers start from."""
+"""Robots without a network: driven by a command, or by a controller."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def driven_robot(
 ) -> DrivenRobot:
     """The robot of a scenario, driven by a gait or a command.
 
-    A sample of a command acts from its time on: the signals take one `cpg.listing_step` from the
-    sample before to this one. Raises InputError for a command without samples, or for another
-    number of cables.
+    The signals of a command are linear between multiples of `cpg.listing_step`. A change of
+    setpoint begins at the time of its sample and takes one such step. Raises InputError for a
+    command without samples, or for another number of cables.
     """
     if isinstance(driver, Gait):
         return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)

@@ -227,7 +227,7 @@ def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Struc
     """A structure in equilibrium on flat ground, and its model, from those at the given positions.
 
     Elastic struts become as long as their forces in equilibrium make them. The forces depend on the
-    lengths, so both are corrected by turns.
+    lengths, so both are corrected alternately.
     """
     up = np.array([0.0, 0.0, lift(scenario, placed)])
     structure = dataclasses.replace(placed, p_WB=placed.p_WB + up)

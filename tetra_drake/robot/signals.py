@@ -137,12 +137,17 @@ class DrivenRobot:
         return self.robot.turns(self.gait, self.steering) if self.gait else np.zeros(1)
 
 
-def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-    """Output of the network, y_extensor - y_flexor (samples, m), at multiples of `listing_step`.
+def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
+    """Signals (samples, m) in N at multiples of `cpg.listing_step`, until after the duration.
 
-    With `cpg.signals: listing`, forward Euler as in listing B: sample i is the state after i + 1
-    steps, and the last sample is one step before the end. With `live`, the classical Runge-Kutta
-    method of order 4, with an error of 1e-5. The turn within a step is the turn at its middle.
+    They are `cpg.gain` times the output of the network, y_extensor - y_flexor. Between samples they
+    are linear. They are not set to zero before the start-up time. The turn within a step is the
+    turn at its middle.
+
+    With `cpg.signals: listing`, the network is integrated with forward Euler as in listing B:
+    sample i is the state after i + 1 steps, and the network ends one step before the duration. With
+    `live`, the classical Runge-Kutta method of order 4 is used, with an error of 1e-5. The last
+    output of the network is held for two more samples.
 
     Raises InputError if the gait does not fit. Raises InputError for a gait with feedback, because
     its signals depend on the robot's motion.
@@ -158,16 +163,7 @@ def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None)
     output = np.empty((DrivenRobot.of(robot, gait).sample_count, oscillators))
     listing = cpg.signals == "listing"
     network_output(network, inputs, cpg.listing_step, listing, neurons, output)
-    return output
-
-
-def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-    """Signals (samples, m) in N at multiples of `cpg.listing_step`, until after the duration.
-
-    Between samples the signals are linear. They are not set to zero before the start-up time.
-    """
-    raw = raw_output(robot, gait, steering)
-    return robot.scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
+    return cpg.gain * np.vstack([output, output[-1:], output[-1:]])
 
 
 def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:

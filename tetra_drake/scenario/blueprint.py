@@ -20,7 +20,7 @@ TOLERANCE = 1e-6
 
 USUAL_SIZES = 0.1, 1.0
 """Least and greatest size (m) of robots for which areas of terrain, margins of figures and other
-lengths are chosen. They grow and shrink with other robots. See Blueprint.scale."""
+lengths are chosen. For larger and smaller robots these lengths are scaled. See Blueprint.scale."""
 
 LONGEST, SHORTEST = 1e4, 1e-6
 """Limits for the length of a strut, in m. The first is also the largest coordinate of a node."""
@@ -59,7 +59,7 @@ class Blueprint:
     struts: np.ndarray
     """Indices of the two nodes of each strut (struts, 2)."""
     strut_keys: tuple[str, ...]
-    """Settings of the struts, such as "struts.bar.pairs[0]", for messages."""
+    """Keys of the struts in the settings, such as "struts.bar.pairs[0]", for error messages."""
     strut_radius: np.ndarray
     """Radii of the struts (struts,)."""
     strut_density: np.ndarray
@@ -91,7 +91,7 @@ class Blueprint:
     cable_groups: tuple[str, ...]
     """Group of each cable, such as "outer"."""
     cable_keys: tuple[str, ...]
-    """Settings of the cables, such as "cables.side.pairs[0]", for messages."""
+    """Keys of the cables in the settings, such as "cables.side.pairs[0]", for error messages."""
     cable_ends: np.ndarray
     """Indices of the two nodes of each cable (cables, 2), from the lower body to the higher."""
     cable_laws: tuple[Mapping[str, float], ...]

@@ -64,7 +64,8 @@ Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
 class StrutGroup(Section):
-    """Struts of one make: solid cylinders with a sphere of the same density at each end."""
+    """Struts with the same constants: solid cylinders with a sphere of the same density at each
+    end."""
 
     pairs: Pairs
     """The nodes that each strut joins."""
@@ -90,8 +91,8 @@ class StrutGroup(Section):
 
 
 class SphereGroup(Section):
-    """Solid spheres of one make at nodes, in place of the spheres of their struts. A sphere at a
-    node of no strut is a body of its own."""
+    """Equal solid spheres at nodes, in place of the spheres of their struts. A sphere at a node of
+    no strut is a body of its own."""
 
     nodes: list[str] = Field(min_length=1)
     """The nodes at their centres."""
