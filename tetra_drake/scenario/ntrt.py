@@ -100,12 +100,12 @@ class _Translation:
             pair, builder, at = part
             (first, second), is_cable = pair.nodes, builder.kind == "cables"
             body, other = body_of.get(first, first), body_of.get(second, second)
-            has_mass = is_cable or builder.parameters.density
+            is_massless = not is_cable and not builder.parameters.density
             if is_cable and body == other and first != second:
                 self._note("left out, as they join a body to itself", f"{first} {second}")
             elif body == WORLD and not is_cable:
                 self._note("held in space, as their density is 0", pair.group)
-            elif not has_mass and frozenset(pair.nodes) in dense_pairs:
+            elif is_massless and frozenset(pair.nodes) in dense_pairs:
                 self._note("left out, as parts with mass have their place", pair.group)
             else:
                 groups.setdefault((builder.kind, pair.group, at), []).append(part)

@@ -111,8 +111,6 @@ class Assembly:
         self, given: dict[str, Substructure], file: Path, part: str, above: tuple[Path, ...]
     ) -> None:
         """Adds the substructures of a file, then turns all, then scales and moves them."""
-        from scipy.spatial import transform
-
         entries: list[tuple[str, int, Substructure, Place]] = []
         for names, entry in given.items():
             place = Place(file, f"substructures.{names}")
@@ -124,6 +122,8 @@ class Assembly:
                 self.add_file(file.parent / entry.path, part=f"{part}{name}.", above=above)
         for name, _, entry, place in entries:
             if (rotation := entry.rotation) is not None:
+                from scipy.spatial import transform
+
                 start, axis = self._part(part, name, place), np.array(rotation.axis)
                 if not axis.any():
                     problem = "found a vector of length 0, expected a direction"

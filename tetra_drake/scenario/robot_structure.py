@@ -235,7 +235,10 @@ class StructureFile(Section):
             cable_laws.append(self.cables[cable.group].law(float(np.linalg.norm(span))))
         cable_names = tuple(" ".join((cable.group, *cable.nodes)) for cable in cables)
         numbers = _cable_numbers(cable_names)
-        driven = [[numbers[name] for name in x if name in numbers] for x in self.actuated.values()]
+        groups = [  # unknown cables are refused by _check_actuated()
+            tuple(numbers[name] for name in names if name in numbers)
+            for names in self.actuated.values()
+        ]
 
         return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
@@ -265,7 +268,7 @@ class StructureFile(Section):
             slack=True,
             contacts=np.array(sorted({number[node] for node in touching}), dtype=int),
             oscillators=tuple(self.actuated),
-            groups=tuple(map(tuple, driven)),
+            groups=tuple(groups),
         )
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
