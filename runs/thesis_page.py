@@ -32,9 +32,9 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import read_json, read_text, write_whole
 from tetra_drake.formatting import fixed, ranged, rounded
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.measures import dominant_frequency
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.section import flattened, written
 from tetra_drake.settings.units import INCH, POUND_FORCE, plainest

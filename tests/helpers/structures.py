@@ -13,11 +13,12 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from tetra_drake.engines.lanes.batch import LaneBatch
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -74,8 +75,8 @@ def unit_inertias(structure: Structure) -> np.ndarray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
 
 
-def joined_nodes(given: StructureFile) -> dict[str, np.ndarray]:
-    """The nodes of a structure file and what joins them, as statics takes them."""
+def joined_nodes(given: StructureFile | Tetrahedra) -> dict[str, np.ndarray]:
+    """The nodes of a robot and what joins them, as statics takes them."""
     blueprint = given.blueprint()
     return {
         "p_WN": blueprint.p_WN,

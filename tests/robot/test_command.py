@@ -6,7 +6,7 @@ from helpers.actuations import MOTOR, WINCH
 
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.prototype.command_file import command_columns
-from tetra_drake.robot.command import Command, driven_robot, held_samples
+from tetra_drake.robot.command import Command, driven_robot
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 
@@ -24,10 +24,11 @@ def counting(cables: int = 8, samples: int = 3) -> Command:
         (0.004, 3, 4),  # within the step from 8 to 12 ms
     ],
 )
-def test_a_sample_is_held_for_ten_milliseconds_and_the_last_for_ever(step, before, after):
-    held = held_samples(counting(1), step, 1.0)[:, 0]
+def test_a_sample_is_held_for_ten_milliseconds_and_the_last_for_ever(scenario, step, before, after):
+    changed = scenario.with_changes({"cpg.listing_step": f"{step} s"})
+    held = driven_robot(changed, counting()).samples[:, 0]
     assert (held[0], held[before], held[after], held[-1]) == (0.0, 0.0, 10.0, 20.0)
-    assert len(held) * step > 1.0 + step
+    assert len(held) * step > changed.simulation.duration + step
 
 
 def test_each_driven_cable_has_a_signal_of_its_own(scenario):

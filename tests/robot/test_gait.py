@@ -164,14 +164,9 @@ def test_repair_couples_tau_b_unless_it_is_independent(scenario):
     np.testing.assert_array_equal(ParameterSpace.of(scenario).repair(vector), vector)
 
 
-def draw(scenario, seed: int, count: int) -> np.ndarray:
-    """Vectors drawn one after the other, (count, parameters)."""
-    generator, space = np.random.default_rng(seed), ParameterSpace.of(scenario)
-    return np.array([space.random(generator) for _ in range(count)])
-
-
 def test_random_gaits_are_uniform_within_the_bounds(scenario):
-    vectors = draw(scenario, seed=5, count=2000)
+    generator, space = np.random.default_rng(5), ParameterSpace.of(scenario)
+    vectors = np.array([space.random(generator) for _ in range(2000)])
     weights, taus = vectors[:, :-2], vectors[:, TAU_A]
     assert 1.0 <= weights.min() < 1.01 and 3.39 < weights.max() <= 3.4
     assert 0.2 <= taus.min() < 0.202 and 0.498 < taus.max() <= 0.5

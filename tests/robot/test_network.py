@@ -9,7 +9,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.network import Weights
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import raw_output
+from tetra_drake.robot.signals import signal_samples
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
@@ -22,7 +22,7 @@ def test_two_oscillators_silence_each_other_with_weights_above_two(scenario, low
     two = scenario.with_changes({"robot.tetrahedra": 3, "simulation.duration": "40 s"} | bounds)
     robot, still = Robot.of(two), two.cpg.external_input / (1.0 + two.cpg.self_inhibition_weight)
     for seed in range(20):
-        late = raw_output(robot, seeded_gait(two, seed))[-10_000:]
+        late = signal_samples(robot, seeded_gait(two, seed))[-10_000:] / two.cpg.gain
         if swings:
             assert (np.ptp(late, axis=0) > 0.1).all()
         else:

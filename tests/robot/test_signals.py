@@ -5,7 +5,7 @@ import pytest
 
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
+from tetra_drake.robot.signals import save_signals, signal_samples
 from tetra_drake.settings.units import shown_in
 
 
@@ -22,10 +22,15 @@ def gait(scenario, data) -> Gait:
     return load_gait(data / "gait_b.json", scenario)
 
 
+def network_output(robot: Robot, gait: Gait) -> np.ndarray:
+    """y_extensor - y_flexor (samples, m)."""
+    return signal_samples(robot, gait) / robot.scenario.cpg.gain
+
+
 def test_stepped_as_the_listing_steps_it_gives_the_listings_output(robot, listing):
     gait, steps, reference = listing
-    output = raw_output(robot, gait)
-    assert output.shape == (30_000, 4)
+    output = network_output(robot, gait)
+    assert output.shape == (30_002, 4), "the last is held for two more samples"
     np.testing.assert_allclose(output[steps], reference, rtol=0, atol=1e-9)
 
 
@@ -33,7 +38,7 @@ def test_the_converged_network_stays_within_the_listings_own_error(scenario, lis
     # Euler's error reaches 1.4e-2 by 15 s on gait_a. The listing stamps a state one step early.
     gait, steps, reference = listing
     scenario = scenario.with_changes({"cpg.signals": "live"})
-    error = np.abs(raw_output(Robot.of(scenario), gait)[steps + 1] - reference).max(axis=1)
+    error = np.abs(network_output(Robot.of(scenario), gait)[steps + 1] - reference).max(axis=1)
     assert error[steps * 0.5e-3 <= 3.0].max() < 2e-3
     assert error.max() < 2e-2
 

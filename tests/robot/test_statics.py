@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from helpers.structures import joined_nodes
 
-from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.statics import cable_wrenches, find_statics
-from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
 
@@ -34,12 +32,7 @@ def prism(n: int, twist: float, *, radius: float = 1.0, height: float = 1.5) -> 
 def nested_tetrahedra(spacing: float) -> Joined:
     """Two tetrahedra of the thesis and the cables between them: three outer, three inner ones."""
     changes = {"robot.tetrahedra": 2, "robot.spacing": f"{spacing} m"}
-    structure = Robot.of(load_scenario("thesis").with_changes(changes)).structure
-    return {
-        "p_WN": node_positions(structure, structure.initial_state),
-        "body_of_node": structure.carriers,
-        "cable_ends": np.stack([structure.cables[end] for end in ("node_a", "node_b")], axis=1),
-    }
+    return joined_nodes(load_scenario("thesis").with_changes(changes).robot)
 
 
 def shipped(name: str) -> Joined:

@@ -37,16 +37,6 @@ def distances(p_WN: np.ndarray) -> np.ndarray:
     return np.linalg.norm(p_WN[:, np.newaxis] - p_WN, axis=2)
 
 
-@pytest.mark.parametrize("name", ["prism", "six_bar"])
-def test_bars_have_the_mass_and_the_moments_of_the_independent_simulation(name, data):
-    recorded, structure = recorded_structure(data, name), Robot.of(load_scenario(name)).structure
-    np.testing.assert_allclose(structure.mass, recorded["bar_mass"], rtol=1e-12)
-    across, axial = recorded["moment_across"], recorded["moment_axial"]
-    for mass, inertia in zip(structure.mass, unit_inertias(structure), strict=True):
-        moments = mass * np.linalg.eigvalsh(inertia)
-        np.testing.assert_allclose(moments, [axial, across, across], rtol=1e-9)
-
-
 def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
     scenario = load_scenario("mast").with_changes({"robot.masses": {"v2_front_low": "35 g"}})
     structure, group = Robot.of(scenario).structure, scenario.robot.struts["v2"]

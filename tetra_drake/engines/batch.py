@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure
 
 if TYPE_CHECKING:

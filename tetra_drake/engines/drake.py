@@ -25,9 +25,9 @@ from tetra_drake.kernels.packed import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
-from tetra_drake.robot.driven import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.engine_kinds import Drake

@@ -12,8 +12,8 @@ from tetra_drake.engines.batch import Batch, LoneRobot, SerialBatch, Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import driven_robot
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 
 _BRIEF = 0.01

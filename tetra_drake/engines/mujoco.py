@@ -42,7 +42,6 @@ from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.laws.forces import Forces, Parts, compute_strut_forces, pull_of_cable
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.equilibrium import (
     Unactuated,
     force_at_rest,
@@ -52,6 +51,7 @@ from tetra_drake.robot.equilibrium import (
 from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario

@@ -17,7 +17,7 @@ from tetra_drake.laws.contact import MODE_COLUMNS, update_modes
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.tally import Tally, observe, update_clearance
-from tetra_drake.robot.driven import DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot
 
 CLEARED = 16
 """Number of states from one computation of the clearance to the next, of states added at once."""

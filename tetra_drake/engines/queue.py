@@ -15,9 +15,9 @@ from tetra_drake.engines.engine import Engine, engine_of
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Driver, driven_robot
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 
 _GATHERING = 1e-3

@@ -19,9 +19,9 @@ from tetra_drake.laws.cable import CableLaw
 from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import controlled_robot
-from tetra_drake.robot.driven import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario

@@ -18,10 +18,10 @@ from tetra_drake.errors import InputError
 from tetra_drake.formatting import fixed, heading_html
 from tetra_drake.laws.tally import Tally
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.measures import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario

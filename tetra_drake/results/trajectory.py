@@ -103,7 +103,7 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     if motion.ground_forces is not None:
         ground_forces = motion.ground_forces
     free_lengths = np.tile(structure.cables["free_length"], (len(motion.times), 1))
-    actuator, driven = robot.model.actuator, robot.cables_of_drives
+    actuator, driven = robot.model.actuator, np.sort(robot.driven)
     if has_drive(actuator):  # winches change the free lengths
         free_lengths[:, driven] = wound(actuator, motion.drives, free_lengths[:, driven])
     modes = np.sign(motion.modes[:, :, :STICK_POINT])

@@ -1,4 +1,4 @@
-"""Robots without a network: commands for actuators, and what controllers start from."""
+"""Robots without a network: driven by a command, or by a controller."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.driven import DrivenRobot
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -38,8 +38,12 @@ Driver = Gait | Command
 def driven_robot(
     scenario: Scenario, driver: Driver, *, steering: SteeringSignal | None = None
 ) -> DrivenRobot:
-    """The robot of a scenario, driven by a gait or a command. Raises InputError for a command
-    without samples, or for another number of cables."""
+    """The robot of a scenario, driven by a gait or a command.
+
+    The signals of a command are linear between multiples of `cpg.listing_step`. A change of
+    setpoint begins at the time of its sample and takes one such step. Raises InputError for a
+    command without samples, or for another number of cables.
+    """
     if isinstance(driver, Gait):
         return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
     robot = Robot.of(scenario).without_network()
@@ -49,7 +53,10 @@ def driven_robot(
         problem = f"is of shape {driver.samples.shape}, expected {driven.size} driven cables"
     if problem:
         raise InputError(f"command {driver.name}", "samples", problem)
-    held = held_samples(driver, scenario.cpg.listing_step, scenario.simulation.duration)
+    step = scenario.cpg.listing_step
+    times = step * (np.arange(math.ceil(scenario.simulation.duration / step) + 2) - 1)
+    latest = np.floor(times / driver.period + 1e-6).astype(int)
+    held = driver.samples[np.clip(latest, 0, len(driver.samples) - 1)]
     signals = scenario.actuation.signals(held, CableLaw.of(robot.structure.cables[driven]))
     robot = dataclasses.replace(robot, first_signals=signals[0])
     return DrivenRobot(robot=robot, name=driver.name, samples=signals)
@@ -64,14 +71,3 @@ def controlled_robot(scenario: Scenario) -> Robot:
     robot = by_network.without_network()
     law = CableLaw.of(robot.structure.cables[robot.driven])
     return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
-
-
-def held_samples(command: Command, step: float, duration: float) -> np.ndarray:
-    """Setpoints of a command at multiples of `step` (s), until after `duration` (s).
-
-    Signals are linear between these times. A change of setpoint begins at its time and takes one
-    step.
-    """
-    times = step * (np.arange(math.ceil(duration / step) + 2) - 1)
-    latest = np.floor(times / command.period + 1e-6).astype(int)
-    return command.samples[np.clip(latest, 0, len(command.samples) - 1)]

@@ -51,7 +51,8 @@ POWER_STEPS = 10
 """Iterations for the least stable motion of a balanced robot."""
 
 RESISTED = 1e-6
-"""Least share of the greatest displacement of an anchored node by which a motion is resisted."""
+"""An anchor resists a motion that moves its node by more than this share of the greatest
+displacement."""
 
 LEAST_STIFFNESS = 1e-12
 """Stiffness of a motion that nothing resists, as a share of the robot's greatest stiffness."""
@@ -329,7 +330,7 @@ def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 @compiled
 def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
-    """Writes the generalized force (6 n,) at rest. `modes` are of nodes in the air."""
+    """Writes the generalized force (6 n,) at rest. `modes` must be 0, for nodes in the air."""
     robot, forces = unpacked(parts)
     move_robot(robot, state, forces)
     update_modes(state, forces.nodes, robot.ground, forces.frames, modes)

@@ -160,16 +160,20 @@ class ParameterSpace:
         chosen, parameters = np.unique(shared, return_inverse=True)
         names = [f"weight {weight_names[i]}" for i in chosen]
         names += [f"gain {name}" for name in pathways]
-
-        def numbers(*, weight: float, gain: float, tau_a: float) -> Vector:
-            taus = [tau_a, TAU_B_PER_TAU_A * tau_a]
-            return np.array([weight] * len(chosen) + [gain] * len(pathways) + taus)
-
+        # Rows: low, high, floors. Columns: weight, gain, tau_A, tau_B.
+        rows = [
+            [bounds.weight_min, -LARGEST_GAIN, bounds.tau_a_min, bounds.tau_a_min],
+            [bounds.weight_max, LARGEST_GAIN, bounds.tau_a_max, bounds.tau_a_max],
+            [0.0, -math.inf, bounds.tau_a_min, bounds.tau_a_min],
+        ]
+        limits = np.repeat(rows, [len(chosen), len(pathways), 1, 1], axis=1)
+        limits[:, TAU_B] *= TAU_B_PER_TAU_A
+        low, high, floors = limits
         return cls(
             names=(*names, "tau_A", "tau_B"),
-            low=numbers(weight=bounds.weight_min, gain=-LARGEST_GAIN, tau_a=bounds.tau_a_min),
-            high=numbers(weight=bounds.weight_max, gain=LARGEST_GAIN, tau_a=bounds.tau_a_max),
-            floors=numbers(weight=0.0, gain=-math.inf, tau_a=bounds.tau_a_min),
+            low=low,
+            high=high,
+            floors=floors,
             couples_tau_b=not bounds.independent_tau_b,
             weights=parameters,
             weight_names=weight_names,

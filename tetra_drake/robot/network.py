@@ -48,7 +48,21 @@ class Weights:
         kind = np.arange(2 * self.blueprint.signals) % 2
         coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
         if self.reach is not None:
-            coupled &= np.kron(self.blueprint.distances, np.ones((2, 2))) <= self.reach
+            from scipy.sparse.csgraph import shortest_path
+
+            # Oscillators are at distance 0 if their cables join the same bodies, at distance 1 if
+            # they share a body, at distance 2 if both are at distance 1 of a third, and so on.
+            bodies, groups = (
+                self.blueprint.carriers[self.blueprint.cable_ends],
+                self.blueprint.groups,
+            )
+            joined = [set(bodies[list(cables)].ravel().tolist()) for cables in groups]
+            shape = len(joined), len(joined)
+            near = np.array([[bool(a & b) for b in joined] for a in joined]).reshape(shape)
+            same = np.array([[a == b for b in joined] for a in joined]).reshape(shape)
+            steps = np.minimum(shortest_path(near, unweighted=True), len(joined))
+            distances = np.where(same, 0.0, steps)
+            coupled &= np.kron(distances, np.ones((2, 2))) <= self.reach
         return np.argwhere(coupled)
 
     @functools.cached_property

@@ -19,8 +19,8 @@ LEAST_MOTION = 0.01
 STILL = 0.1
 """Distance that a robot should walk, as a share of its length."""
 SINKS, BEARS = 0.03, 0.01
-"""Depths of a robot in its ground, as shares of its height: too deep, and as deep as in a ground
-that bears it."""
+"""Depths of a robot in its ground, as shares of its height: from the first on it is too deep; the
+second is usual in a ground that is stiff enough."""
 
 
 def gain_remark(robot: Robot) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Self
 
@@ -51,6 +50,8 @@ class Robot:
     """Constants of bodies, cables and ground, in the form of the kernels."""
     first_signals: np.ndarray
     """Signals (m,) in N at t = 0, which the actuators follow already."""
+    has_network: bool = True
+    """False if the signals are given, by a command or a controller."""
 
     @classmethod
     def of(cls, scenario: Scenario, *, at_rest: bool = False) -> Self:
@@ -86,7 +87,7 @@ class Robot:
         model = model._replace(ground=make_ground(scenario, structure))
         return cls(scenario, structure, model, first_signals=np.zeros(structure.signals))
 
-    def without_network(self) -> Self:
+    def without_network(self) -> Robot:
         """The robot with one signal for each driven cable.
 
         Actuators that imitate springs and dampers do not do so here: a command contains their
@@ -104,20 +105,14 @@ class Robot:
         )
         model = self.model._replace(cables=cable.Cables.of(structure.cables))
         still = np.zeros(structure.signals)
-        return dataclasses.replace(self, structure=structure, model=model, first_signals=still)
+        return Robot(self.scenario, structure, model, first_signals=still, has_network=False)
 
     @property
     def driven(self) -> np.ndarray:
         """Indices of the cables that have actuators, in the order of the oscillators. Commands,
-        actions and loads have this order."""
+        actions and loads have this order; states of the actuators have the order of the cables."""
         groups = self.structure.groups
         return np.array([number for group in groups for number in group], dtype=np.int64)
-
-    @property
-    def cables_of_drives(self) -> np.ndarray:
-        """Indices of the driven cables in the order of the structure's cables, as states of the
-        actuators have it."""
-        return np.sort(self.driven)
 
     @property
     def ground(self) -> Ground:
@@ -139,12 +134,9 @@ class Robot:
 
     @functools.cached_property
     def senses(self) -> Senses:
-        """Constants of the oscillators' sensors. Raises InputError if there is no equilibrium."""
-        return self.senses_of(self.scenario.cpg.feedback)
-
-    def senses_of(self, pathways: Collection[str]) -> Senses:
-        """Constants of the oscillators' sensors for some pathways of feedback."""
-        structure = self.structure
+        """Constants of the oscillators' sensors. Raises InputError if feedback needs an
+        equilibrium and there is none."""
+        structure, pathways = self.structure, self.scenario.cpg.feedback if self.has_network else []
         drivers = structure.cables["signal"].copy()
         bodies = structure.carriers[structure.cable_ends]
         last = [bodies[list(cables)].max() for cables in structure.groups]
@@ -197,9 +189,9 @@ class Robot:
         return np.asarray(steered_input(u0, turns[..., np.newaxis], sides))
 
     def starting_drives(self) -> np.ndarray:
-        """States of the actuators at t = 0 (drives,); see laws.actuator and
-        cables_of_drives."""
-        cables = self.starting_cables(self.cables_of_drives)
+        """States of the actuators at t = 0 (drives,), in the order of the cables; see
+        laws.actuator."""
+        cables = self.starting_cables(np.sort(self.driven))
         return np.asarray(self.scenario.actuation.drives(cables))
 
     def starting_cables(self, numbers: np.ndarray | None = None) -> DrivenCables:
@@ -235,7 +227,7 @@ def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Struc
     """A structure in equilibrium on flat ground, and its model, from those at the given positions.
 
     Elastic struts become as long as their forces in equilibrium make them. The forces depend on the
-    lengths, so both are corrected by turns.
+    lengths, so both are corrected alternately.
     """
     up = np.array([0.0, 0.0, lift(scenario, placed)])
     structure = dataclasses.replace(placed, p_WB=placed.p_WB + up)

@@ -1,30 +1,153 @@
-"""Actuation signals of a gait, computed before the simulation.
+"""Signals of the actuators: made by the network of a gait, or given by a command or a controller.
 
-Without feedback the network does not depend on the robot. So its signals can be computed before the
-robot is simulated, as in the thesis.
+Without feedback a network does not depend on the robot's motion. So its signals can be computed
+before the simulation, as in the thesis.
 """
 
 from __future__ import annotations
 
+import functools
 import math
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.laws.oscillator import make_neurons, network_output
+from tetra_drake.laws.feedback import Gains
+from tetra_drake.laws.oscillator import Network, make_neurons, network_output
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.network import SteeringSignal, initial_neurons
 from tetra_drake.robot.robot import Robot
 
+MARK_DECIMALS = 9
+"""Decimals of the times (s) at which a step must end. A step between two times that differ in
+rounding would be too short."""
 
-def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-    """Output of the network, y_extensor - y_flexor (samples, m), at multiples of `listing_step`.
 
-    With `cpg.signals: listing`, forward Euler as in listing B: sample i is the state after i + 1
-    steps, and the last sample is one step before the end. With `live`, the classical Runge-Kutta
-    method of order 4, with an error of 1e-5. The turn within a step is the turn at its middle.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DrivenRobot:
+    """A robot with the source of its signals: a gait, or given signals."""
+
+    robot: Robot
+    name: str
+    """Name of the source of the signals."""
+    samples: np.ndarray
+    """Given signals (k, m) in N at multiples of `cpg.listing_step`, linear in between. The last
+    ones are held. A controller gives the first ones, a command at least two, a gait none."""
+    gait: Gait | None = None
+    """The gait whose network makes the signals; None if they are given."""
+    steering: SteeringSignal | None = None
+    """The turn, in place of the gait's."""
+
+    @classmethod
+    def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
+        """A robot driven by the network of a gait."""
+        none = np.zeros((0, robot.structure.signals))
+        return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)
+
+    @property
+    def start_up(self) -> float:
+        """Time (s) from which the signals act."""
+        return self.robot.scenario.cpg.start_up if self.gait else 0.0
+
+    @property
+    def steady_start(self) -> float:
+        """Start (s) of the steady stretch. Mean values are over this stretch."""
+        return max(self.robot.scenario.simulation.settling_time, self.start_up)
+
+    @property
+    def is_controlled(self) -> bool:
+        """True if a controller sets the signals while the robot moves."""
+        return len(self.samples) == 1
+
+    @property
+    def is_live(self) -> bool:
+        """True if a network is integrated together with the robot."""
+        return self.gait is not None and self.robot.scenario.cpg.signals == "live"
+
+    @property
+    def sample_count(self) -> int:
+        """Number of samples of the signals, a network's included."""
+        if self.gait is None:
+            return len(self.samples)
+        scenario = self.robot.scenario
+        steps = scenario.simulation.duration / scenario.cpg.listing_step
+        return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
+
+    def signals_at(self, times: np.ndarray) -> np.ndarray:
+        """Signals (times, m) in N at `times` (s); zero before the start-up time."""
+        samples = self._all_samples
+        grid = self.robot.scenario.cpg.listing_step * np.arange(len(samples))
+        values = np.empty((len(times), samples.shape[1]))
+        for column, given in enumerate(samples.T):
+            values[:, column] = np.interp(times, grid, given)
+        values[times < self.start_up - 1e-9] = 0.0
+        return values
+
+    @functools.cached_property
+    def _all_samples(self) -> np.ndarray:
+        """Samples (k, m) in N of the signals, a network's included."""
+        if self.gait is None:
+            return self.samples
+        return signal_samples(self.robot, self.gait, self.steering)
+
+    @property
+    def changes(self) -> dict[float, np.ndarray]:
+        """Signals (m,) in N after each change of the given signals, by the time (s) at which the
+        change begins."""
+        begins = self.robot.scenario.cpg.listing_step * self._changing
+        after = self.samples[self._changing + 1]
+        return dict(zip(begins.round(MARK_DECIMALS).tolist(), after, strict=True))
+
+    @functools.cached_property
+    def _changing(self) -> np.ndarray:
+        """Indices of the given samples that differ from the next."""
+        return np.flatnonzero((np.diff(self.samples, axis=0) != 0.0).any(axis=1))
+
+    @functools.cached_property
+    def marks(self) -> np.ndarray:
+        """Times (s) at which a step must end, ascending: start, start-up, `simulation.steady_from`,
+        end, and where a change of the given signals begins or ends."""
+        settings, step = self.robot.scenario.simulation, self.robot.scenario.cpg.listing_step
+        ends = step * np.add.outer([0, 1], self._changing).ravel()
+        instants = np.append([0.0, settings.settling_time, self.start_up], ends)
+        marks = np.unique(instants.round(MARK_DECIMALS))
+        before = marks[marks < settings.duration - 0.5 * 10.0**-MARK_DECIMALS]
+        return np.append(before, settings.duration)
+
+    @property
+    def network(self) -> Network:
+        """Network that makes the signals. It has no neurons if the signals are given."""
+        if self.gait is not None:
+            return self.robot.network(self.gait)
+        return Network.of(np.zeros((0, 0)), tau_a=1.0, tau_b=1.0, self_inhibition_weight=0.0)
+
+    @property
+    def gains(self) -> np.ndarray:
+        """Gains of the network's feedback, in the order of PATHWAYS; zeros if there is none."""
+        gains = self.gait.gains if self.gait else Gains()
+        return np.array([gain for _, gain in gains])
+
+    @property
+    def turns(self) -> np.ndarray:
+        """Steering, -1 to 1, at multiples of `cpg.listing_step`; see Robot.turns()."""
+        return self.robot.turns(self.gait, self.steering) if self.gait else np.zeros(1)
+
+
+def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
+    """Signals (samples, m) in N at multiples of `cpg.listing_step`, until after the duration.
+
+    They are `cpg.gain` times the output of the network, y_extensor - y_flexor. Between samples they
+    are linear. They are not set to zero before the start-up time. The turn within a step is the
+    turn at its middle.
+
+    With `cpg.signals: listing`, the network is integrated with forward Euler as in listing B:
+    sample i is the state after i + 1 steps, and the network ends one step before the duration. With
+    `live`, the classical Runge-Kutta method of order 4 is used, with an error of 1e-5. The last
+    output of the network is held for two more samples.
 
     Raises InputError if the gait does not fit. Raises InputError for a gait with feedback, because
     its signals depend on the robot's motion.
@@ -37,38 +160,10 @@ def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None)
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
     inputs = robot.tonic_input(midway)
     neurons = make_neurons(initial_neurons(cpg, oscillators))
-    output = np.empty((sample_count(robot), oscillators))
+    output = np.empty((DrivenRobot.of(robot, gait).sample_count, oscillators))
     listing = cpg.signals == "listing"
     network_output(network, inputs, cpg.listing_step, listing, neurons, output)
-    return output
-
-
-def sample_count(robot: Robot) -> int:
-    """Number of samples of raw_output()."""
-    scenario = robot.scenario
-    steps = scenario.simulation.duration / scenario.cpg.listing_step
-    return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
-
-
-def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-    """Signals (samples, m) in N at multiples of `cpg.listing_step`, until after the duration.
-
-    Between samples the signals are linear. They are not set to zero before the start-up time.
-    """
-    raw = raw_output(robot, gait, steering)
-    return robot.scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
-
-
-def interpolated(
-    samples: np.ndarray, times: np.ndarray, *, step: float, start_up: float
-) -> np.ndarray:
-    """Signals (times, m) at `times` (s), from samples (k, m) that are `step` (s) apart; zero before
-    the start-up time (s)."""
-    grid, values = step * np.arange(len(samples)), np.empty((len(times), samples.shape[1]))
-    for column, given in enumerate(samples.T):
-        values[:, column] = np.interp(times, grid, given)
-    values[times < start_up - 1e-9] = 0.0
-    return values
+    return cpg.gain * np.vstack([output, output[-1:], output[-1:]])
 
 
 def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:
@@ -90,8 +185,7 @@ def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | No
         raise InputError("rate", "", problem)
     period = cpg.listing_step if rate is None else 1.0 / rate
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
-    samples = signal_samples(robot, gait)
-    signals = interpolated(samples, times, step=cpg.listing_step, start_up=cpg.start_up)
+    signals = DrivenRobot.of(robot, gait).signals_at(times)
     names = [f"signal_{i + 1}" for i in range(robot.structure.signals)]
     cables = np.array(robot.structure.cable_names)
     driven = [" + ".join(cables[list(group)]) for group in robot.structure.groups]

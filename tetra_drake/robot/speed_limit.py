@@ -9,7 +9,7 @@ import numpy as np
 
 from tetra_drake.laws.actuator import Limits
 from tetra_drake.laws.cable import CableLaw, elastic_energy, elastic_tension
-from tetra_drake.robot.driven import DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import node_positions
 
 LEAST_LIMIT = 10.16
@@ -17,12 +17,13 @@ LEAST_LIMIT = 10.16
 
 
 def speed_limit(driven: DrivenRobot) -> float:
-    """Speed limit of a robot's bodies in m/s: `simulation.max_speed`, by default a speed out of
-    reach.
+    """Speed limit of a robot's bodies in m/s: `simulation.max_speed`, by default a speed that the
+    robot cannot reach.
 
-    By default the lightest body has all energy that there can be: of a fall from the robot's top to
-    the lowest ground, of the cables at the start, and of a pull by each actuator over the length of
-    its cable. To this speed is added what weight and loads give the robot where no ground stops it.
+    The default is the speed of the lightest body if it had all energy that there can be: of a fall
+    from the robot's top to the lowest ground, of the cables at the start, and of a pull by each
+    actuator over the length of its cable. Added is the speed that weight and loads can give the
+    whole robot where no ground stops it.
     """
     robot = driven.robot
     scenario, structure = robot.scenario, robot.structure

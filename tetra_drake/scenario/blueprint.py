@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Self
 
 import numpy as np
 
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.laws.model import WORLD
-from tetra_drake.settings.refusals import hint, refuse
+from tetra_drake.settings.refusals import refuse
 
 TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
 
 USUAL_SIZES = 0.1, 1.0
 """Least and greatest size (m) of robots for which areas of terrain, margins of figures and other
-lengths are chosen. They grow and shrink with other robots. See Blueprint.scale."""
+lengths are chosen. For larger and smaller robots these lengths are scaled. See Blueprint.scale."""
 
 LONGEST, SHORTEST = 1e4, 1e-6
 """Limits for the length of a strut, in m. The first is also the largest coordinate of a node."""
@@ -61,7 +59,7 @@ class Blueprint:
     struts: np.ndarray
     """Indices of the two nodes of each strut (struts, 2)."""
     strut_keys: tuple[str, ...]
-    """Settings of the struts, such as "struts.bar.pairs[0]", for messages."""
+    """Keys of the struts in the settings, such as "struts.bar.pairs[0]", for error messages."""
     strut_radius: np.ndarray
     """Radii of the struts (struts,)."""
     strut_density: np.ndarray
@@ -93,7 +91,7 @@ class Blueprint:
     cable_groups: tuple[str, ...]
     """Group of each cable, such as "outer"."""
     cable_keys: tuple[str, ...]
-    """Settings of the cables, such as "cables.side.pairs[0]", for messages."""
+    """Keys of the cables in the settings, such as "cables.side.pairs[0]", for error messages."""
     cable_ends: np.ndarray
     """Indices of the two nodes of each cable (cables, 2), from the lower body to the higher."""
     cable_laws: tuple[Mapping[str, float], ...]
@@ -180,54 +178,9 @@ class Blueprint:
         images = [{image_of_cable[cable] for cable in cables} for cables in self.groups]
         return tuple(groups.index(cables) if cables in groups else None for cables in images)
 
-    @property
-    def distances(self) -> np.ndarray:
-        """Distances between oscillators (m, m): 0 if their cables join the same bodies, 1 if they
-        share a body, 2 if both are at distance 1 of a third oscillator, and so on."""
-        from scipy.sparse.csgraph import shortest_path
-
-        bodies = self.carriers[self.cable_ends]
-        joined = [set(bodies[list(cables)].ravel().tolist()) for cables in self.groups]
-        count = len(joined)
-        near = np.array([[bool(a & b) for b in joined] for a in joined]).reshape(count, count)
-        same = np.array([[a == b for b in joined] for a in joined]).reshape(count, count)
-        steps = np.minimum(shortest_path(near, unweighted=True), count)
-        return np.where(same, 0.0, steps)
-
-    def with_oscillators(self, actuated: Mapping[str, Sequence[str]]) -> Self:
-        """The robot with other oscillators, given by the names of their cables.
-
-        Args:
-            actuated: names of the cables that each oscillator drives, such as "side a1 b1", with
-                the two nodes in either order.
-
-        Raises:
-            InputError: names the key in `actuated` of an unknown cable, or of one that has an
-                oscillator already.
-        """
-        numbers: dict[str, int] = {}
-        for number, name in enumerate(self.cable_names):
-            group, first, second = name.split()
-            numbers[name] = numbers[f"{group} {second} {first}"] = number
-
-        drivers: dict[int, str] = {}
-        for oscillator, names in actuated.items():
-            for i, name in enumerate(names):
-                key = f"actuated.{oscillator}[{i}]"
-                if name not in numbers:
-                    refuse(key, f"found unknown cable '{name}'; {hint(name, numbers)}")
-                cable = numbers[name]
-                if cable in drivers:
-                    found = f"found '{self.cable_names[cable]}', which '{drivers[cable]}' drives"
-                    refuse(key, f"{found}, expected it once")
-                drivers[cable] = oscillator
-
-        groups = tuple(tuple(numbers[name] for name in names) for names in actuated.values())
-        return dataclasses.replace(self, oscillators=tuple(actuated), groups=groups)
-
     def check(self) -> None:
         """Raises InputError, naming the key, for a robot that the laws cannot compute."""
-        self.check_struts()
+        self.check_sizes()
         self._check_bodies()
         self._check_cables()
 
@@ -250,10 +203,16 @@ class Blueprint:
             refuse("anchors", "hold every body, expected one that can move")
         if not self.contacts.size:
             refuse("contacts", "found none, expected one node at least")
-        self.check_lists()
 
-    def check_struts(self) -> None:
-        """Raises InputError for a strut whose size is too extreme for the computation of forces."""
+    def check_sizes(self) -> None:
+        """Raises InputError for a list without an item for each body, or a strut whose size is too
+        extreme for the computation of forces."""
+        bodies = len(self.bodies)
+        for key, items in (("offsets", self.offsets), ("payload", self.payload)):
+            if len(items) != bodies:
+                expected = f"expected none or {bodies}, one for each body"
+                refuse(key, f"found {len(items)} items, {expected}")
+
         lengths, diameters = self._distances(self.struts), 2.0 * self.strut_radius
         masses = math.pi * self.strut_radius**2 * lengths * self.strut_density
         struts = zip(self.strut_keys, lengths, diameters, masses, strict=True)
@@ -265,14 +224,6 @@ class Blueprint:
                 refuse(key, f"{thick}, expected a diameter of at least {THINNEST:g} of the length")
             if 0.0 < mass < LIGHTEST:
                 refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
-
-    def check_lists(self) -> None:
-        """Raises InputError for a list of settings that does not have one item per body."""
-        bodies = len(self.bodies)
-        for key, items in (("offsets", self.offsets), ("payload", self.payload)):
-            if len(items) != bodies:
-                expected = f"expected none or {bodies}, one for each body"
-                refuse(key, f"found {len(items)} items, {expected}")
 
     def _check_bodies(self) -> None:
         """Refuses bodies of hardly any mass, and nodes at one place.

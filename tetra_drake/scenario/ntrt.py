@@ -95,10 +95,21 @@ class _Translation:
         body_of = {node: body if body in dense else WORLD for node, body in body_of.items()}
         used: dict[str, None] = {}
         groups: dict[tuple[str, str, Place], list[_Part]] = {}
-        for part in self._effective(parts, body_of):
+        dense_pairs = {frozenset(pair.nodes) for pair, made, _ in parts if made.parameters.density}
+        for part in parts:
             pair, builder, at = part
-            groups.setdefault((builder.kind, pair.group, at), []).append(part)
-            used |= dict.fromkeys(pair.nodes)
+            (first, second), is_cable = pair.nodes, builder.kind == "cables"
+            body, other = body_of.get(first, first), body_of.get(second, second)
+            is_massless = not is_cable and not builder.parameters.density
+            if is_cable and body == other and first != second:
+                self._note("left out, as they join a body to itself", f"{first} {second}")
+            elif body == WORLD and not is_cable:
+                self._note("held in space, as their density is 0", pair.group)
+            elif is_massless and frozenset(pair.nodes) in dense_pairs:
+                self._note("left out, as parts with mass have their place", pair.group)
+            else:
+                groups.setdefault((builder.kind, pair.group, at), []).append(part)
+                used |= dict.fromkeys(pair.nodes)
         for group in groups.values():
             self._add_group(group)
         fixed = [name for name in used if body_of.get(name) == WORLD]
@@ -113,21 +124,6 @@ class _Translation:
         for name, one in self._one_of.items():
             if one not in used and one not in body_of:
                 self._note("left out, as nothing uses them", name)
-
-    def _effective(self, parts: list[_Part], body_of: dict[str, int]) -> Iterator[_Part]:
-        """Parts without those that have no effect. `body_of` is the body of each node."""
-        dense = {frozenset(pair.nodes) for pair, made, _ in parts if made.parameters.density}
-        for pair, builder, at in parts:
-            (first, second), is_cable = pair.nodes, builder.kind == "cables"
-            body, other = body_of.get(first, first), body_of.get(second, second)
-            if is_cable and body == other and first != second:
-                self._note("left out, as they join a body to itself", f"{first} {second}")
-            elif body == WORLD and not is_cable:
-                self._note("held in space, as their density is 0", pair.group)
-            elif not is_cable and not builder.parameters.density and frozenset(pair.nodes) in dense:
-                self._note("left out, as parts with mass have their place", pair.group)
-            else:
-                yield pair, builder, at
 
     def _note(self, what: str, name: str) -> None:
         self.notes.setdefault(what, {})[name] = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.ntrt_file import Builder, NtrtFile, Rotation, Substructure
+from tetra_drake.scenario.ntrt_file import Builder, NtrtFile, Substructure
 from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Pair
 from tetra_drake.scenario.yaml_text import read_mapping
 from tetra_drake.settings.refusals import hint
@@ -46,7 +46,7 @@ class Rule(NamedTuple):
 
 
 class TaggedPair(NamedTuple):
-    """Pair of nodes. Without nodes: what the pairs of a list share, with the place of the list."""
+    """Pair of nodes with its tags."""
 
     group: str
     """Key of its list: tags, separated by single blanks."""
@@ -54,7 +54,8 @@ class TaggedPair(NamedTuple):
     part: str
     """Beginning of the names of nodes in the part that the pair belongs to."""
     place: Place
-    nodes: Ends = ("", "")
+    nodes: Ends
+    """Paths of the nodes; as the file gives them until the nodes are found."""
 
 
 @dataclass
@@ -86,22 +87,23 @@ class Assembly:
         _check_size(len(self.parts), MOST_PARTS, Place(file, "substructures"))
         self._add_parts(given.substructures, file, part, (*above, file.resolve()))
         for tags, builder in given.builders.items():
-            self.rules.append(Rule(_tags(tags), builder, Place(file, f"builders.{tags}")))
+            place = Place(file, f"builders.{tags}")
+            self.rules.append(Rule(frozenset(tags.split()), builder, place))
         self.nodes |= {part + name: np.array(p) for name, p in given.nodes.items()}
         self.places |= {part + name: Place(file, f"nodes.{name}") for name in given.nodes}
         _check_size(len(self.nodes), MOST_NODES, Place(file, "nodes"))
         for tags, pairs in given.pair_groups.items():
-            shared = _shared(tags, part, Place(file, f"pair_groups.{tags}"))
-            self._add_pairs(shared, pairs, (part, part))
+            listed = _listed(pairs, tags, part, Place(file, f"pair_groups.{tags}"))
+            self._add_pairs(listed, (part, part))
         for outer, groups in given.bond_groups.items():
             for inner, pairs in groups.items():
                 bond, tags = (outer, inner) if "/" in outer else (inner, outer)
                 place = Place(file, f"bond_groups.{outer}.{inner}")
-                self._add_bond(bond, _shared(tags, part, place), pairs)
+                self._add_bond(bond, _listed(pairs, tags, part, place), part, place)
 
     def rule(self, pair: TaggedPair, kind: str) -> Rule | None:
         """The last rule of a kind for a pair. The tags of its part count, too."""
-        tags = pair.tags | _tags(_last(pair.part))
+        tags = pair.tags | _tags_of(pair.part)
         fitting = (one for one in reversed(self.rules) if one.tags <= tags)
         return next((one for one in fitting if one.builder.kind == kind), None)
 
@@ -120,7 +122,15 @@ class Assembly:
                 self.add_file(file.parent / entry.path, part=f"{part}{name}.", above=above)
         for name, _, entry, place in entries:
             if (rotation := entry.rotation) is not None:
-                start, turn = self._part(part, name, place), _turn(rotation, place)
+                from scipy.spatial import transform
+
+                start, axis = self._part(part, name, place), np.array(rotation.axis)
+                if not axis.any():
+                    problem = "found a vector of length 0, expected a direction"
+                    raise InputError(file, f"{place.key}.rotation.axis", problem)
+                axis /= np.abs(axis).max()  # its square must not be 0
+                vector = rotation.angle * axis / np.linalg.norm(axis)
+                turn = transform.Rotation.from_rotvec(vector, degrees=True).as_matrix()
                 self._move(start, place, turn, about=rotation.reference)
         for name, i, entry, place in entries:
             shift = i * np.array(entry.offset) + entry.translation
@@ -151,24 +161,17 @@ class Assembly:
             part = self._part(part, one, place)
         return _least_nested(self.nodes, part, tags, place, f"unknown node '{path}'")
 
-    def _add_pairs(self, shared: TaggedPair, pairs: list[Pair], starts: Ends) -> None:
+    def _add_pairs(self, listed: list[TaggedPair], starts: Ends) -> None:
         """Adds pairs from nodes of one part to nodes of another. `starts` are the parts."""
-        for pair, one in self._numbered(shared, pairs):
-            first, second = map(self._node, starts, pair, (one.place, one.place))
-            self.pairs.append(one._replace(nodes=(first, second)))
+        for pair in listed:
+            _check_size(len(self.pairs) + 1, MOST_PAIRS, pair.place)
+            first, second = map(self._node, starts, pair.nodes, (pair.place, pair.place))
+            self.pairs.append(pair._replace(nodes=(first, second)))
 
-    def _numbered(self, shared: TaggedPair, pairs: list[Pair]) -> Iterator[tuple[Pair, TaggedPair]]:
-        """Pairs of a list, each with its tags and its key in the file."""
-        _check_size(len(self.pairs) + len(pairs), MOST_PAIRS, shared.place)
-        for number, pair in enumerate(pairs):
-            place = shared.place._replace(key=f"{shared.place.key}[{number}]")
-            yield pair, shared._replace(place=place)
-
-    def _add_bond(self, bond: str, shared: TaggedPair, pairs: list[Pair]) -> None:
+    def _add_bond(self, bond: str, listed: list[TaggedPair], part: str, place: Place) -> None:
         """Adds the pairs of a bond such as "a/b/c/node_node" between neighbours in a row of
         parts."""
         *names, kind = bond.split("/")
-        part, place = shared.part, shared.place
         _check_size(len(names), MOST_PARTS, place)
         if kind not in ("node_node", "node_edge") or len(names) < 2:
             expected = "expected parts and a kind, 'A/B/node_node' or 'A/B/node_edge'"
@@ -176,12 +179,12 @@ class Assembly:
         for first, second in itertools.pairwise(names):
             starts = self._part(part, first, place), self._part(part, second, place)
             if kind == "node_edge":
-                self._bond_edges(shared, pairs, starts)
+                self._bond_edges(listed, starts, place)
             else:  # builders may ask for the names of both parts
-                tags = shared.tags | _tags(f"{first} {second} {first}/{second}")
-                self._add_pairs(shared._replace(tags=tags), pairs, starts)
+                tags = frozenset(f"{first} {second} {first}/{second}".split())
+                self._add_pairs([one._replace(tags=one.tags | tags) for one in listed], starts)
 
-    def _bond_edges(self, shared: TaggedPair, pairs: list[Pair], starts: Ends) -> None:
+    def _bond_edges(self, listed: list[TaggedPair], starts: Ends, place: Place) -> None:
         """Bonds nodes of a part to the middles of edges NODE/NODE of another.
 
         The second part is moved onto the first: the centres of the bonded points meet, and the
@@ -189,22 +192,23 @@ class Assembly:
         Each cable at an edge becomes two cables, from its ends to the node. Cables between the
         nodes are removed. Rods stay, but are refused as edges.
         """
+        _check_size(len(self.pairs) + len(listed), MOST_PAIRS, place)
         bonds, middles = [], []
-        for pair, one in self._numbered(shared, pairs):
+        for one in listed:
             ends = [
                 [self._node(start, name, one.place) for name in end.split("/", 1)]
-                for start, end in zip(starts, pair, strict=True)
+                for start, end in zip(starts, one.nodes, strict=True)
             ]
             if sorted(map(len, ends)) != [1, 2]:
-                problem = f"found {pair}, expected a node and an edge NODE/NODE"
+                problem = f"found {[*one.nodes]}, expected a node and an edge NODE/NODE"
                 raise InputError(*one.place, problem)
             (node,), edge = sorted(ends, key=len)
             bonds.append((node, edge, one))
             middles.append([np.mean([self.nodes[name] for name in end], axis=0) for end in ends])
         there, own = np.array(middles).reshape(-1, 2, 3).swapaxes(0, 1)
         centre = own.mean(axis=0)
-        turn = _frame(there, shared.place).T @ _frame(own, shared.place)
-        self._move(starts[1], shared.place, turn, about=centre, shift=there.mean(axis=0) - centre)
+        turn = _frame(there, place).T @ _frame(own, place)
+        self._move(starts[1], place, turn, about=centre, shift=there.mean(axis=0) - centre)
         nodes = {node for node, _, _ in bonds}
         edges = {frozenset(edge): one.place for _, edge, one in bonds}
         for old in self.pairs.copy():
@@ -220,9 +224,14 @@ class Assembly:
             self.pairs.append(one._replace(nodes=(node, second)))
 
 
-def _shared(tags: str, part: str, place: Place) -> TaggedPair:
-    """Tags and place that the pairs of a list have in common. `tags` is the key of the list."""
-    return TaggedPair(" ".join(tags.split()), _tags(tags), part, place)
+def _listed(pairs: list[Pair], tags: str, part: str, place: Place) -> list[TaggedPair]:
+    """Pairs of a list. `tags` is the key of the list, `place` its place in the file."""
+    group, all_tags = " ".join(tags.split()), frozenset(tags.split())
+    places = [place._replace(key=f"{place.key}[{number}]") for number in range(len(pairs))]
+    return [
+        TaggedPair(group, all_tags, part, one, (first, second))
+        for (first, second), one in zip(pairs, places, strict=True)
+    ]
 
 
 def _check_size(count: int, most: int, place: Place) -> None:
@@ -235,7 +244,7 @@ def _check_size(count: int, most: int, place: Place) -> None:
 def _least_nested(names: Iterable[str], part: str, tags: str, place: Place, what: str) -> str:
     """The least nested name inside a part that has all tags. `what` is for the error message."""
     inside = [name for name in names if name.startswith(part) and name != part]
-    fitting = [name for name in inside if _tags(tags) <= _tags(_last(name))]
+    fitting = [name for name in inside if _tags_of(name).issuperset(tags.split())]
     if not fitting or not tags:
         close = hint(tags, [name.removeprefix(part).rstrip(".") for name in inside])
         raise InputError(*place, f"found {what}; {close}")
@@ -243,25 +252,9 @@ def _least_nested(names: Iterable[str], part: str, tags: str, place: Place, what
 
 
 @functools.lru_cache(maxsize=4096)
-def _tags(text: str) -> Tags:
-    return frozenset(text.split())
-
-
-def _last(path: str) -> str:
+def _tags_of(path: str) -> Tags:
     """Tags of a node or a part: the end of its path."""
-    return path.rstrip(".").rpartition(".")[2]
-
-
-def _turn(rotation: Rotation, place: Place) -> Any:
-    """Matrix (3, 3) of a rotation."""
-    from scipy.spatial import transform
-
-    if not any(rotation.axis):
-        problem = "found a vector of length 0, expected a direction"
-        raise InputError(place.file, f"{place.key}.rotation.axis", problem)
-    axis = np.array(rotation.axis) / np.abs(rotation.axis).max()  # its square must not be 0
-    vector = rotation.angle * axis / np.linalg.norm(axis)
-    return transform.Rotation.from_rotvec(vector, degrees=True).as_matrix()
+    return frozenset(path.rstrip(".").rpartition(".")[2].split())
 
 
 def _frame(p: np.ndarray, place: Place) -> Any:

@@ -64,7 +64,8 @@ Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
 class StrutGroup(Section):
-    """Struts of one make: solid cylinders with a sphere of the same density at each end."""
+    """Struts with the same constants: solid cylinders with a sphere of the same density at each
+    end."""
 
     pairs: Pairs
     """The nodes that each strut joins."""
@@ -90,8 +91,8 @@ class StrutGroup(Section):
 
 
 class SphereGroup(Section):
-    """Solid spheres of one make at nodes, in place of the spheres of their struts. A sphere at a
-    node of no strut is a body of its own."""
+    """Equal solid spheres at nodes, in place of the spheres of their struts. A sphere at a node of
+    no strut is a body of its own."""
 
     nodes: list[str] = Field(min_length=1)
     """The nodes at their centres."""
@@ -195,7 +196,7 @@ class StructureFile(Section):
     def size(self) -> float:
         """Length (m) of the shortest strut, or of the shortest cable if there are no struts; the
         unit of `disturbances.start`."""
-        return self._passive_blueprint().shortest
+        return self.blueprint().shortest
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
         """Further changes that follow from `changes` to a base: none."""
@@ -207,10 +208,6 @@ class StructureFile(Section):
         Bodies and their nodes are in the order of the struts; then come other nodes with a mass or
         a sphere. Cables are in the order of the pairs of bodies, those from fixed nodes first.
         """
-        return self._passive_blueprint().with_oscillators(self.actuated)
-
-    def _passive_blueprint(self) -> Blueprint:
-        """The robot without oscillators."""
         bodies = self._nodes_of_bodies()
         body_of = {node: body for body, nodes in enumerate(bodies) for node in nodes}
         moving = [*body_of]
@@ -236,6 +233,12 @@ class StructureFile(Section):
             span = np.array(self.nodes[second]) - self.nodes[first]
             cable_ends.append([number[first], number[second]])
             cable_laws.append(self.cables[cable.group].law(float(np.linalg.norm(span))))
+        cable_names = tuple(" ".join((cable.group, *cable.nodes)) for cable in cables)
+        numbers = _cable_numbers(cable_names)
+        groups = [  # unknown cables are refused by _check_actuated()
+            tuple(numbers[name] for name in names if name in numbers)
+            for names in self.actuated.values()
+        ]
 
         return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
@@ -257,13 +260,15 @@ class StructureFile(Section):
             anchor_damping=self.anchor_stiffness * self.anchor_time_constant * held,
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
-            cable_names=tuple(" ".join((cable.group, *cable.nodes)) for cable in cables),
+            cable_names=cable_names,
             cable_groups=tuple(cable.group for cable in cables),
             cable_keys=tuple(cable.key for cable in cables),
             cable_ends=np.array(cable_ends, dtype=int).reshape(-1, 2),
             cable_laws=tuple(cable_laws),
             slack=True,
             contacts=np.array(sorted({number[node] for node in touching}), dtype=int),
+            oscillators=tuple(self.actuated),
+            groups=tuple(groups),
         )
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
@@ -306,12 +311,24 @@ class StructureFile(Section):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _apply_unit(cls, tree: Any) -> Any:
-        """Applies the key `unit` of a tree to all coordinates without a unit. Only mm is kept:
-        other units of a robot follow from its lengths."""
-        if not isinstance(tree, dict) or tree.get("unit") is None:
+    def _prepare(cls, tree: Any) -> Any:
+        """Refuses a group without pairs: most often a change of a group of another name. Applies
+        the key `unit` to all coordinates without a unit. Only mm is kept: other units of a robot
+        follow from its lengths."""
+        if not isinstance(tree, dict):
             return tree
-        unit = tree["unit"]
+        for kind in ("struts", "cables"):
+            given = tree.get(kind)
+            groups = given.items() if isinstance(given, dict) else ()
+            mappings = [(str(name), group) for name, group in groups if isinstance(group, dict)]
+            whole = [name for name, group in mappings if "pairs" in group]
+            for name, group in mappings:
+                if "pairs" not in group:
+                    refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, whole)}")
+
+        unit = tree.get("unit")
+        if unit is None:
+            return tree
         try:
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
@@ -323,31 +340,10 @@ class StructureFile(Section):
             )
         return tree
 
-    @pydantic.model_validator(mode="before")
-    @classmethod
-    def _check_groups(cls, tree: Any) -> Any:
-        """Refuses a group without pairs: most often a change of a group of another name."""
-        for kind in ("struts", "cables") if isinstance(tree, dict) else ():
-            given = tree.get(kind)
-            groups = given.items() if isinstance(given, dict) else ()
-            mappings = [(str(name), group) for name, group in groups if isinstance(group, dict)]
-            whole = [name for name, group in mappings if "pairs" in group]
-            for name, group in mappings:
-                if "pairs" not in group:
-                    refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, whole)}")
-        return tree
-
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
-        self._check_nodes()
-        passive = self._passive_blueprint()
-        passive.check()
-        passive.with_oscillators(self.actuated)  # refuses unknown cables
-        return self
-
-    def _check_nodes(self) -> None:
         """Refuses nodes that do not exist, are joined twice or to themselves, hang on nothing,
-        cannot move where they must, or are far away."""
+        cannot move where they must, or are far away; then what no robot can have."""
         members = [*_members("struts", self.struts), *_members("cables", self.cables)]
         ends = [(member.key, node) for member in members for node in member.nodes]
         anchors = [(f"anchors.{node}", node) for node in self.anchors]
@@ -391,6 +387,25 @@ class StructureFile(Section):
             if max(map(abs, place)) > LONGEST:
                 expected = f"expected coordinates of at most {LONGEST:g} m"
                 refuse(f"nodes.{node}", f"found {place}, {expected}")
+        self.blueprint().check()
+        return self
+
+    @pydantic.model_validator(mode="after")
+    def _check_actuated(self) -> StructureFile:
+        """Refuses an unknown cable, or one that has an oscillator already."""
+        cable_names = self.blueprint().cable_names
+        numbers, drivers = _cable_numbers(cable_names), dict[int, str]()
+        for oscillator, names in self.actuated.items():
+            for i, name in enumerate(names):
+                key = f"actuated.{oscillator}[{i}]"
+                if name not in numbers:
+                    refuse(key, f"found unknown cable '{name}'; {hint(name, numbers)}")
+                cable = numbers[name]
+                if cable in drivers:
+                    found = f"found '{cable_names[cable]}', which '{drivers[cable]}' drives"
+                    refuse(key, f"{found}, expected it once")
+                drivers[cable] = oscillator
+        return self
 
 
 RobotKind = Annotated[Tetrahedra | StructureFile, Kinds()]
@@ -405,6 +420,15 @@ def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterato
     for name, group in groups.items():
         for place, (first, second) in enumerate(group.pairs):
             yield Member(f"{key}.{name}.pairs[{place}]", name, (first, second))
+
+
+def _cable_numbers(names: Iterable[str]) -> dict[str, int]:
+    """Indices of cables by their names, with the two nodes in either order."""
+    numbers: dict[str, int] = {}
+    for number, name in enumerate(names):
+        group, first, second = name.split()
+        numbers[name] = numbers[f"{group} {second} {first}"] = number
+    return numbers
 
 
 def components(pairs: Iterable[Sequence[str]]) -> list[list[str]]:

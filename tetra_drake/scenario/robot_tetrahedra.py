@@ -197,46 +197,40 @@ class Tetrahedra(Section):
     @field_validator("spacing")
     @classmethod
     def _balance(cls, spacing: float, info: ValidationInfo) -> float:
+        """Spacing s (m) at which the cables of a junction balance along x, if none is given.
+
+        Three outer cables of length s pull two tetrahedra together. Three inner cables, from a tip
+        at distance h to base nodes at distance s and radius R, push them apart if s < h. The weight
+        is neglected: twice the density moves T1 by less than 0.003 in. Refuses cables that balance
+        at no spacing.
+        """
         if spacing > 0.0 or not {"strut_length", "cables"} <= info.data.keys():
             return spacing
-        return balanced_spacing(info.data["strut_length"], info.data["cables"])
+        strut_length, cables = info.data["strut_length"], info.data["cables"]
+        height, radius = strut_length * math.sqrt(2.0 / 3.0), strut_length / math.sqrt(3.0)
+        outer, inner = CableLaw(**cables.law("outer top")), CableLaw(**cables.law("inner top"))
+
+        def pull(s: float) -> float:
+            length = math.hypot(radius, height - s)
+            apart = elastic_tension(length - inner.free_length, inner) * (height - s) / length
+            return elastic_tension(s - outer.free_length, outer) - apart
+
+        near, far = 0.0, height + cables.free_length
+        if pull(near) >= 0.0:
+            refuse("", "the cables balance at no spacing; give one")
+        for _ in range(100):  # enough halvings for double precision
+            middle = 0.5 * (near + far)
+            if pull(middle) > 0.0:
+                far = middle
+            else:
+                near = middle
+        return far
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        blueprint = self.blueprint()
-        blueprint.check_struts()
-        blueprint.check_lists()
+        self.blueprint().check_sizes()
         cables = [cable for group in self.actuation for cable in group]
         for cable in cables:
             if cables.count(cable) > 1:
                 refuse("actuation", f"found '{cable}' twice, expected each cable once at most")
         return self
-
-
-def balanced_spacing(strut_length: float, cables: RowCables) -> float:
-    """Spacing s (m) at which the cables of a junction balance along x.
-
-    Three outer cables of length s pull two tetrahedra together. Three inner cables, from a tip at
-    distance h to base nodes at distance s and radius R, push them apart if s < h. The weight is
-    neglected: twice the density moves T1 by less than 0.003 in. Refuses cables that balance at no
-    spacing.
-    """
-    height = strut_length * math.sqrt(2.0 / 3.0)
-    radius = strut_length / math.sqrt(3.0)
-    outer, inner = CableLaw(**cables.law("outer top")), CableLaw(**cables.law("inner top"))
-
-    def pull(s: float) -> float:
-        length = math.hypot(radius, height - s)
-        apart = elastic_tension(length - inner.free_length, inner) * (height - s) / length
-        return elastic_tension(s - outer.free_length, outer) - apart
-
-    near, far = 0.0, height + cables.free_length
-    if pull(near) >= 0.0:
-        refuse("", "the cables balance at no spacing; give one")
-    for _ in range(100):  # enough halvings for double precision
-        middle = 0.5 * (near + far)
-        if pull(middle) > 0.0:
-            far = middle
-        else:
-            near = middle
-    return far

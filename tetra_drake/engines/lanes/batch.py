@@ -33,9 +33,9 @@ from tetra_drake.laws.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.command import driven_robot
-from tetra_drake.robot.driven import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.scenario import Scenario
 

@@ -17,8 +17,8 @@ from tetra_drake.laws.actuator import DRIVE, Limits
 from tetra_drake.laws.forces import sizes_of
 from tetra_drake.laws.oscillator import make_neurons
 from tetra_drake.results.result import motion_times
-from tetra_drake.robot.driven import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.network import initial_neurons
+from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.scenario.engine_kinds import Compiled
 
@@ -69,7 +69,7 @@ class Prepared:
             robot=model._replace(ground=ground),
             solver=solver,
             network=driven.network,
-            senses=driven.senses,
+            senses=robot.senses,
             sides=np.repeat(structure.sides, 2).astype(float),
             external_input=np.array([cpg.external_input]),
             gains=driven.gains,
