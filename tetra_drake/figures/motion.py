@@ -26,8 +26,8 @@ from tetra_drake.figures.style import (
     page_of,
     page_width,
     panels_in_columns,
-    set_title,
     shown_part,
+    titled,
 )
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results.result import SimulationResult
@@ -70,12 +70,11 @@ def relative_distances(result: SimulationResult, *, time: Span | None = None) ->
         line = distances.sel(body=name)
         panel.axhline(float(line[0]), color="0.6", linewidth=0.7)
         panel.plot(line.time, line, label=folded(name, width), **line_style(i))
-    panel.set_xlabel("time (s)")
-    panel.set_ylabel(folded(f"distance from {first} ({unit.length_name})", 0.6 * height))
+    y_label = folded(f"distance from {first} ({unit.length_name})", 0.6 * height)
+    panel.set(xlabel="time (s)", ylabel=y_label)
     if names:
         page.legend(loc="outside right upper", reverse=True, frameon=False)
-    set_title(page, f"Distance of each body from {first}", share=0.6)  # beside the legend
-    return page
+    return titled(page, f"Distance of each body from {first}", share=0.6)  # beside the legend
 
 
 @figure_function
@@ -95,8 +94,7 @@ def before_and_after(
         legend[f"{when}: {way}, {result.name}"] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
     legend_below(page, legend)
-    set_title(page, "Distance walked, before and after evolution")
-    return page
+    return titled(page, "Distance walked, before and after evolution")
 
 
 @figure_function
@@ -129,8 +127,7 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
     if len(looks) <= len(LINE_COLOURS):
         legend = dict(zip(structure.bodies, looks, strict=True)) | legend
     legend_below(page, legend)
-    set_title(page, "Time lapse from above: time and distance walked")
-    return page
+    return titled(page, "Time lapse from above: time and distance walked")
 
 
 @figure_function
@@ -156,8 +153,7 @@ def path_of_the_centre(
             panel.plot(points[:, X], _heights_below(points, result), **_GROUND)
         panel.set_ylabel(f"height ({unit.length_name})")
         panel.margins(x=0.02, y=0.1)
-        set_title(page, "Height of the centre along its path")
-        return page
+        return titled(page, "Height of the centre along its path")
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
     if structure.points_ahead:
         looks["heading"] = {"color": OKABE_ITO["vermillion"], "marker": ">", "linestyle": "-"}
@@ -170,8 +166,7 @@ def path_of_the_centre(
     panel.set_aspect("equal", adjustable="datalim")
     panel.set_ylabel(f"y ({unit.length_name})")
     legend_below(page, looks)
-    set_title(page, "Path of the centre from above")
-    return page
+    return titled(page, "Path of the centre from above")
 
 
 @figure_function
@@ -225,8 +220,7 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
     }
     legend_below(page, looks)
     title = "One step" if cycle else "The last quarter"
-    set_title(page, f"{title}, {start:.2f} to {end:.2f} s")
-    return page
+    return titled(page, f"{title}, {start:.2f} to {end:.2f} s")
 
 
 def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[np.ndarray, float]:

@@ -262,10 +262,11 @@ def panels_in_columns(
     return list(grid[:count])
 
 
-def set_title(page: Page, title: str, *, share: float = 1.0) -> None:
-    """Writes the title of a figure at the upper left, in lines of a share of the page's width."""
+def titled(page: Page, title: str, *, share: float = 1.0) -> Page:
+    """A figure with a title at its upper left, in lines of a share of the figure's width."""
     text = folded(title, share * page_width(page), size=rcParams["figure.titlesize"])
     page.suptitle(text, x=0.01, ha="left")
+    return page
 
 
 def name_panel(panel: Axes, name: str) -> None:
@@ -313,8 +314,8 @@ def save_findings(
     text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(folder / "summary.json", text + "\n")
     save_figure(figure, folder, name, kinds=kinds)
-    pictures = [f"{name}.{kind}" for kind in kinds]
-    return [*(f"{table}.csv" for table in tables), "summary.json", *pictures]
+    csv_files = [f"{table}.csv" for table in tables]
+    return [*csv_files, "summary.json", *(f"{name}.{kind}" for kind in kinds)]
 
 
 @common_style()

@@ -33,7 +33,7 @@ from tetra_drake.figures.style import (
     page_of,
     page_width,
     save_findings,
-    set_title,
+    titled,
 )
 from tetra_drake.formatting import TextTable, fixed, ranged, rounded
 from tetra_drake.scenario.scenario import Scenario
@@ -168,18 +168,15 @@ def compare_scenarios(
     Raises InputError also if no scenario has two of the runs.
     """
     _check_lists(directories, labels)
-    groups: dict[str, list[int]] = {}
-    for place, directory in enumerate(directories):
-        name = read_manifest(Path(directory)).scenario.name
-        groups.setdefault(name, []).append(place)
-    if all(len(group) == 1 for group in groups.values()):
-        found = f"found one run of each scenario: {', '.join(groups)}"
+    names = pandas.Series([read_manifest(Path(each)).scenario.name for each in directories])
+    if names.is_unique:
+        found = f"found one run of each scenario: {', '.join(names)}"
         raise InputError("compare", "scenarios", f"{found}; expected two of one scenario at least")
     compared = {}
-    for name, places in groups.items():
-        own = [labels[place] for place in places] if labels else None
-        runs = [directories[place] for place in places]
-        compared[name] = compare(runs, reach=reach, labels=own)
+    for name, group in names.groupby(names, sort=False):
+        own = [labels[place] for place in group.index] if labels else None
+        runs = [directories[place] for place in group.index]
+        compared[str(name)] = compare(runs, reach=reach, labels=own)
     return compared
 
 
@@ -293,8 +290,8 @@ def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
 
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     """Columns of Compared.runs for one run, computed from its trials."""
-    row: dict[str, Any] = {"trials": len(trials), "going_on": int((~trials["ended"]).sum())}
-    row["cost"] = trials["cost"].median()
+    going_on, cost = int((~trials["ended"]).sum()), trials["cost"].median()
+    row: dict[str, Any] = {"trials": len(trials), "going_on": going_on, "cost": cost}
     for name in ("at_common", "fitness", "distance"):
         values = trials[name].replace(-math.inf, math.nan).dropna()
         row[name] = values.median()
@@ -444,5 +441,4 @@ def comparison(compared: Compared) -> Drawn:
         distance = f"{compared.reach / unit.length:.4g} {unit.length_name}"
         panels[1].set(ylabel=f"{distance} reached (% of trials)", ylim=(-3.0, 103.0))
     legend_below(page, {label: line_style(series) for series, label in enumerate(labels)})
-    set_title(page, "How well runs search: median and quartiles over trials")
-    return page
+    return titled(page, "How well runs search: median and quartiles over trials")

@@ -19,7 +19,7 @@ import pandas
 from tetra_drake.evolution.entries import ELITES, EliteLine, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, gait_label, load_run
-from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
+from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, titled
 from tetra_drake.files import json_number
 from tetra_drake.formatting import listed
 from tetra_drake.optimizers.quality_diversity import FLOOR
@@ -75,8 +75,8 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
         return
     file.repair()
     run = load_run(directory)
-    gaits_of_map = elites(run)
-    missing = gaits_of_map[gaits_of_map["kept"].isna()]
+    of_map = elites(run)
+    missing = of_map[of_map["kept"].isna()]
     if missing.empty:
         return
     keys = missing[_KEY].to_numpy().tolist()
@@ -165,5 +165,4 @@ def map_of_gaits(run: Run) -> Drawn:
     notes = [f"{listed(names)}: {gait_label(gait)}" for names, gait in named]
     notes = [f"{number}  {note}" for number, note in enumerate(notes, start=1)]
     page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize="small", wrap=True)
-    set_title(page, "Map of gaits")
-    return page
+    return titled(page, "Map of gaits")

@@ -94,12 +94,6 @@ class MotionCapture(Section):
     clock: Time = Field(default=0.0, ge=0)
     """Largest offset of the log's clock from the command's, which is found; 0 for none."""
 
-    @property
-    def files(self) -> dict[str, str]:
-        """Paths of the files by key."""
-        paths = {"log": self.log, "command": self.command, "gait": self.gait}
-        return {key: path for key, path in paths.items() if path is not None}
-
     def read(self, scenario: Scenario, name: str) -> Measured:
         """Table of the measured numbers in the log. Raises InputError, naming file and line or
         column, if the log is wrong."""
@@ -198,11 +192,6 @@ class Rest(Section):
     frequency_uncertainty: Annotated[Frequency, _UNCERTAINTY] = 0.05
     """Standard deviation of a frequency."""
 
-    @property
-    def files(self) -> dict[str, str]:
-        """Paths of the files by key: none."""
-        return {}
-
     def read(self, scenario: Scenario, name: str) -> Measured:
         """Table of the measured numbers. Raises InputError for an unknown node or cable."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
@@ -260,6 +249,12 @@ class FitFile(Section):
     measurements: list[Measurement] = Field(min_length=1)
 
 
+def files_of(measurement: Measurement) -> dict[str, str]:
+    """Paths of a measurement's files by key."""
+    paths = measurement.model_dump(include={"log", "command", "gait"})
+    return {key: path for key, path in paths.items() if path is not None}
+
+
 def load_fit_file(path: str | Path) -> FitFile:
     """Reads the file of a fit. Paths in the file are relative to its folder. Raises InputError,
     naming file and key, if the content is wrong."""
@@ -268,7 +263,7 @@ def load_fit_file(path: str | Path) -> FitFile:
     given = FitFile.from_tree(tree, path)
     placed = []
     for measurement in given.measurements:
-        paths = {key: str(path.parent / file) for key, file in measurement.files.items()}
+        paths = {key: str(path.parent / file) for key, file in files_of(measurement).items()}
         placed.append(measurement.model_copy(update=paths))
     return given.model_copy(update={"measurements": placed})
 

@@ -73,8 +73,7 @@ def sweep(
     count = len(walkers) * math.prod(len(values) for values in changes.values())
     if count > MOST:
         raise InputError("sweep", "changes", f"found {count} simulations, expected at most {MOST}")
-    combinations = itertools.product(*changes.values())
-    grid = [dict(zip(changes, each, strict=True)) for each in combinations]
+    grid = [dict(zip(changes, each, strict=True)) for each in itertools.product(*changes.values())]
     scenarios = [with_joined_changes(base, each) for each in grid]
     outcomes = simulate_many(
         [changed for changed in scenarios for _ in walkers],
@@ -96,12 +95,8 @@ def sweep(
             labels[dimension] = [str(value) for value in values], {}
     labels["gait"] = [gait.name for gait in walkers], {}
     shape = [len(values) for values, _ in labels.values()]
-    rows = [
-        {}
-        if isinstance(outcome, SimulationFailure)
-        else {"fitness": outcome.fitness, **vars(outcome.metrics)}
-        for outcome in outcomes
-    ]
+    results = [None if isinstance(each, SimulationFailure) else each for each in outcomes]
+    rows = [{"fitness": each.fitness, **vars(each.metrics)} if each else {} for each in results]
     variables = {}
     for name, unit in {"fitness": "", **UNITS}.items():
         found = np.reshape([row.get(name, math.nan) for row in rows], shape)
