@@ -97,7 +97,7 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
 
 
 def _rows_of_names(names: Iterable[str]) -> float:
-    """Height of one of these names, in rows of the diagram."""
+    """Height of the name with the most lines, in rows of the diagram."""
     return 1.3 * most_lines(names) - 0.3
 
 

@@ -89,12 +89,12 @@ _WIDEST, _MOST_PER_INCH = 40.0, 4.5
 USUAL = Look()
 
 FILE_KINDS = ("svg", "png")
-"""Kinds of the files of a figure, by default."""
+"""File types of a figure, by default."""
 
 
 @dataclass(frozen=True)
 class Print:
-    """Print of figures: their look, and the kinds of their files; see save_figure()."""
+    """Settings for the files of figures: the look, and the file types of save_figure()."""
 
     look: Look = USUAL
     kinds: Sequence[str] = FILE_KINDS
@@ -249,7 +249,8 @@ def own_words(names: Sequence[str]) -> list[str]:
 def panels_in_columns(
     page: Page, count: int, columns: int, *, x_label: str, **shared: Any
 ) -> list[Axes]:
-    """Panels in columns with one common label of x. `shared` is passed to Figure.subplots()."""
+    """Panels in columns with one common label of the x axes. `shared` is passed to
+    Figure.subplots()."""
     inner = page.subfigures(squeeze=False)[0, 0]  # puts the label above a legend of the page
     inner.supxlabel(x_label)
     grid = inner.subplots(math.ceil(count / columns), columns, squeeze=False, **shared).ravel()

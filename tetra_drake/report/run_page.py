@@ -58,7 +58,7 @@ _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 @dataclass(frozen=True)
 class RecordedGait:
-    """A gait of a run: its record, and a new simulation.
+    """Gait of a run: its recorded evaluation, and a new simulation.
 
     The numbers may differ if other versions recorded the gait. They differ for a run with
     disturbances, because the new simulation has none.
@@ -92,7 +92,7 @@ data to draw."""
 
 
 class GaitColumn(NamedTuple):
-    """A gait in a table of the report."""
+    """Column of a gait in a table of the report."""
 
     names: Sequence[str]
     recorded: pandas.Series

@@ -181,8 +181,10 @@ def compare_scenarios(
 
 
 def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Probability that one of our numbers exceeds one of theirs: the share of such pairs among
-    all. Equal numbers count one half. The numbers are along the last axes, (..., n) and (..., m).
+    """Probability that a number of our sample exceeds a number of their sample.
+
+    It is the share of such pairs among all pairs. Equal numbers count one half. Samples are along
+    the last axes, (..., n) and (..., m).
 
     From R. Agarwal et al., "Deep reinforcement learning at the edge of the statistical precipice",
     NeurIPS 2021 (rliable).

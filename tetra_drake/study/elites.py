@@ -93,8 +93,7 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
 
 
 def kept_gaits(gaits: pandas.DataFrame) -> pandas.DataFrame:
-    """Elites that are not lucky, the fittest first: all but those that keep less than the share
-    LUCKY of the draws."""
+    """Elites without those that keep less than the share LUCKY of the draws, the fittest first."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 

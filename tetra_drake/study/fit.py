@@ -207,7 +207,7 @@ def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
 
 
 def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: float) -> Fit:
-    """The result of a fit that started at relative parameters and ended at `x` (n,)."""
+    """The result of a fit from the point `start` (n,) to the point `x` (n,)."""
     first, last = problem.residuals(start), problem.residuals(x)
     misfit, jacobian = problem.misfit(last), problem.jacobian(x)
     half, correlation = _uncertainty(problem, jacobian, misfit)

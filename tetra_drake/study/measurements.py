@@ -95,8 +95,8 @@ class MotionCapture(Section):
     """Largest offset of the log's clock from the command's, which is found; 0 for none."""
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Table of the measured numbers in the log. Raises InputError, naming file and line or
-        column, if the log is wrong."""
+        """Measured coordinates of the log, and their prediction. Raises InputError, naming file and
+        line or column, if the log is wrong."""
         if (self.command is None) == (self.gait is None):
             problem = f"found {'neither' if self.gait is None else 'both'}, expected one of them"
             raise InputError(name, "command", f"{problem}, a command or a gait")
@@ -193,7 +193,8 @@ class Rest(Section):
     """Standard deviation of a frequency."""
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Table of the measured numbers. Raises InputError for an unknown node or cable."""
+        """Measured numbers, and their prediction. Raises InputError for an unknown node or
+        cable."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
         places = _coordinates(structure.node_names)
         for key, known in {"positions": places, "tensions": structure.cable_names}.items():

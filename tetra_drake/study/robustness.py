@@ -103,8 +103,8 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Default disturbances: a spread of `percent` for all numbers marked as Varied, and for the
-    initial positions."""
+    """Default disturbances: a spread of `percent` for all uncertain numbers of a scenario, and for
+    the initial positions. Uncertain numbers are marked as Varied in their settings."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):
@@ -270,8 +270,8 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
 
 
 def chance(draws: int) -> float:
-    """Rank correlation that chance alone may give: 95 % of the correlations of unrelated numbers
-    are smaller in absolute value."""
+    """Largest rank correlation that is likely by chance: 95 % of the correlations of unrelated
+    numbers are smaller in absolute value."""
     return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
 
 

@@ -107,7 +107,7 @@ def sweep(
 
 
 def _values(key: str, given: Any) -> Collection[Any]:
-    """The values for a key; `given` may be a single value."""
+    """The values of a key, from a collection or a single value."""
     if hasattr(given, "tolist"):
         given = given.tolist()
     is_one = isinstance(given, (str, bytes, Mapping, Section)) or not isinstance(given, Collection)
@@ -118,7 +118,7 @@ def _values(key: str, given: Any) -> Collection[Any]:
 
 
 def with_joined_changes(scenario: Scenario, by_joined: Mapping[str, Any]) -> Scenario:
-    """The scenario with changes by keys that are joined by commas and get the same value; see
+    """The scenario with changed values by key; keys joined by commas get the same value. See
     Scenario.with_changes().
 
     Raises InputError, naming the key. It advises to join a changed key and another one of its

@@ -125,7 +125,7 @@ def node_paths(structure: Structure) -> list[str]:
 
 
 def node_colours(structure: Structure) -> list[str]:
-    """Name of each node's colour off the ground."""
+    """Name in COLOURS of each node's colour while it does not touch the ground."""
     colours: list[str] = np.where(structure.held.any(axis=1), "anchor", "node").tolist()
     return colours
 
