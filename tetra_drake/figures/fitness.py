@@ -52,10 +52,9 @@ def initial_distances(run: Run) -> Drawn:
     panel.bar(right, extremes["worst"], width, color=orange, label="least fit gait of a trial")
     panel.axhline(0.0, color="black", linewidth=0.8)
     margin = max(0.9, 2.0 - len(extremes) / 2)  # a single trial has thin bars, too
-    duration = run.scenario.simulation.duration
     panel.set(
         xlabel="trial",
-        ylabel=f"distance in {duration:g} s ({unit.length_name})",
+        ylabel=f"distance in {run.scenario.simulation.duration:g} s ({unit.length_name})",
         xlim=(extremes.index.min() - margin, extremes.index.max() + margin),
         xticks=extremes.index[:: math.ceil(len(extremes) / _TICKS)],
     )

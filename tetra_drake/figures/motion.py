@@ -43,6 +43,7 @@ _MARGIN = 0.6 * INCH  # m; free space around a robot of usual size
 _PROFILE = 0.05 * INCH  # m; distance between points of its ground's profile
 _PANEL_NAME, _GAP = 0.27, 0.13  # inches; height of a panel's name, and gap between panels
 _PATHS = 6  # largest number of panels of paths side by side
+_X_LABEL = "x, forward ({}) →"
 _CLEARANCE = 0.02  # a body is off the ground above this share of the robot's height
 
 _ON_GROUND, _LIFTED = "0.2", OKABE_ITO["vermillion"]
@@ -111,8 +112,7 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
     wide, high = (_range(shown[:, axis], result) for axis in (X, Y))
     columns, height = _fit(instants, wide, high, height_in=6.0)
     page = page_of(height_in=height + 0.9)
-    x_label = f"x, forward ({unit.length_name}) →"
-    panels = panels_in_columns(page, instants, columns, x_label=x_label)
+    panels = panels_in_columns(page, instants, columns, x_label=_X_LABEL.format(unit.length_name))
     looks = [{"color": LINE_COLOURS[i % len(LINE_COLOURS)]} for i in range(len(structure.bodies))]
     for sample, panel in zip(samples, panels, strict=True):
         now = float(trajectory.time[sample])
@@ -199,8 +199,7 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
     page = page_of(height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
 
-    x_label = f"x, forward ({unit.length_name}) →"
-    panels = panels_in_columns(upper, instants, columns, x_label=x_label)
+    panels = panels_in_columns(upper, instants, columns, x_label=_X_LABEL.format(unit.length_name))
     for sample, panel in zip(samples, panels, strict=True):
         name_panel(panel, f"{float(step.time[sample]) - start:.2f} s")
         panel.plot(x, profile + across[0] - high, **_GROUND)

@@ -230,11 +230,9 @@ class Rest(Section):
             p_WN = node_positions(structure, rest.state).ravel()[places]
             force_at_rest(unactuated, rest.state)
             forces = unactuated.forces.cable_forces[cables, TENSION]
-            frequencies = np.full(modes, np.nan)
-            if modes:
-                found = study_equilibrium(robot).frequencies[:modes]
-                frequencies[: len(found)] = found
-            predictions.append(Prediction(np.concatenate([p_WN, forces, frequencies])))
+            found = study_equilibrium(robot).frequencies[:modes] if modes else np.zeros(0)
+            lacking = np.full(modes - len(found), np.nan)
+            predictions.append(Prediction(np.concatenate([p_WN, forces, found, lacking])))
         return predictions
 
 

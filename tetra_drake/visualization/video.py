@@ -15,12 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import check_file, whole_file
 from tetra_drake.formatting import Say, silent
 from tetra_drake.machine import check_package
-from tetra_drake.visualization.browser import (
-    do,
-    launch_browser,
-    picture_of,
-    wait_until_loaded,
-)
+from tetra_drake.visualization.browser import do, launch_browser, picture_of, wait_until_loaded
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
