@@ -28,8 +28,8 @@ from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.study.robustness import by_gait, robustness
 
 LUCKY = 0.5
-"""Least share of draws that an elite must keep; an elite below it is left out as lucky. For `kept`
-see robustness.LOSS."""
+"""Least share of draws that an elite must keep. The fitness of an elite below it is taken for luck,
+and the elite is left out. For `kept` see robustness.LOSS."""
 
 CELLS = ["cell_1", "cell_2"]
 _KEY = ["trial", "index"]

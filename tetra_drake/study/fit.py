@@ -146,7 +146,7 @@ def fit_values(
         parameters: the bounds, least and most, by key. Keys joined by commas get the same value.
         search: searches all values within the bounds for a better start, by CMA-ES.
         folder: keeps each evaluation; another fit to the same data takes them from there.
-        say: is told of each iteration.
+        say: function that gets a line of text after each iteration.
         source: file with the parameters, for errors.
 
     Raises:

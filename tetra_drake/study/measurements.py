@@ -1,6 +1,6 @@
 """Measurements of a robot, for fit(): its motion, or its shape, tensions and frequencies at rest.
 
-Each kind of measurement has its settings, reads its numbers, and predicts them for other scenarios.
+A measurement has settings, reads its numbers, and predicts them for other scenarios.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ class Measured:
 
     name: str
     numbers: pandas.DataFrame
-    """A row per number in SI: label, such as "n3 z"; along, its time (s) or its place in the list;
-    measured; uncertainty, its standard deviation."""
+    """A row per number in SI: label, such as "n3 z"; along, its time (s) or its position in the
+    list; measured; uncertainty, its standard deviation."""
     predict: Callable[[Sequence[Scenario]], list[Prediction]]
     """What scenarios predict; NaN if a scenario cannot be simulated."""
 

@@ -73,7 +73,7 @@ def make_video(
         fps: frames per second.
         view: a name in VIEWS. The camera follows the robot.
         speed: speed of the robot in the video, as a multiple of its own.
-        say: is told the progress.
+        say: function that gets lines of text about the progress.
 
     Raises:
         InputError: if the file cannot be written, the video has more than MOST_FRAMES frames, or
