@@ -97,9 +97,9 @@ def ground_text(scenario: Scenario) -> str:
 def run_text(run: Run) -> str:
     """Text about a run, printed at its end."""
     texts = [TextTable(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
-    if len(run.statuses) > 1:
-        texts.append(trials_table(run).text())
     if not run.best().empty:
+        if len(run.statuses) > 1:
+            texts.append(trials_table(run).text())
         best = run.fittest()
         gaits = [run.initial_best(best["trial"]), best]
         texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
