@@ -77,8 +77,7 @@ SLOW = ("05", "06", "07", "09", "10", "15", "16", "17")
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * name.startswith(SLOW)) for name in NAMES],
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * name.startswith(SLOW)) for name in NAMES]
 )
 def test_a_tutorial_runs_and_draws_its_picture(name, tmp_path, monkeypatch):
     skip_without_its_packages(name)

@@ -4,13 +4,7 @@ import matplotlib
 import pytest
 from matplotlib.figure import Figure
 
-from tetra_drake.figures.style import (
-    Look,
-    common_style,
-    figure_function,
-    page_of,
-    save_figure,
-)
+from tetra_drake.figures.style import Look, common_style, figure_function, page_of, save_figure
 
 
 @figure_function

@@ -9,7 +9,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.run import load_run
 from tetra_drake.laws.friction import Coulomb
-from tetra_drake.report.summary import ground_text, result_text, results
+from tetra_drake.report.summary import ground_text, result_text, results, run_text
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 
@@ -73,7 +73,8 @@ def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
 
 
 def test_a_run_without_a_fitness_is_summed_up_by_its_effort_and_its_last_failure(tmp_path):
-    run = load_run(write_run(tmp_path / "run", [[[(None, 0)]]]))
+    run = load_run(write_run(tmp_path / "run", [[[(None, 0)]]] * 2))
     summary = dict(results(run))
     assert [*summary] == ["evaluations", "time per evaluation", "last failure"]
     assert summary["last failure"] == run.evaluations["failure"].iloc[-1]
+    assert summary["last failure"] in run_text(run)

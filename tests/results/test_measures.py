@@ -7,12 +7,7 @@ import pytest
 from helpers.made_up_walk import PERIOD, make_row, make_walk
 
 from tetra_drake.laws.curves import travelling_index
-from tetra_drake.robot.measures import (
-    distance_walked,
-    dominant_frequency,
-    intervals,
-    last_step,
-)
+from tetra_drake.robot.measures import distance_walked, dominant_frequency, intervals, last_step
 
 TIMES = np.linspace(0.0, 15.0, 1501)
 UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
@@ -30,16 +25,11 @@ def test_the_distance_is_that_of_the_first_marker(walk):
     np.testing.assert_allclose(distance_walked(turned, structure), walk.time**2)
 
 
-@pytest.mark.parametrize(
-    ("active", "expected"),
-    [
-        ([0, 0, 1, 1, 0], [(1.0, 4.0)]),  # begins one sample before it shows
-        ([1, 1, 0, 0, 1], [(0.0, 1.0), (4.0, 8.0)]),
-        ([1, 1, 1, 1, 1], [(0.0, 8.0)]),
-    ],
-)
-def test_intervals(active, expected):
-    assert intervals(np.array([0.0, 1.0, 2.0, 4.0, 8.0]), np.array(active, dtype=bool)) == expected
+def test_an_interval_begins_one_sample_before_it_shows():
+    times = np.array([0.0, 1.0, 2.0, 4.0, 8.0])
+    assert intervals(times, np.array([0, 0, 1, 1, 0], dtype=bool)) == [(1.0, 4.0)]
+    assert intervals(times, np.array([1, 1, 0, 0, 1], dtype=bool)) == [(0.0, 1.0), (4.0, 8.0)]
+    assert intervals(times, np.array([1, 1, 1, 1, 1], dtype=bool)) == [(0.0, 8.0)]
 
 
 @pytest.mark.parametrize("times", [TIMES, UNEVEN], ids=["even", "uneven"])

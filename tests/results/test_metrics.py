@@ -21,8 +21,7 @@ from tetra_drake.scenario.metrics import (
     unmet_requirements,
 )
 from tetra_drake.scenario.scenario import Scenario
-
-INCH = 0.0254
+from tetra_drake.settings.units import INCH
 
 CIRCLE = CentrePath(
     np.linspace(0.0, 6.0, 25),
@@ -81,9 +80,8 @@ def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
     late = CIRCLE.times > 4.0 - 1e-9
     straight = np.where(late[:, None], CIRCLE.centre, CIRCLE.times[:, None] * [1.0, 2.0, 0.0])
     partly = dataclasses.replace(CIRCLE, centre=straight)
-    assert walked(robot, 0.0, path=partly, steady_from=4.0).path_radius == pytest.approx(
-        1.0, rel=1e-6
-    )
+    bent = walked(robot, 0.0, path=partly, steady_from=4.0)
+    assert bent.path_radius == pytest.approx(1.0, rel=1e-6)
     line = dataclasses.replace(CIRCLE, centre=CIRCLE.times[:, None] * np.array([1.0, 2.0, 0.0]))
     assert walked(robot, 0.0, path=line, steady_from=0.0).path_radius == math.inf
 
@@ -132,10 +130,7 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
         ({"objective": {"heading_change": 1.0}}, "turns 180 degrees in 15 s"),
         ({"objective": {"rolled": 1.0}}, "rolled 5.73 deg, walks 2.0 inches in 15 s"),
         ({"terrain": Incline(slope=0.25)}, "walks 2.0 inches up 14.3 degrees in 15 s"),
-        (
-            {"terrain": ROUGH},
-            "walks 2.0 inches on rough ground in 15 s",
-        ),
+        ({"terrain": ROUGH}, "walks 2.0 inches on rough ground in 15 s"),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for_and_where_it_walks(scenario, changes, text):

@@ -19,10 +19,7 @@ from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
-from tetra_drake.visualization.browser import (
-    do,
-    wait_until_loaded,
-)
+from tetra_drake.visualization.browser import do, wait_until_loaded
 from tetra_drake.visualization.replay import save_replay
 from tetra_drake.visualization.scene import COLOURS
 from tetra_drake.visualization.video import make_video

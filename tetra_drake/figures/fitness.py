@@ -16,7 +16,7 @@ from tetra_drake.figures.style import (
     legend_below,
     line_style,
     page_of,
-    set_title,
+    titled,
 )
 from tetra_drake.formatting import fixed
 
@@ -47,23 +47,20 @@ def initial_distances(run: Run) -> Drawn:
     page = page_of(height_in=3.6)
     panel = page.subplots()
     blue, orange = OKABE_ITO["blue"], OKABE_ITO["orange"]
-    best = panel.bar(extremes.index - width / 2, extremes["best"], width, color=blue)
-    worst = panel.bar(extremes.index + width / 2, extremes["worst"], width, color=orange)
+    left, right = extremes.index - width / 2, extremes.index + width / 2
+    panel.bar(left, extremes["best"], width, color=blue, label="fittest gait of a trial")
+    panel.bar(right, extremes["worst"], width, color=orange, label="least fit gait of a trial")
     panel.axhline(0.0, color="black", linewidth=0.8)
     margin = max(0.9, 2.0 - len(extremes) / 2)  # a single trial has thin bars, too
-    duration = run.scenario.simulation.duration
     panel.set(
         xlabel="trial",
-        ylabel=f"distance in {duration:g} s ({unit.length_name})",
+        ylabel=f"distance in {run.scenario.simulation.duration:g} s ({unit.length_name})",
         xlim=(extremes.index.min() - margin, extremes.index.max() + margin),
         xticks=extremes.index[:: math.ceil(len(extremes) / _TICKS)],
     )
     panel.grid(visible=False, axis="x")
-    best.set_label("fittest gait of a trial")
-    worst.set_label("least fit gait of a trial")
-    legend_below(page, {}, best, worst)
-    set_title(page, "Best and worst initial gait of each trial")
-    return page
+    legend_below(page, {}, *panel.containers)
+    return titled(page, "Best and worst initial gait of each trial")
 
 
 @figure_function
@@ -92,8 +89,7 @@ def initial_fitness(run: Run, trial: int) -> Drawn:
     legend_below(page, {}, *panel.get_legend_handles_labels()[0])
     failed = len(initial) - len(walked)
     title = f"Fitness of the initial gaits of trial {trial}"
-    set_title(page, title + (f"; {failed} failed" if failed else ""))
-    return page
+    return titled(page, title + (f"; {failed} failed" if failed else ""))
 
 
 @figure_function
@@ -135,5 +131,4 @@ def fitness_of_trials(run: Run) -> Drawn:
     panel.set(xlabel="evaluations", ylabel=f"{kind} fitness", xmargin=0.02)
     panel.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
     legend_below(page, legend)
-    set_title(page, f"{kind.capitalize()} fitness of each trial")
-    return page
+    return titled(page, f"{kind.capitalize()} fitness of each trial")

@@ -25,12 +25,13 @@ from tetra_drake.figures.style import (
     page_of,
     page_width,
     panels_in_columns,
-    set_title,
     shown_part,
+    titled,
 )
 from tetra_drake.formatting import fixed
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.measures import Span, intervals, off_ground, share_of_time
+from tetra_drake.settings.units import Units
 
 _SECONDS = 4.0  # length of the part that is shown by default
 
@@ -60,7 +61,7 @@ def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) 
     start_up = result.scenario.cpg.start_up
     is_shown = float(trajectory.time[0]) < start_up
     others = [Patch(color=SHADE, label="start-up")] if is_shown else []
-    page, panels = _panels_over_time(forces.cable.values[driven], groups=groups)
+    page, panels = _panels_over_time(forces.cable.values[driven], unit, groups=groups)
     for cable, oscillator, panel in zip(driven, oscillators, panels, strict=True):
         panel.axhline(0.0, color="0.6", linewidth=0.6)
         if others:
@@ -68,9 +69,7 @@ def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) 
         panel.plot(forces.time, forces.tension[:, cable], **_FIRST)
         panel.plot(forces.time, forces.signal.sel(oscillator=oscillator), **_SECOND)
     legend_below(page, {"cable tension": _FIRST, "signal": _SECOND}, *others)
-    panels[0].figure.supylabel(f"force ({unit.force_name})")
-    set_title(page, "Signals and tensions of actuated cables")
-    return page
+    return titled(page, "Signals and tensions of actuated cables")
 
 
 @figure_function
@@ -84,9 +83,8 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)
     _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)
-    page, panels = _panels_over_time(
-        list(feet.values()), groups=per_body.min(), beside="stands 100 %"
-    )
+    names, groups = list(feet.values()), per_body.min()
+    page, panels = _panels_over_time(names, unit, groups=groups, beside="stands 100 %")
     touching = forces.where(forces.normal_force > 0.0)
     both = touching.normal_force, touching.friction_force.sel(horizontal="x")
     values = np.concatenate([*(each.values.ravel() for each in both), [0.0]])
@@ -109,9 +107,7 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
     along = "along x" if result.robot.ground.flat else "along the forward tangent"
     looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
     legend_below(page, looks, Patch(color=SHADE, label="stance"))
-    panels[0].figure.supylabel(f"force ({unit.force_name})")
-    set_title(page, "Forces of the ground")
-    return page
+    return titled(page, "Forces of the ground")
 
 
 def _shown(result: SimulationResult, time: Span | None) -> xarray.Dataset:
@@ -141,10 +137,10 @@ def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
 
 
 def _panels_over_time(
-    names: Sequence[str], *, groups: int, beside: str = ""
+    names: Sequence[str], units: Units, *, groups: int, beside: str = ""
 ) -> tuple[Page, list[Axes]]:
-    """The page and a panel per name. If there are few groups of panels, each group has a column. A
-    text `beside` the names has its own line if it needs one."""
+    """A figure, and its panels of forces over time, one per name. If there are few groups of
+    panels, each group has a column. A text `beside` the names has its own line if it needs one."""
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
@@ -154,9 +150,9 @@ def _panels_over_time(
         names = [f"{name}\n" for name in names]
     row = 1.05 + 0.15 * most_lines(names)
     page = page_of(height_in=1.0 + min(row * rows, 9.0))
-    panels = panels_in_columns(
-        page, len(names), columns, x_label="time (s)", sharex=True, sharey=True
-    )
+    shared: Any = {"sharex": True, "sharey": True}
+    panels = panels_in_columns(page, len(names), columns, x_label="time (s)", **shared)
+    panels[0].figure.supylabel(f"force ({units.force_name})")
     for name, panel in zip(names, panels, strict=True):
         name_panel(panel, name)
         panel.set_xmargin(0.0)

@@ -23,8 +23,8 @@ from tetra_drake.figures.style import (
     own_words,
     page_of,
     page_width,
-    set_title,
     shown_part,
+    titled,
     write_beside,
 )
 from tetra_drake.formatting import fixed
@@ -93,12 +93,11 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
             panel.grid(visible=False, axis="x")
             for mark in marks[marks >= start]:
                 panel.axvline(mark, color="0.6", linewidth=0.7, linestyle=(0, (1, 2)))
-    set_title(page, title)
-    return page
+    return titled(page, title)
 
 
 def _rows_of_names(names: Iterable[str]) -> float:
-    """Height of one of these names, in rows of the diagram."""
+    """Height of the name with the most lines, in rows of the diagram."""
     return 1.3 * most_lines(names) - 0.3
 
 

@@ -26,8 +26,8 @@ from tetra_drake.figures.style import (
     page_of,
     page_width,
     panels_in_columns,
-    set_title,
     shown_part,
+    titled,
 )
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results.result import SimulationResult
@@ -43,6 +43,7 @@ _MARGIN = 0.6 * INCH  # m; free space around a robot of usual size
 _PROFILE = 0.05 * INCH  # m; distance between points of its ground's profile
 _PANEL_NAME, _GAP = 0.27, 0.13  # inches; height of a panel's name, and gap between panels
 _PATHS = 6  # largest number of panels of paths side by side
+_X_LABEL = "x, forward ({}) →"
 _CLEARANCE = 0.02  # a body is off the ground above this share of the robot's height
 
 _ON_GROUND, _LIFTED = "0.2", OKABE_ITO["vermillion"]
@@ -70,12 +71,11 @@ def relative_distances(result: SimulationResult, *, time: Span | None = None) ->
         line = distances.sel(body=name)
         panel.axhline(float(line[0]), color="0.6", linewidth=0.7)
         panel.plot(line.time, line, label=folded(name, width), **line_style(i))
-    panel.set_xlabel("time (s)")
-    panel.set_ylabel(folded(f"distance from {first} ({unit.length_name})", 0.6 * height))
+    y_label = folded(f"distance from {first} ({unit.length_name})", 0.6 * height)
+    panel.set(xlabel="time (s)", ylabel=y_label)
     if names:
         page.legend(loc="outside right upper", reverse=True, frameon=False)
-    set_title(page, f"Distance of each body from {first}", share=0.6)  # beside the legend
-    return page
+    return titled(page, f"Distance of each body from {first}", share=0.6)  # beside the legend
 
 
 @figure_function
@@ -95,8 +95,7 @@ def before_and_after(
         legend[f"{when}: {way}, {result.name}"] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
     legend_below(page, legend)
-    set_title(page, "Distance walked, before and after evolution")
-    return page
+    return titled(page, "Distance walked, before and after evolution")
 
 
 @figure_function
@@ -113,8 +112,7 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
     wide, high = (_range(shown[:, axis], result) for axis in (X, Y))
     columns, height = _fit(instants, wide, high, height_in=6.0)
     page = page_of(height_in=height + 0.9)
-    x_label = f"x, forward ({unit.length_name}) →"
-    panels = panels_in_columns(page, instants, columns, x_label=x_label)
+    panels = panels_in_columns(page, instants, columns, x_label=_X_LABEL.format(unit.length_name))
     looks = [{"color": LINE_COLOURS[i % len(LINE_COLOURS)]} for i in range(len(structure.bodies))]
     for sample, panel in zip(samples, panels, strict=True):
         now = float(trajectory.time[sample])
@@ -129,8 +127,7 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
     if len(looks) <= len(LINE_COLOURS):
         legend = dict(zip(structure.bodies, looks, strict=True)) | legend
     legend_below(page, legend)
-    set_title(page, "Time lapse from above: time and distance walked")
-    return page
+    return titled(page, "Time lapse from above: time and distance walked")
 
 
 @figure_function
@@ -156,8 +153,7 @@ def path_of_the_centre(
             panel.plot(points[:, X], _heights_below(points, result), **_GROUND)
         panel.set_ylabel(f"height ({unit.length_name})")
         panel.margins(x=0.02, y=0.1)
-        set_title(page, "Height of the centre along its path")
-        return page
+        return titled(page, "Height of the centre along its path")
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
     if structure.points_ahead:
         looks["heading"] = {"color": OKABE_ITO["vermillion"], "marker": ">", "linestyle": "-"}
@@ -170,8 +166,7 @@ def path_of_the_centre(
     panel.set_aspect("equal", adjustable="datalim")
     panel.set_ylabel(f"y ({unit.length_name})")
     legend_below(page, looks)
-    set_title(page, "Path of the centre from above")
-    return page
+    return titled(page, "Path of the centre from above")
 
 
 @figure_function
@@ -204,8 +199,7 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
     page = page_of(height_in=sum(parts) + 0.5)
     upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
 
-    x_label = f"x, forward ({unit.length_name}) →"
-    panels = panels_in_columns(upper, instants, columns, x_label=x_label)
+    panels = panels_in_columns(upper, instants, columns, x_label=_X_LABEL.format(unit.length_name))
     for sample, panel in zip(samples, panels, strict=True):
         name_panel(panel, f"{float(step.time[sample]) - start:.2f} s")
         panel.plot(x, profile + across[0] - high, **_GROUND)
@@ -225,8 +219,7 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
     }
     legend_below(page, looks)
     title = "One step" if cycle else "The last quarter"
-    set_title(page, f"{title}, {start:.2f} to {end:.2f} s")
-    return page
+    return titled(page, f"{title}, {start:.2f} to {end:.2f} s")
 
 
 def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[np.ndarray, float]:

@@ -89,12 +89,12 @@ _WIDEST, _MOST_PER_INCH = 40.0, 4.5
 USUAL = Look()
 
 FILE_KINDS = ("svg", "png")
-"""Kinds of the files of a figure, by default."""
+"""File types of a figure, by default."""
 
 
 @dataclass(frozen=True)
 class Print:
-    """Print of figures: their look, and the kinds of their files; see save_figure()."""
+    """Settings for the files of figures: the look, and the file types of save_figure()."""
 
     look: Look = USUAL
     kinds: Sequence[str] = FILE_KINDS
@@ -249,7 +249,8 @@ def own_words(names: Sequence[str]) -> list[str]:
 def panels_in_columns(
     page: Page, count: int, columns: int, *, x_label: str, **shared: Any
 ) -> list[Axes]:
-    """Panels in columns with one common label of x. `shared` is passed to Figure.subplots()."""
+    """Panels in columns with one common label of the x axes. `shared` is passed to
+    Figure.subplots()."""
     inner = page.subfigures(squeeze=False)[0, 0]  # puts the label above a legend of the page
     inner.supxlabel(x_label)
     grid = inner.subplots(math.ceil(count / columns), columns, squeeze=False, **shared).ravel()
@@ -262,10 +263,11 @@ def panels_in_columns(
     return list(grid[:count])
 
 
-def set_title(page: Page, title: str, *, share: float = 1.0) -> None:
-    """Writes the title of a figure at the upper left, in lines of a share of the page's width."""
+def titled(page: Page, title: str, *, share: float = 1.0) -> Page:
+    """A figure with a title at its upper left, in lines of a share of the figure's width."""
     text = folded(title, share * page_width(page), size=rcParams["figure.titlesize"])
     page.suptitle(text, x=0.01, ha="left")
+    return page
 
 
 def name_panel(panel: Axes, name: str) -> None:
@@ -313,8 +315,8 @@ def save_findings(
     text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(folder / "summary.json", text + "\n")
     save_figure(figure, folder, name, kinds=kinds)
-    pictures = [f"{name}.{kind}" for kind in kinds]
-    return [*(f"{table}.csv" for table in tables), "summary.json", *pictures]
+    csv_files = [f"{table}.csv" for table in tables]
+    return [*csv_files, "summary.json", *(f"{name}.{kind}" for kind in kinds)]
 
 
 @common_style()

@@ -52,7 +52,7 @@ SCHEMA = 1
 
 
 class PathColumns(Section):
-    """The path of the centre in result.json, in the order of CentrePath."""
+    """Columns of the centre's path in result.json, in the order of the arrays of CentrePath."""
 
     time_s: list[float]
     x_m: list[float]

@@ -8,8 +8,9 @@ from __future__ import annotations
 import base64
 import inspect
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -57,7 +58,7 @@ _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 @dataclass(frozen=True)
 class RecordedGait:
-    """A gait of a run: its record, and a new simulation.
+    """Gait of a run: its recorded evaluation, and a new simulation.
 
     The numbers may differ if other versions recorded the gait. They differ for a run with
     disturbances, because the new simulation has none.
@@ -85,19 +86,13 @@ class ShownGaits:
     """Fittest initial gait of the same trial; see Run.initial_best()."""
 
 
-class Picture(NamedTuple):
-    """A figure of a report: the function that draws it, and the function's arguments."""
-
-    draw: Callable[..., Any]
-    data: Sequence[Any]
-
-
-Pictures = Mapping[str, Sequence[Picture]]
-"""The figures in each part of a report: gait, evolution, forces."""
+Pictures = Mapping[str, Sequence[partial[Any]]]
+"""Figures of a report by its parts: gait, evolution, forces. A figure is its function, with the
+data to draw."""
 
 
 class GaitColumn(NamedTuple):
-    """A gait in a table of the report."""
+    """Column of a gait in a table of the report."""
 
     names: Sequence[str]
     recorded: pandas.Series
@@ -129,9 +124,10 @@ def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USU
     if is_run and out is None:
         return write_report(source, printed)
     if is_run:
-        draw_pictures(pictures_of_run(simulate_shown_gaits(load_run(source))), folder, printed)
+        pictures = pictures_of_run(simulate_shown_gaits(load_run(source)))
     else:
-        draw_pictures(pictures_of_gait(load_result(source)), folder, printed)
+        pictures = pictures_of_gait(load_result(source))
+    draw_pictures(pictures, folder, printed)
     return [folder]
 
 
@@ -185,30 +181,30 @@ def pictures_of_gait(result: SimulationResult) -> Pictures:
     if len(structure.contacts):
         forces.append(ground_forces)
     parts = {"gait": [gait_diagram, time_lapse], "forces": forces}
-    return {part: [Picture(draw, [result]) for draw in draws] for part, draws in parts.items()}
+    return {part: [partial(draw, result) for draw in draws] for part, draws in parts.items()}
 
 
 def pictures_of_run(shown: ShownGaits) -> Pictures:
     """The figures of a run and of its best gait."""
     run, trial = shown.run, shown.best.recorded["trial"]
     best, initial, trials = shown.best.result, shown.initial.result, initial_extremes(run).index
-    evolution = [Picture(fitness_of_trials, [run])] if len(run.iterations) else []
+    evolution = [partial(fitness_of_trials, run)] if len(run.iterations) else []
     if len(trials):
-        evolution.append(Picture(initial_distances, [run]))
+        evolution.append(partial(initial_distances, run))
     if trial in trials:
-        evolution.append(Picture(initial_fitness, [run, trial]))
+        evolution.append(partial(initial_fitness, run, trial))
     if len(elites(run)):
-        evolution.append(Picture(map_of_gaits, [run]))
-    evolution.append(Picture(before_and_after, [initial, best]))
+        evolution.append(partial(map_of_gaits, run))
+    evolution.append(partial(before_and_after, initial, best))
     return {"evolution": evolution, **pictures_of_gait(best)}
 
 
 def draw_pictures(pictures: Pictures, folder: Path, printed: Print = AS_USUAL) -> None:
     """Draws figures and writes them to a folder. Raises InputError if a file cannot be written."""
     for part in pictures.values():
-        for picture in part:
-            figure = picture.draw(*picture.data, **vars(printed.look))
-            save_figure(figure, folder, picture.draw.__name__, kinds=printed.kinds)
+        for draw in part:
+            figure = draw(**vars(printed.look))
+            save_figure(figure, folder, draw.func.__name__, kinds=printed.kinds)
 
 
 def _notable(shown: ShownGaits) -> list[GaitColumn]:
@@ -221,9 +217,9 @@ def _notable(shown: ShownGaits) -> list[GaitColumn]:
     return found
 
 
-def _embedded(picture: Picture, folder: Path) -> dict[str, str]:
+def _embedded(picture: partial[Any], folder: Path) -> dict[str, str]:
     """Name, caption and content of a figure with a file in `folder`."""
-    name, caption = picture.draw.__name__, inspect.getdoc(picture.draw) or ""
+    name, caption = picture.func.__name__, inspect.getdoc(picture.func) or ""
     content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
     # As an image: the ids of two SVGs in one page would clash.
     image = f"data:image/svg+xml;base64,{content}"
@@ -239,11 +235,10 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
     turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
     times = [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
     best_gait = str(trial_folder(Path(), trial) / BEST_GAIT)
+    named = {"initially": shown.initial.recorded, "best": best.recorded}
     gaits = [
         GaitColumn(names, row, best_gait if "best" in names else None)
-        for names, row in distinct_gaits(
-            {"initially": shown.initial.recorded, "best": best.recorded}
-        )
+        for names, row in distinct_gaits(named)
     ]
     differences = [
         (key, value)

@@ -97,9 +97,9 @@ def ground_text(scenario: Scenario) -> str:
 def run_text(run: Run) -> str:
     """Text about a run, printed at its end."""
     texts = [TextTable(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
-    if len(run.statuses) > 1:
-        texts.append(trials_table(run).text())
     if not run.best().empty:
+        if len(run.statuses) > 1:
+            texts.append(trials_table(run).text())
         best = run.fittest()
         gaits = [run.initial_best(best["trial"]), best]
         texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
@@ -127,15 +127,14 @@ def results(run: Run) -> list[tuple[str, str]]:
     fittest = run.fittest()
     starts = [run.initial_best(trial) for trial in best["trial"]]
     initial = max(starts, key=lambda gait: gait["fitness"])
-    name = _about(run)
-    title = name.replace("_", " ")
+    name = headline_metric(run.scenario.objective, fittest)
     size, unit = run.scenario.units.of(UNITS[name])
 
     def three(value: float) -> str:
         return f"{rounded(value / size)} {unit}".rstrip()
 
     rows = [
-        (title, f"{three(fittest[name])}, {gait_label(fittest)}"),
+        (name.replace("_", " "), f"{three(fittest[name])}, {gait_label(fittest)}"),
         ("best initial gait", f"{three(initial[name])}, {gait_label(initial)}"),
     ]
     if len(best) > 1:
@@ -153,7 +152,7 @@ def trials_table(run: Run) -> TextTable:
     """
     import pandas
 
-    name = _about(run)
+    name = headline_metric(run.scenario.objective, run.fittest())
     size, title = _size_and_title(name, run.scenario.units)
     best = run.best().set_index("trial")
     in_drake = run.reevaluations.set_index(["trial", "index"])
@@ -174,11 +173,6 @@ def trials_table(run: Run) -> TextTable:
     table = table.loc[:, ~table.isin(["-", ""]).all()]
     texts = [place for place, name in enumerate(table) if name in ("trial", "end")]
     return TextTable([*table], table.to_numpy().tolist(), text_columns=texts)
-
-
-def _about(run: Run) -> str:
-    """Name of the main metric in the objective of a run."""
-    return headline_metric(run.scenario.objective, run.fittest())
 
 
 def _time(seconds: float) -> str:

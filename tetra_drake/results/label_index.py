@@ -13,10 +13,10 @@ from tetra_drake.settings.refusals import hint
 
 
 class LabelIndex(PandasIndex):
-    """Index of labels along a dimension that also has unique names.
+    """Index of a coordinate whose labels may repeat; a label selects all entries that have it.
 
-    The names use xarray's own index, because xarray can only align arrays with equal kinds of
-    index.
+    The unique names along the same dimension use xarray's own index, because xarray can only align
+    arrays with equal kinds of index.
     """
 
     def sel(

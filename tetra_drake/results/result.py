@@ -121,8 +121,7 @@ class SimulationResult:
         """The HTML page that save_replay() writes."""
         from tetra_drake.visualization.replay import replay_page
 
-        robot, title = self.robot, self.title
-        return replay_page(robot=robot, trajectory=self.trajectory, title=title)[0]
+        return replay_page(robot=self.robot, trajectory=self.trajectory, title=self.title)[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
         """Writes a page that plays the motion; see visualization.replay.save_replay()."""

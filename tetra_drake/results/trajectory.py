@@ -149,7 +149,8 @@ def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
 
 
 def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
-    """The dataset with an index of each coordinate. Files do not keep indexes."""
+    """The dataset with an index for each coordinate, by which labels are selected. Files do not
+    keep indexes."""
     from tetra_drake.results.label_index import LabelIndex
 
     for name in dataset.coords.keys() - dataset.xindexes.keys():

@@ -33,7 +33,7 @@ from tetra_drake.figures.style import (
     page_of,
     page_width,
     save_findings,
-    set_title,
+    titled,
 )
 from tetra_drake.formatting import TextTable, fixed, ranged, rounded
 from tetra_drake.scenario.scenario import Scenario
@@ -168,24 +168,23 @@ def compare_scenarios(
     Raises InputError also if no scenario has two of the runs.
     """
     _check_lists(directories, labels)
-    groups: dict[str, list[int]] = {}
-    for place, directory in enumerate(directories):
-        name = read_manifest(Path(directory)).scenario.name
-        groups.setdefault(name, []).append(place)
-    if all(len(group) == 1 for group in groups.values()):
-        found = f"found one run of each scenario: {', '.join(groups)}"
+    names = pandas.Series([read_manifest(Path(each)).scenario.name for each in directories])
+    if names.is_unique:
+        found = f"found one run of each scenario: {', '.join(names)}"
         raise InputError("compare", "scenarios", f"{found}; expected two of one scenario at least")
     compared = {}
-    for name, places in groups.items():
-        own = [labels[place] for place in places] if labels else None
-        runs = [directories[place] for place in places]
-        compared[name] = compare(runs, reach=reach, labels=own)
+    for name, group in names.groupby(names, sort=False):
+        own = [labels[place] for place in group.index] if labels else None
+        runs = [directories[place] for place in group.index]
+        compared[str(name)] = compare(runs, reach=reach, labels=own)
     return compared
 
 
 def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Probability that one of our numbers exceeds one of theirs: the share of such pairs among
-    all. Equal numbers count one half. The numbers are along the last axes, (..., n) and (..., m).
+    """Probability that a number of our sample exceeds a number of their sample.
+
+    It is the share of such pairs among all pairs. Equal numbers count one half. Samples are along
+    the last axes, (..., n) and (..., m).
 
     From R. Agarwal et al., "Deep reinforcement learning at the edge of the statistical precipice",
     NeurIPS 2021 (rliable).
@@ -293,8 +292,8 @@ def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
 
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     """Columns of Compared.runs for one run, computed from its trials."""
-    row: dict[str, Any] = {"trials": len(trials), "going_on": int((~trials["ended"]).sum())}
-    row["cost"] = trials["cost"].median()
+    going_on, cost = int((~trials["ended"]).sum()), trials["cost"].median()
+    row: dict[str, Any] = {"trials": len(trials), "going_on": going_on, "cost": cost}
     for name in ("at_common", "fitness", "distance"):
         values = trials[name].replace(-math.inf, math.nan).dropna()
         row[name] = values.median()
@@ -444,5 +443,4 @@ def comparison(compared: Compared) -> Drawn:
         distance = f"{compared.reach / unit.length:.4g} {unit.length_name}"
         panels[1].set(ylabel=f"{distance} reached (% of trials)", ylim=(-3.0, 103.0))
     legend_below(page, {label: line_style(series) for series, label in enumerate(labels)})
-    set_title(page, "How well runs search: median and quartiles over trials")
-    return page
+    return titled(page, "How well runs search: median and quartiles over trials")

@@ -19,7 +19,7 @@ import pandas
 from tetra_drake.evolution.entries import ELITES, EliteLine, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, gait_label, load_run
-from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, set_title
+from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_of, titled
 from tetra_drake.files import json_number
 from tetra_drake.formatting import listed
 from tetra_drake.optimizers.quality_diversity import FLOOR
@@ -28,8 +28,8 @@ from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.study.robustness import by_gait, robustness
 
 LUCKY = 0.5
-"""Least share of draws that an elite must keep; an elite below it is left out as lucky. For `kept`
-see robustness.LOSS."""
+"""Least share of draws that an elite must keep. The fitness of an elite below it is taken for luck,
+and the elite is left out. For `kept` see robustness.LOSS."""
 
 CELLS = ["cell_1", "cell_2"]
 _KEY = ["trial", "index"]
@@ -75,8 +75,8 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
         return
     file.repair()
     run = load_run(directory)
-    gaits_of_map = elites(run)
-    missing = gaits_of_map[gaits_of_map["kept"].isna()]
+    of_map = elites(run)
+    missing = of_map[of_map["kept"].isna()]
     if missing.empty:
         return
     keys = missing[_KEY].to_numpy().tolist()
@@ -93,8 +93,7 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
 
 
 def kept_gaits(gaits: pandas.DataFrame) -> pandas.DataFrame:
-    """Elites that are not lucky, the fittest first: all but those that keep less than the share
-    LUCKY of the draws."""
+    """Elites without those that keep less than the share LUCKY of the draws, the fittest first."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 
@@ -165,5 +164,4 @@ def map_of_gaits(run: Run) -> Drawn:
     notes = [f"{listed(names)}: {gait_label(gait)}" for names, gait in named]
     notes = [f"{number}  {note}" for number, note in enumerate(notes, start=1)]
     page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize="small", wrap=True)
-    set_title(page, "Map of gaits")
-    return page
+    return titled(page, "Map of gaits")

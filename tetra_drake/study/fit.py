@@ -23,7 +23,7 @@ from tetra_drake.figures.style import (
     name_panel,
     page_of,
     save_findings,
-    set_title,
+    titled,
 )
 from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent
@@ -31,7 +31,7 @@ from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.load import SCENARIO, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.fit_problem import STEP, Bounds, FitProblem, parameter_of
-from tetra_drake.study.measurements import FitFile, Measurement
+from tetra_drake.study.measurements import FitFile, Measurement, files_of
 
 LONGER, ROUGH = 10.0, 0.2
 """Factor of a longer step; and difference of the derivatives with both steps, as a share of the
@@ -146,7 +146,7 @@ def fit_values(
         parameters: the bounds, least and most, by key. Keys joined by commas get the same value.
         search: searches all values within the bounds for a better start, by CMA-ES.
         folder: keeps each evaluation; another fit to the same data takes them from there.
-        say: is told of each iteration.
+        say: function that gets a line of text after each iteration.
         source: file with the parameters, for errors.
 
     Raises:
@@ -167,15 +167,15 @@ def fit_values(
         raise InputError(source, "parameters", f"{found}, expected at least a number for each key")
     digest = hashlib.sha256(f"{__version__} {scenario.values()}".encode())
     for measurement in given.measurements:
-        settings = measurement.model_dump(exclude=set(measurement.files))
+        files = files_of(measurement)
+        settings = measurement.model_dump(exclude=set(files))
         digest.update(f"{type(measurement).tag} {settings}".encode())
-        for key, path in measurement.files.items():
+        for key, path in files.items():
             digest.update(key.encode() + read_bytes(path, key))
 
     problem = FitProblem(scenario, fitted, measured, digest.hexdigest(), folder, say)
     start = np.array([parameter.start / parameter.scale for parameter in fitted])
-    first = problem.residuals(start)
-    if not np.isfinite(first).all():
+    if not np.isfinite(problem.residuals(start)).all():
         what = "is not simulated, or lacks equilibrium or frequencies, with the start values"
         raise InputError(scenario.name, "", what)
 
@@ -207,7 +207,7 @@ def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
 
 
 def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: float) -> Fit:
-    """The result of a fit that started at relative parameters and ended at `x` (n,)."""
+    """The result of a fit from the point `start` (n,) to the point `x` (n,)."""
     first, last = problem.residuals(start), problem.residuals(x)
     misfit, jacobian = problem.misfit(last), problem.jacobian(x)
     half, correlation = _uncertainty(problem, jacobian, misfit)
@@ -357,5 +357,4 @@ def residuals(fit: Fit) -> Drawn:
         if not is_motion:
             panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     legend_below(page, styles)
-    set_title(page, "Predictions minus measurements")
-    return page
+    return titled(page, "Predictions minus measurements")

@@ -49,8 +49,8 @@ class Parameter(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Unit of the relative parameter: the start, or the width of the bounds if the start is 0
-        or they are narrower."""
+        """Divisor that makes the parameter dimensionless: the size of the start value, or the width
+        of the bounds if the start is 0 or the bounds are narrower."""
         width = self.most - self.least
         return min(abs(self.start) or width, width)
 
@@ -95,11 +95,10 @@ def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -
 
 @dataclass(eq=False)
 class FitProblem:
-    """Weighted residuals of a fit, and their derivatives by relative parameters.
+    """Weighted residuals of a fit, and their derivatives by dimensionless parameters.
 
-    All scenarios of an iteration are simulated side by side.
-
-    A point is an array (n,) of relative parameters.
+    A point is an array (n,) of parameters, each divided by its scale. All scenarios of an iteration
+    are simulated side by side.
     """
 
     scenario: Scenario
@@ -184,7 +183,7 @@ class FitProblem:
         return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
 
     def tell(self, residuals: np.ndarray) -> None:
-        """Tells the user of an iteration that ended with these residuals."""
+        """Reports an iteration that ended with these residuals to the user."""
         self.say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
 
     def _neighbours(self, x: np.ndarray, step: float) -> list[np.ndarray]:

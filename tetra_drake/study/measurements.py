@@ -1,6 +1,6 @@
 """Measurements of a robot, for fit(): its motion, or its shape, tensions and frequencies at rest.
 
-Each kind of measurement has its settings, reads its numbers, and predicts them for other scenarios.
+A measurement has settings, reads its numbers, and predicts them for other scenarios.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ class Measured:
 
     name: str
     numbers: pandas.DataFrame
-    """A row per number in SI: label, such as "n3 z"; along, its time (s) or its place in the list;
-    measured; uncertainty, its standard deviation."""
+    """A row per number in SI: label, such as "n3 z"; along, its time (s) or its position in the
+    list; measured; uncertainty, its standard deviation."""
     predict: Callable[[Sequence[Scenario]], list[Prediction]]
     """What scenarios predict; NaN if a scenario cannot be simulated."""
 
@@ -94,15 +94,9 @@ class MotionCapture(Section):
     clock: Time = Field(default=0.0, ge=0)
     """Largest offset of the log's clock from the command's, which is found; 0 for none."""
 
-    @property
-    def files(self) -> dict[str, str]:
-        """Paths of the files by key."""
-        paths = {"log": self.log, "command": self.command, "gait": self.gait}
-        return {key: path for key, path in paths.items() if path is not None}
-
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Table of the measured numbers in the log. Raises InputError, naming file and line or
-        column, if the log is wrong."""
+        """Measured coordinates of the log, and their prediction. Raises InputError, naming file and
+        line or column, if the log is wrong."""
         if (self.command is None) == (self.gait is None):
             problem = f"found {'neither' if self.gait is None else 'both'}, expected one of them"
             raise InputError(name, "command", f"{problem}, a command or a gait")
@@ -198,13 +192,9 @@ class Rest(Section):
     frequency_uncertainty: Annotated[Frequency, _UNCERTAINTY] = 0.05
     """Standard deviation of a frequency."""
 
-    @property
-    def files(self) -> dict[str, str]:
-        """Paths of the files by key: none."""
-        return {}
-
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Table of the measured numbers. Raises InputError for an unknown node or cable."""
+        """Measured numbers, and their prediction. Raises InputError for an unknown node or
+        cable."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
         places = _coordinates(structure.node_names)
         for key, known in {"positions": places, "tensions": structure.cable_names}.items():
@@ -240,11 +230,9 @@ class Rest(Section):
             p_WN = node_positions(structure, rest.state).ravel()[places]
             force_at_rest(unactuated, rest.state)
             forces = unactuated.forces.cable_forces[cables, TENSION]
-            frequencies = np.full(modes, np.nan)
-            if modes:
-                found = study_equilibrium(robot).frequencies[:modes]
-                frequencies[: len(found)] = found
-            predictions.append(Prediction(np.concatenate([p_WN, forces, frequencies])))
+            found = study_equilibrium(robot).frequencies[:modes] if modes else np.zeros(0)
+            lacking = np.full(modes - len(found), np.nan)
+            predictions.append(Prediction(np.concatenate([p_WN, forces, found, lacking])))
         return predictions
 
 
@@ -260,6 +248,12 @@ class FitFile(Section):
     measurements: list[Measurement] = Field(min_length=1)
 
 
+def files_of(measurement: Measurement) -> dict[str, str]:
+    """Paths of a measurement's files by key."""
+    paths = measurement.model_dump(include={"log", "command", "gait"})
+    return {key: path for key, path in paths.items() if path is not None}
+
+
 def load_fit_file(path: str | Path) -> FitFile:
     """Reads the file of a fit. Paths in the file are relative to its folder. Raises InputError,
     naming file and key, if the content is wrong."""
@@ -268,7 +262,7 @@ def load_fit_file(path: str | Path) -> FitFile:
     given = FitFile.from_tree(tree, path)
     placed = []
     for measurement in given.measurements:
-        paths = {key: str(path.parent / file) for key, file in measurement.files.items()}
+        paths = {key: str(path.parent / file) for key, file in files_of(measurement).items()}
         placed.append(measurement.model_copy(update=paths))
     return given.model_copy(update={"measurements": placed})
 

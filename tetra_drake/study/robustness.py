@@ -27,7 +27,7 @@ from tetra_drake.figures.style import (
     page_of,
     page_width,
     save_findings,
-    set_title,
+    titled,
     write_beside,
 )
 from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
@@ -103,8 +103,8 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Default disturbances: a spread of `percent` for all numbers marked as Varied, and for the
-    initial positions."""
+    """Default disturbances: a spread of `percent` for all uncertain numbers of a scenario, and for
+    the initial positions. Uncertain numbers are marked as Varied in their settings."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):
@@ -270,8 +270,8 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
 
 
 def chance(draws: int) -> float:
-    """Rank correlation that chance alone may give: 95 % of the correlations of unrelated numbers
-    are smaller in absolute value."""
+    """Largest rank correlation that is likely by chance: 95 % of the correlations of unrelated
+    numbers are smaller in absolute value."""
     return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
 
 
@@ -368,8 +368,8 @@ def robustness_figure(judgement: Judgement) -> Drawn:
     above.axvline(1.0 - LOSS, **REFERENCE)
     above.axvline(1.0, color="black", linewidth=0.8)
     margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
-    above.set(xlabel="distance / undisturbed distance", xmargin=0.02)
-    above.set_ylim(-margin, len(gaits) - 1 + margin)
+    y_range = -margin, len(gaits) - 1 + margin
+    above.set(xlabel="distance / undisturbed distance", xmargin=0.02, ylim=y_range)
     name_panel(above, "distance in each draw")
     above.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
     above.grid(visible=False, axis="y")
@@ -385,11 +385,9 @@ def robustness_figure(judgement: Judgement) -> Drawn:
         (together, "all changes together", "size of rank correlation"),
     ):
         name_panel(axes, name)
-        axes.set_xlabel(folded(label, width))
-        axes.set(xmargin=0.05, ylim=(-0.7, len(what) - 0.3))
+        axes.set(xlabel=folded(label, width), xmargin=0.05, ylim=(-0.7, len(what) - 0.3))
         axes.set_xlim(left=0.0)
         axes.grid(visible=False, axis="y")
         axes.set_yticks(places, what)
     together.tick_params(labelleft=False)
-    set_title(page, f"Robustness under {count} draws of disturbances")
-    return page
+    return titled(page, f"Robustness under {count} draws of disturbances")

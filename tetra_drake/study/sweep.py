@@ -73,8 +73,7 @@ def sweep(
     count = len(walkers) * math.prod(len(values) for values in changes.values())
     if count > MOST:
         raise InputError("sweep", "changes", f"found {count} simulations, expected at most {MOST}")
-    combinations = itertools.product(*changes.values())
-    grid = [dict(zip(changes, each, strict=True)) for each in combinations]
+    grid = [dict(zip(changes, each, strict=True)) for each in itertools.product(*changes.values())]
     scenarios = [with_joined_changes(base, each) for each in grid]
     outcomes = simulate_many(
         [changed for changed in scenarios for _ in walkers],
@@ -96,12 +95,8 @@ def sweep(
             labels[dimension] = [str(value) for value in values], {}
     labels["gait"] = [gait.name for gait in walkers], {}
     shape = [len(values) for values, _ in labels.values()]
-    rows = [
-        {}
-        if isinstance(outcome, SimulationFailure)
-        else {"fitness": outcome.fitness, **vars(outcome.metrics)}
-        for outcome in outcomes
-    ]
+    results = [None if isinstance(each, SimulationFailure) else each for each in outcomes]
+    rows = [{"fitness": each.fitness, **vars(each.metrics)} if each else {} for each in results]
     variables = {}
     for name, unit in {"fitness": "", **UNITS}.items():
         found = np.reshape([row.get(name, math.nan) for row in rows], shape)
@@ -112,7 +107,7 @@ def sweep(
 
 
 def _values(key: str, given: Any) -> Collection[Any]:
-    """The values for a key; `given` may be a single value."""
+    """The values of a key, from a collection or a single value."""
     if hasattr(given, "tolist"):
         given = given.tolist()
     is_one = isinstance(given, (str, bytes, Mapping, Section)) or not isinstance(given, Collection)
@@ -123,7 +118,7 @@ def _values(key: str, given: Any) -> Collection[Any]:
 
 
 def with_joined_changes(scenario: Scenario, by_joined: Mapping[str, Any]) -> Scenario:
-    """The scenario with changes by keys that are joined by commas and get the same value; see
+    """The scenario with changed values by key; keys joined by commas get the same value. See
     Scenario.with_changes().
 
     Raises InputError, naming the key. It advises to join a changed key and another one of its

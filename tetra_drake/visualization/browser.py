@@ -54,7 +54,7 @@ def picture_of(page: Page) -> Image.Image:
 
 
 def wait_until_loaded(page: Page) -> None:
-    """Waits until a replay page can play."""
+    """Waits until the scripts of a replay page have built the scene."""
     page.wait_for_function("window.film")
 
 

@@ -13,9 +13,9 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.visualization.scene import (
     ASPECT,
     COLOURS,
-    FIELD_OF_VIEW,
     FLOOR_MARGIN,
     THICKEST,
+    VIEW_SLOPE,
     camera_position,
     drawn_radii,
     view_axes,
@@ -23,8 +23,6 @@ from tetra_drake.visualization.scene import (
 
 _HEIGHT, _DPI = 400, 100
 """Height of a picture in pixels, and pixels per inch. The width is ASPECT times the height."""
-_SLOPE = float(np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))
-"""Half the height of the view at the distance 1."""
 _SQUARES = np.arange(-30, 31)
 """Lines of the floor on each axis, in squares from the robot."""
 
@@ -67,7 +65,7 @@ def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
     size = ASPECT * _HEIGHT / _DPI, _HEIGHT / _DPI
     canvas = FigureCanvasAgg(Figure(size, dpi=_DPI, facecolor=COLOURS["sky"]))
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xlim=(-ASPECT * _SLOPE, ASPECT * _SLOPE), ylim=(-_SLOPE, _SLOPE))
+    axes.set(xlim=(-ASPECT * VIEW_SLOPE, ASPECT * VIEW_SLOPE), ylim=(-VIEW_SLOPE, VIEW_SLOPE))
     axes.axis("off")
     for collection in drawn:  # matplotlib keeps the order of equals
         collection.set(capstyle="round")
@@ -87,4 +85,4 @@ def _seen(points: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 def _widths(radii: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Widths in points of lines with radii in m, from the distances (lines, 2) of their ends."""
-    return np.asarray(72.0 * _HEIGHT / _DPI * radii / _SLOPE / depth.mean(axis=1))
+    return np.asarray(72.0 * _HEIGHT / _DPI * radii / VIEW_SLOPE / depth.mean(axis=1))

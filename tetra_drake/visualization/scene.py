@@ -60,6 +60,8 @@ _GAMMA = 2.2  # in browsers, colours of vertices are linear; all other colours a
 
 FIELD_OF_VIEW, ASPECT = 30.0, 1.7
 """Vertical field of view of the camera in degrees, and assumed width / height of the window."""
+VIEW_SLOPE = float(np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))
+"""Half the height of the camera's view at the distance 1."""
 
 VIEW = -0.45, 1.0, -0.45
 """View direction of the camera: from the robot's right and front, down on it."""
@@ -123,7 +125,7 @@ def node_paths(structure: Structure) -> list[str]:
 
 
 def node_colours(structure: Structure) -> list[str]:
-    """Name of each node's colour off the ground."""
+    """Name in COLOURS of each node's colour while it does not touch the ground."""
     colours: list[str] = np.where(structure.held.any(axis=1), "anchor", "node").tolist()
     return colours
 
@@ -180,15 +182,13 @@ def set_surroundings(
     reach = float(np.linalg.norm(seen - middle, axis=1).max())
     if robot.scenario.terrain.is_ground:
         _add_floor(meshcat, robot, points, reach=reach)
-    for unused in ("/Grid", "/Axes"):
-        meshcat.SetProperty(unused, "visible", False)
     for part in ("top_color", "bottom_color"):
         meshcat.SetProperty("/Background/<object>", part, _rgb("sky").tolist())
-    position = camera_position(seen, middle)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
-    meshcat.SetCameraPose(position, middle)
-    for unused in ("PointLightPositiveX", "PointLightNegativeX", "SpotLight"):
-        meshcat.SetProperty(f"/Lights/{unused}", "visible", False)
+    meshcat.SetCameraPose(camera_position(seen, middle), middle)
+    lights = "PointLightPositiveX", "PointLightNegativeX", "SpotLight"
+    for unused in ("/Grid", "/Axes", *(f"/Lights/{light}" for light in lights)):
+        meshcat.SetProperty(unused, "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", AMBIENT)
     settings = {
         "intensity": SUN,
@@ -280,11 +280,9 @@ def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Position of a camera that looks at `target` (3,) and sees all `points` (points, 3)."""
     right, up, forward = view_axes()
     offset = points - target
-    slope = np.tan(np.deg2rad(FIELD_OF_VIEW) / 2)
-    for_width = np.abs(offset @ right) / (ASPECT * slope) - offset @ forward
-    for_height = np.abs(offset @ up) / slope - offset @ forward
-    margin = 1.05
-    return target - margin * max(for_width.max(), for_height.max()) * forward
+    for_width = np.abs(offset @ right) / (ASPECT * VIEW_SLOPE) - offset @ forward
+    for_height = np.abs(offset @ up) / VIEW_SLOPE - offset @ forward
+    return target - 1.05 * max(for_width.max(), for_height.max()) * forward
 
 
 def rgba(name: str) -> Rgba:

@@ -15,12 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import check_file, whole_file
 from tetra_drake.formatting import Say, silent
 from tetra_drake.machine import check_package
-from tetra_drake.visualization.browser import (
-    do,
-    launch_browser,
-    picture_of,
-    wait_until_loaded,
-)
+from tetra_drake.visualization.browser import do, launch_browser, picture_of, wait_until_loaded
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -78,7 +73,7 @@ def make_video(
         fps: frames per second.
         view: a name in VIEWS. The camera follows the robot.
         speed: speed of the robot in the video, as a multiple of its own.
-        say: is told the progress.
+        say: function that gets lines of text about the progress.
 
     Raises:
         InputError: if the file cannot be written, the video has more than MOST_FRAMES frames, or
