@@ -22,7 +22,7 @@ import pandas
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.progress import Display
+from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.files import check_file, read_json, write_whole
@@ -136,7 +136,7 @@ def run_of(name: str) -> Run:
         resume=(out / MANIFEST).exists(),
         reevaluate=False,
         report=False,
-        progress=Display(sys.stdout),
+        progress=Progress(sys.stdout),
     )
 
 

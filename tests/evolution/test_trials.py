@@ -72,7 +72,7 @@ def test_an_optimiser_that_reports_what_cannot_be_recorded_is_named(tmp_path, re
 
 
 def test_a_run_in_which_everything_fails_goes_to_its_end(run_small):
-    trial = run_small(evaluate=lambda vector: Evaluation.failed("no ground")) / "trial_00"
+    trial = run_small(evaluate=lambda vector: Evaluation(failure="no ground")) / "trial_00"
     assert len(lines(trial / "evaluations.jsonl")) == 42
     assert lines(trial / "iterations.jsonl")[-1]["mean_fitness"] is None
     assert not (trial / "best_gait.json").exists()

@@ -42,7 +42,7 @@ def bowl(vector):
 
 
 def failing(vector):
-    return Evaluation.failed("fell")
+    return Evaluation(failure="fell")
 
 
 def run(kind, evaluate=bowl, *, budget=600, **options):

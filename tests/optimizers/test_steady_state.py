@@ -2,6 +2,7 @@
 hand, and the optimiser as a whole, told the fitness of a cheap function."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -62,18 +63,17 @@ def test_failed_members_lose_every_tournament_and_do_not_count_in_the_mean():
 
 
 def test_seven_tenths_of_the_parameters_move_by_up_to_their_step(scenario, generator):
-    steps = mutation_steps(ParameterSpace.of(scenario), scenario.optimizer)
-    twin = np.zeros(len(steps))
-    options = {"steps": steps, "floors": twin - 1.0, "settings": scenario.optimizer}
-    pairs = [make_children(twin, twin, generator=generator, **options) for _ in range(DRAWS)]
-    rows = np.array([first for first, _ in pairs])
-    np.testing.assert_array_equal(rows, [second for _, second in pairs])
+    space, settings = ParameterSpace.of(scenario), scenario.optimizer
+    steps, twin = mutation_steps(space, settings), 2.0 * space.high
+    pairs = [make_children(twin, twin, space, settings, generator) for _ in range(DRAWS)]
+    rows = np.array([first for first, _ in pairs]) - twin
+    np.testing.assert_array_equal(rows, [second - twin for _, second in pairs])
     moved = rows != 0.0
     np.testing.assert_allclose(moved.mean(axis=0), 0.7, atol=0.04)
     assert moved.mean() == pytest.approx(0.7, abs=0.006)
     assert (rows[moved] > 0.0).mean() == pytest.approx(0.5, abs=0.01)
     sizes = np.abs(rows) / steps
-    assert 0.999 < sizes.max() <= 1.0
+    assert 0.999 < sizes.max() < 1.0 + 1e-9
     assert sizes[moved].mean() == pytest.approx(0.5, abs=0.01)
 
 
@@ -107,13 +107,13 @@ def test_one_iteration_as_the_listing_goes_through_it():
     )
     parents = [select_parent(fitnesses, tournament=3, generator=script) for _ in range(2)]
     assert parents == [2, 1]
-    mutants = make_children(
-        *population[parents],
-        steps=np.array([0.2, 0.2, 0.05, 0.1]),
+    space = SimpleNamespace(
+        names=["weight 1", "weight 2", "tau_A", "tau_B"],
+        low=np.array([1.0, 1.0, 0.2, 0.4]),
+        high=np.array([3.4, 3.4, 0.5, 1.0]),
         floors=np.array([0.0, 0.0, 0.2, 0.4]),
-        settings=kinds.SteadyState(),
-        generator=script,
     )
+    mutants = make_children(*population[parents], space, kinds.SteadyState(), script)
     # Children [1.5, 0.1, 0.21, 1.00] and [3.0, 2.5, 0.50, 0.42], moved by [0.1, -0.2, -0.04, 0.0].
     # Child 1: weight 2 would be negative and tau below 0.2, so both stay.
     np.testing.assert_allclose(mutants, [[1.6, 0.1, 0.21, 1.00], [3.1, 2.3, 0.46, 0.42]])
@@ -159,5 +159,5 @@ def test_a_trial_ends_when_the_mean_fitness_levels_off_and_not_for_want_of_one()
     for iteration in range(22):
         told = level.tell([Evaluation(1.0)] * len(level.ask()))
         assert told.stop == ("mean fitness levelled off" if iteration == 21 else None)
-        told = failing.tell([Evaluation.failed("fell")] * len(failing.ask()))
+        told = failing.tell([Evaluation(failure="fell")] * len(failing.ask()))
         assert (told.report, told.stop) == ({"mean_fitness": None}, None)

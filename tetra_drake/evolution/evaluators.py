@@ -44,6 +44,19 @@ MakeExecutor = Callable[[int], Executor]
 """Function that makes an executor with the given number of workers. If it cannot choose the number,
 it has an attribute `workers`: the current number, or a text about it."""
 
+
+@dataclass(frozen=True)
+class LentExecutor:
+    """An executor of the user, as a MakeExecutor. An evaluator does not shut it down."""
+
+    executor: Executor
+    workers: int | str = "its executor's"
+    """Number of its workers, or a text about it."""
+
+    def __call__(self, workers: int) -> Executor:
+        return self.executor
+
+
 TASKS_PER_WORKER = 150
 """Number of tasks after which a worker process is replaced. Drake before 1.56 leaks about 2 MB per
 diagram with Python systems."""
@@ -115,7 +128,8 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
     finally:
         for future in list(running):
             future.cancel()
-        executor.shutdown(wait=is_done)
+        if not isinstance(make, LentExecutor):
+            executor.shutdown(wait=is_done)
 
 
 class WorkerProcesses(Executor):
@@ -174,21 +188,6 @@ def deaf_to_ctrl_c() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@dataclass(frozen=True)
-class Lent(Executor):
-    """An executor of the user, as a MakeExecutor: it is not shut down."""
-
-    executor: Executor
-    workers: int | str = "its executor's"
-
-    def __call__(self, workers: int) -> Executor:
-        return self
-
-    def submit(self, function: Callable[..., Any], /, *args: Any, **more: Any) -> Future[Any]:
-        """See Executor.submit()."""
-        return self.executor.submit(function, *args, **more)
 
 
 def finished(

@@ -19,20 +19,16 @@ class Evaluation:
     """Outcome of one vector. A failure has fitness -inf; it has metrics only if the simulation was
     completed."""
 
-    fitness: float
+    fitness: float = -math.inf
     metrics: Mapping[str, Any] = field(default_factory=dict)
     """Metrics in the form of Metrics.to_json()."""
     failure: str | None = None
+    """Reason of a failure; None for a success."""
     wall_time: float = 0.0
     """Wall time in s. Simulations that run side by side on a core share the time of the core."""
     engine: str = ""
     draws: Mapping[str, Sequence[float]] | None = None
     """Fitness and distance (m) of each draw of disturbances; None without disturbances."""
-
-    @classmethod
-    def failed(cls, reason: str) -> Evaluation:
-        """A failed evaluation with this reason."""
-        return cls(fitness=-math.inf, failure=reason)
 
 
 @dataclass(frozen=True, eq=False)

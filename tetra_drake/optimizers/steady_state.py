@@ -7,7 +7,7 @@ is at least 1 - p.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,12 +35,10 @@ class SteadyStateOptimizer:
     generator: np.random.Generator
     settings: kinds.SteadyState
 
-    def __post_init__(self) -> None:
-        self._steps = mutation_steps(self.space, self.settings)
-        self._asked: list[Vector] = []
-        self._population: list[Vector] = []
-        self._fitnesses: Vector = np.empty(0)
-        self._means: list[float] = []
+    _asked: list[Vector] = field(init=False, default_factory=list)
+    _population: list[Vector] = field(init=False, default_factory=list)
+    _fitnesses: Vector = field(init=False)
+    _means: list[float] = field(init=False, default_factory=list)
 
     def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
@@ -53,14 +51,8 @@ class SteadyStateOptimizer:
                 select_parent(self._fitnesses, tournament=size, generator=generator)
                 for _ in range(2)
             )
-            children = make_children(
-                self._population[first],
-                self._population[second],
-                steps=self._steps,
-                floors=space.floors,
-                settings=settings,
-                generator=generator,
-            )
+            parents = self._population[first], self._population[second]
+            children = make_children(*parents, space, settings, generator)
             self._asked = [space.repair(child) for child in children]
         return [vector.copy() for vector in self._asked]
 
@@ -114,9 +106,7 @@ def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector
 def make_children(
     first: Vector,
     second: Vector,
-    *,
-    steps: Vector,
-    floors: Vector,
+    space: ParameterSpace,
     settings: kinds.SteadyState,
     generator: np.random.Generator,
 ) -> list[Vector]:
@@ -128,7 +118,7 @@ def make_children(
     As in the listing, both children get the same changes, and only reductions are checked: a
     parameter that would fall to its floor or below stays as it is.
     """
-    count = len(steps)
+    steps, count = mutation_steps(space, settings), len(first)
     swapped = generator.random(count) >= 1.0 - settings.crossover_probability
     children = np.where(swapped, second, first), np.where(swapped, first, second)
 
@@ -136,7 +126,7 @@ def make_children(
     moves = generator.random(count) >= 1.0 - settings.mutation_probability
     change = np.where(moves, sign * (steps * generator.random(count)), 0.0)
     return [
-        np.where((change < 0.0) & ~(child + change > floors), child, child + change)
+        np.where((change < 0.0) & ~(child + change > space.floors), child, child + change)
         for child in children
     ]
 
