@@ -149,7 +149,7 @@ def last_iteration(means: Sequence[float], settings: SteadyState) -> int:
 
 
 def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
-    """What the thesis says of a trial, for ours. Lengths are in inches."""
+    """Numbers of one of our trials that the thesis gives for its trials. Lengths are in inches."""
     lines = run.iterations.query("trial == @trial").set_index("iteration")
     means = lines["mean_fitness"].to_list()
     last = last_iteration(means, settings)
@@ -194,7 +194,7 @@ the trials and in the trial with the best gait."""
 
 
 def results(trials: pandas.DataFrame) -> dict[str, float]:
-    """The same results as in THESIS, for trials of ours."""
+    """Results of our trials, by the names in THESIS."""
     rise = trials["best_in"] / trials["initial_best_in"]
     return {
         "initial": trials["initial_best_in"].max(),

@@ -86,7 +86,7 @@ _EFFORT = {"require": {"clearance": "0.125 in", "tension": 0.0, "mean_actuator_p
 
 
 def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, Any]:
-    """Changes of an experiment."""
+    """Changes of a scenario for an experiment with this optimiser."""
     sizes = {"evolution.trials": trials, "evolution.evaluations": evaluations}
     return {"optimizer": optimizer, **sizes}
 

@@ -12,11 +12,6 @@ STATUS = replace(FRESH, iteration=9, evaluations=40, failures=1, **BEST)
 ENDED = replace(STATUS, evaluations=100, best_fitness=6.0, stop="levelled off")
 
 
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
 def test_a_line_is_about_all_trials_and_shows_the_fittest_gait():
     stream = io.StringIO()
     for statuses in ([FRESH], [STATUS, ENDED, FRESH]):
@@ -66,7 +61,8 @@ def test_the_time_left_counts_no_compilation_and_waits_until_it_is_known(monkeyp
 
 def test_a_terminal_shows_one_bar_for_the_run_and_one_per_stage(monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    stream = Terminal()
+    stream = io.StringIO()
+    stream.isatty = lambda: True
     with Progress(stream) as progress:
         progress.show([STATUS, ENDED, FRESH])
         progress.stage("best gaits", 2, 5)

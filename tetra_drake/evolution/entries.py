@@ -150,7 +150,8 @@ class IterationLine(Line):
 
 
 class EliteLine(Line):
-    """Line of an elite on disturbed robots; see analysis.elites."""
+    """Line of an elite, the fittest gait of a cell of the map, on disturbed robots; see
+    study.elites."""
 
     identity = ("trial", "index")
 

@@ -46,7 +46,7 @@ _SEEDS_KEPT = 32
 
 @dataclass(eq=False)
 class GaitEvaluation:
-    """Evaluates vectors by simulating their gaits.
+    """Fitness function of evolution: it simulates the gait of a vector.
 
     The result is the same in any process, bit for bit, unless the time budget runs out.
     """

@@ -97,7 +97,7 @@ def _name(given: object) -> str:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a run: scenario, seed, installed versions and method."""
+    """Definition of a run: scenario, seed, versions of the packages, and method."""
 
     scenario: Scenario
     seed: int

@@ -16,8 +16,8 @@ from tetra_drake.scenario.disturbances import IterationSeed
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Outcome of one vector. A failure has fitness -inf; it has metrics only if the simulation was
-    completed."""
+    """Fitness and metrics of one vector. A failure has fitness -inf; it has metrics only if the
+    simulation was completed."""
 
     fitness: float = -math.inf
     metrics: Mapping[str, Any] = field(default_factory=dict)
@@ -33,7 +33,7 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A vector to evaluate, numbered as in the record."""
+    """A vector to evaluate, with its numbers in the record."""
 
     vector: Vector
     trial: int = 0
@@ -53,7 +53,7 @@ Evaluate = Callable[[Task], Evaluation]
 
 @dataclass(frozen=True)
 class Iteration:
-    """Outcome of an optimiser's iteration: its report on the evaluations."""
+    """What an optimiser reports after it got the evaluations of an iteration."""
 
     report: Mapping[str, Any]
     """Numbers to record with the iteration, by name; an unknown number is None."""

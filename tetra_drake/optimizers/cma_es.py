@@ -116,7 +116,8 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
 
 @dataclass(frozen=True)
 class Box:
-    """Points between 0 and 1. A root is an angle in half turns, so every root is a valid point."""
+    """Search space of parameters between 0 and 1. A root is an angle in half turns, so that every
+    root is a valid point."""
 
     size: int
 
