@@ -1,15 +1,13 @@
-"""The thesis's algorithm: its operators' statistics and bounds, an iteration of the listing by
-hand, and the optimiser as a whole, told the fitness of a cheap function."""
+"""The operators of the thesis's algorithm: their statistics and bounds, and an iteration of the
+listing by hand."""
 
 import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.analytic import optimise, small_scenario
 
-from tetra_drake.optimizers import optimizer_of
-from tetra_drake.optimizers.base import Evaluation, mean_fitness
+from tetra_drake.optimizers.base import mean_fitness
 from tetra_drake.optimizers.steady_state import (
     find_place,
     has_levelled_off,
@@ -134,30 +132,3 @@ def test_steps_are_the_thesis_s(scenario):
     np.testing.assert_allclose(steps({})[[0, TAU_A, TAU_B]], [0.2, 0.05, 0.1])
     listing = {"optimizer.tau_mutation": "listing"}
     np.testing.assert_allclose(steps(listing)[[TAU_A, TAU_B]], [0.0, 0.1])
-
-
-def evaluate(vector):
-    return Evaluation(-float(((vector[:-2] - 2.0) ** 2).sum() + abs(vector[TAU_A] - 0.25)))
-
-
-def make(scenario):
-    space, generator = ParameterSpace.of(scenario), np.random.default_rng(3)
-    return optimizer_of(scenario.optimizer)(space, scenario.evolution, generator)
-
-
-def test_the_mean_fitness_never_falls_and_rises_much():
-    optimizer = make(small_scenario(population=20, iterations=200))
-    _, iterations = optimise(optimizer, evaluate, 420)
-    means = np.array([iteration.report["mean_fitness"] for iteration in iterations])
-    assert (np.diff(means) >= -1e-12).all()
-    assert means[-1] > 0.6 * means[0]
-
-
-def test_a_trial_ends_when_the_mean_fitness_levels_off_and_not_for_want_of_one():
-    changes = {"optimizer.stop_after": 20, "optimizer.stop_window": 10}
-    level, failing = (make(small_scenario(iterations=100).with_changes(changes)) for _ in range(2))
-    for iteration in range(22):
-        told = level.tell([Evaluation(1.0)] * len(level.ask()))
-        assert told.stop == ("mean fitness levelled off" if iteration == 21 else None)
-        told = failing.tell([Evaluation(failure="fell")] * len(failing.ask()))
-        assert (told.report, told.stop) == ({"mean_fitness": None}, None)

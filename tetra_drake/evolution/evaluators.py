@@ -44,19 +44,6 @@ MakeExecutor = Callable[[int], Executor]
 """Function that makes an executor with the given number of workers. If it cannot choose the number,
 it has an attribute `workers`: the current number, or a text about it."""
 
-
-@dataclass(frozen=True)
-class LentExecutor:
-    """An executor of the user, as a MakeExecutor. An evaluator does not shut it down."""
-
-    executor: Executor
-    workers: int | str = "its executor's"
-    """Number of its workers, or a text about it."""
-
-    def __call__(self, workers: int) -> Executor:
-        return self.executor
-
-
 TASKS_PER_WORKER = 150
 """Number of tasks after which a worker process is replaced. Drake before 1.56 leaks about 2 MB per
 diagram with Python systems."""
@@ -104,7 +91,8 @@ def in_lanes(evaluate: GaitEvaluation, workers: int) -> Iterator[Submit]:
 
 @contextlib.contextmanager
 def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterator[Submit]:
-    """Evaluator on an executor of concurrent.futures.
+    """Evaluator on an executor of concurrent.futures. It shuts the executor down, unless it is a
+    LentExecutor.
 
     If a worker dies, its future raises the error of the executor, such as BrokenExecutor. A task
     for an executor that is broken or shut down raises InputError.
@@ -130,6 +118,18 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
             future.cancel()
         if not isinstance(make, LentExecutor):
             executor.shutdown(wait=is_done)
+
+
+@dataclass(frozen=True)
+class LentExecutor:
+    """An executor of the user, as a MakeExecutor. An evaluator does not shut it down."""
+
+    executor: Executor
+    workers: int | str = "its executor's"
+    """Number of its workers, or a text about it."""
+
+    def __call__(self, workers: int) -> Executor:
+        return self.executor
 
 
 class WorkerProcesses(Executor):
