@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NoReturn
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, make_folder, read_bytes, writing
@@ -71,6 +71,7 @@ class Line(BaseModel):
     """Content of a line in a record: keys with their types. Undeclared keys are kept."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False, extra="allow")
+    __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
 
     identity: ClassVar[tuple[str, ...]] = ()
     """Keys whose values together differ from line to line."""
