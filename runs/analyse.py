@@ -95,7 +95,7 @@ _NUMBERS = [*SHOWN, "sensitivity_in", "distance_in", TURNED]
 
 @dataclass(frozen=True)
 class Analysis:
-    """Content of analysis.json."""
+    """Analysis of a run's best gaits: the content of analysis.json."""
 
     best_gaits: pandas.DataFrame
     """The fittest gait of each trial. Index: trial. Columns: evaluation, evaluations (of the whole

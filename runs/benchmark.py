@@ -67,14 +67,14 @@ CONVERGED_MUJOCO = "!Mujoco {step: 0.0125 ms}"
 
 
 def brief(scenario: Scenario) -> Scenario:
-    """Runs a simulation only to load and compile the code before measurements."""
+    """The scenario for a moment, to load and compile the code before measurements."""
     return scenario.with_changes(
         {"simulation.duration": "0.02 s", "simulation.steady_from": "0.01 s"}
     )
 
 
 def walk(scenario: Scenario, gaits: int, *, cores: int, lanes: bool) -> list[SimulationResult]:
-    """Results of gaits. Without `lanes` they are simulated one after the other."""
+    """Results of random gaits, simulated side by side in lanes, or else one after the other."""
     drawn = [seeded_gait(scenario, seed) for seed in range(gaits)]
     groups = [drawn] if lanes else [[gait] for gait in drawn]
     results = []
@@ -178,7 +178,7 @@ def grounds_table(scenario: Scenario) -> str:
 
 
 def held_gait(scenario: Scenario, gait: Gait) -> Command:
-    """The signals of a gait, held for control periods."""
+    """A gait as a command: its signals, constant during each control period."""
     robot, period = Robot.of(scenario), scenario.simulation.control_period
     times = np.arange(0.0, scenario.simulation.duration, period)
     of_cable = robot.structure.cables["signal"][robot.driven]
@@ -186,15 +186,18 @@ def held_gait(scenario: Scenario, gait: Gait) -> Command:
 
 
 def step_through(simulation: Simulation, actions: np.ndarray) -> None:
-    """Simulates robots with actions (periods, robots, actions)."""
+    """Simulates robots that get actions (periods, robots, actions) in each control period."""
     simulation.reset()
     for some in actions:
         simulation.step(some)
 
 
 def controlled_rows(scenario: Scenario) -> list[list[str]]:
-    """Control periods per second of robots with the actions of gaits, and this throughput beside
-    simulations of the same actions as commands, and of the gaits themselves."""
+    """Rows about robots in control periods, whose actions are the signals of gaits.
+
+    They are: control periods per second; this speed relative to simulations of the same signals as
+    commands; and relative to simulations of the gaits.
+    """
     rows: list[list[str]] = [[], [], []]
     for robots in CONTROLLED:
         gaits = [seeded_gait(scenario, seed) for seed in range(robots)]
@@ -213,7 +216,7 @@ def controlled_rows(scenario: Scenario) -> list[list[str]]:
 
 
 def rollout_row(scenario: Scenario) -> list[str]:
-    """Control periods per second of robots in MuJoCo's rollout, with its threads."""
+    """Row with the control periods per second of robots in MuJoCo's rollout, on all cores."""
     import mujoco
     from mujoco.rollout import Rollout
 

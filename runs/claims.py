@@ -82,9 +82,12 @@ def delay(cause: np.ndarray, effect: np.ndarray, most: int) -> tuple[float, floa
 
 
 def rhythm(trajectory: xarray.Dataset) -> dict[str, Any]:
-    """Period (s) of a gait. Of the feet's forward speeds: travelling index, lags (cycles) behind
-    the foot before, deviation / mean, percents of time below zero, and correlation with the speed
-    one period later. Empty if the signals do not oscillate at least twice."""
+    """Rhythm of a gait: its period (s), and numbers of the feet's forward speeds.
+
+    They are: travelling index, lags (cycles) behind the foot before, deviation / mean, percents of
+    time below zero, and correlation with the speed one period later. Empty if the signals do not
+    oscillate at least twice.
+    """
     times, signals = trajectory.time.values, trajectory.signal.values
     speeds = trajectory.v_WN.sel(node=FEET, axis="x").values
     frequency = dominant_frequency(times, signals[:, np.ptp(signals, axis=0).argmax()])
@@ -115,9 +118,12 @@ def travel(trajectory: xarray.Dataset) -> dict[str, np.ndarray]:
 
 
 def responses(trajectory: xarray.Dataset, period: float) -> dict[str, Any]:
-    """Of each pair of driven cables: deviation of the tension T in percent of the signal S; delays
-    (ms) behind S of T ("late"), of S - T ("yields") and of the cable's shortening, with the
-    correlations there."""
+    """Response of each pair of driven cables to its signal S.
+
+    "ratio" is the deviation of the tension T in percent of the deviation of S. Of three effects
+    there are the delay (ms) behind S and the correlation at this delay: of T ("late"), of S - T
+    ("yields"), and of the cable's shortening ("shortens").
+    """
     spacing = float(trajectory.time[1] - trajectory.time[0])
     rows = []
     for oscillator in trajectory.oscillator.values:

@@ -67,7 +67,7 @@ def why_outdated(name: str, experiment: Experiment, directory: Path) -> str:
 
 @dataclass
 class Reminded:
-    """Optimiser that is told recorded fitnesses in place of simulated ones."""
+    """Optimiser that gets the recorded fitnesses, not the simulated ones."""
 
     optimizer: Optimizer
     fitnesses: Sequence[float]
@@ -134,7 +134,7 @@ def first_difference(run: Run, again: Run) -> str:
 
 
 def _goes_elsewhere(then: pandas.Series, now: pandas.Series, again: Run) -> bool:
-    """True if a gait's distance is another, by more than rounding explains."""
+    """True if the distance of a gait has changed by more than rounding errors explain."""
     apart = abs(now["distance_in"] - then["distance_in"])
     if apart <= DISTANCE or (math.isnan(then["distance_in"]) and math.isnan(now["distance_in"])):
         return False

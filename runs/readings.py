@@ -22,7 +22,7 @@ import pandas
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.progress import Display
+from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.files import check_file, read_json, write_whole
@@ -136,7 +136,7 @@ def run_of(name: str) -> Run:
         resume=(out / MANIFEST).exists(),
         reevaluate=False,
         report=False,
-        progress=Display(sys.stdout),
+        progress=Progress(sys.stdout),
     )
 
 
@@ -149,7 +149,7 @@ def last_iteration(means: Sequence[float], settings: SteadyState) -> int:
 
 
 def numbers_of(run: Run, trial: int, settings: SteadyState) -> dict[str, float]:
-    """What the thesis says of a trial, for ours. Lengths are in inches."""
+    """Numbers of one of our trials that the thesis gives for its trials. Lengths are in inches."""
     lines = run.iterations.query("trial == @trial").set_index("iteration")
     means = lines["mean_fitness"].to_list()
     last = last_iteration(means, settings)
@@ -194,7 +194,7 @@ the trials and in the trial with the best gait."""
 
 
 def results(trials: pandas.DataFrame) -> dict[str, float]:
-    """The same results as in THESIS, for trials of ours."""
+    """Results of our trials, by the names in THESIS."""
     rise = trials["best_in"] / trials["initial_best_in"]
     return {
         "initial": trials["initial_best_in"].max(),

@@ -29,7 +29,7 @@ from thinning import thin
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.evolution.progress import Display
+from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.figures.gait_diagram import gait_diagram
@@ -86,7 +86,7 @@ _EFFORT = {"require": {"clearance": "0.125 in", "tension": 0.0, "mean_actuator_p
 
 
 def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, Any]:
-    """Changes of an experiment."""
+    """Changes of a scenario for an experiment with this optimiser."""
     sizes = {"evolution.trials": trials, "evolution.evaluations": evaluations}
     return {"optimizer": optimizer, **sizes}
 
@@ -173,7 +173,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     analysis, copy = made / ANALYSIS, shown / ANALYSIS
     if analysis.exists() and copy.exists() and filecmp.cmp(analysis, copy, shallow=False):
         return
-    resume, progress = (made / MANIFEST).exists(), Display(sys.stdout)
+    resume, progress = (made / MANIFEST).exists(), Progress(sys.stdout)
     if not resume:
         save_times(load_times(out) | {name: {}}, out)
     with timed(name, "evolution", out):

@@ -70,7 +70,8 @@ ENGINES = {
 
 @dataclass(frozen=True)
 class RollingPolicy:
-    """Policy of a rover: free lengths of its cables by their places around its centre.
+    """Feedback policy of a rover: the free length of each cable, from the position of the cable
+    relative to the rover's centre.
 
     Each cable is shortened by a polynomial in x and z, the place of its middle in the world frame
     from the centre, in units of half a rod. All cables have the same polynomial, so the rover keeps
@@ -113,7 +114,7 @@ class RollingPolicy:
 
 
 def undisturbed(changes: Mapping[str, Any]) -> Scenario:
-    """The rover with changes. Its power counts from 2 s on."""
+    """The rover without disturbances, with changes. Its mean power is taken from 2 s on."""
     return load_scenario("rover").with_changes({"simulation.steady_from": "2 s", **changes})
 
 

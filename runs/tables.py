@@ -97,7 +97,7 @@ def load_all(directory: Path = HERE) -> dict[str, Analysis]:
 
 
 def shown(name: str, file: str, about: str) -> str:
-    """A picture of a run, HEIGHT high. Its width is given, as pages make wide pictures narrower."""
+    """HTML of a picture of a run, HEIGHT high. It has a width, too: pages shrink wide pictures."""
     width = round(HEIGHT * aspect(HERE / name / file))
     return f'<img src="{name}/{file}" width="{width}" alt="{about}">'
 
@@ -227,8 +227,8 @@ def trust_table(runs: Runs) -> str:
 
 
 def films(names: Mapping[str, str], runs: Runs, *, distances: bool) -> str:
-    """A row of films for README.md, of one height, with what moves. With `distances`, with the
-    distances and times of the best gaits."""
+    """Markdown table with a row of films for README.md, and captions that say what moves. With
+    `distances` the captions have the distances of the best gaits."""
     width, pictures, captions = ROW // len(names), [], []
     for name, words in names.items():
         folder = f"{HERE.name}/{name}"

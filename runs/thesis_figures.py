@@ -54,8 +54,8 @@ INITIAL, EVOLVED = THESIS["initial"], THESIS["evolved"]
 
 
 def walks(run: Run) -> Results:
-    """Results of each trial's farthest and least far initial gait, and of its fittest gait, by
-    GAITS."""
+    """Results of three gaits of each trial, by their names in GAITS: the initial gaits with the
+    greatest and the least distance, and the fittest gait."""
     initial = run.initial().groupby("trial")["distance"]
     chosen = initial.idxmax(), initial.idxmin(), run.best().index
     results = {}

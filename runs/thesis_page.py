@@ -198,7 +198,7 @@ def motion_errors(run: Run, engines: Iterable[str]) -> list[str]:
 
 
 def widths(*pictures: str) -> list[int]:
-    """Widths (pixels) of pictures beside each other, so that they have one height."""
+    """Widths (pixels) of pictures in a row, so that all have the same height."""
     shapes = [aspect(PAGE.parent / picture) for picture in pictures]
     return [round(ROW * shape / sum(shapes)) for shape in shapes]
 
@@ -216,7 +216,8 @@ def apart(first: str, second: str) -> str:
 
 
 def without_slip(run: Run) -> str:
-    """Distances of a run's best gaits where the deflection becomes 0 at the stiction range."""
+    """Distances of a run's best gaits if no node slips: the deflection is reset to 0 at the
+    stiction range."""
     scenario = run.scenario.with_changes({"friction.reset": "range"})
     walks = [simulate(scenario, gait).metrics.distance_in for gait in run.gaits()]
     return over_trials(pandas.Series(walks))

@@ -77,7 +77,7 @@ def thin(source: Path, out: Path) -> None:
 
 
 def _entries(run: Run, name: str, trial: int | None = None) -> list[dict[str, Any]]:
-    """Content of the lines of a file of a run."""
+    """The lines of a file of a run, as dictionaries."""
     return [line.content() for line in run.file(name, trial).read()]
 
 

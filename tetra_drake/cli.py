@@ -259,7 +259,7 @@ def _evolve(
     Example: tetra-drake evolve --scenario quick --out runs/demo
     """
     from tetra_drake.evolution.manifest import MANIFEST, read_manifest
-    from tetra_drake.evolution.progress import Display
+    from tetra_drake.evolution.progress import Progress
     from tetra_drake.experiment import evolve
     from tetra_drake.report.summary import run_text
     from tetra_drake.scenario.load import load_scenario
@@ -288,7 +288,7 @@ def _evolve(
                 workers=workers,
                 resume=resume,
                 executor=make_executor,
-                progress=Display(sys.stdout),
+                progress=Progress(sys.stdout),
                 reevaluate=None if reevaluate else False,
             )
     except KeyboardInterrupt:
@@ -629,10 +629,10 @@ def _prepare() -> None:
     Example: tetra-drake prepare
     """
     from tetra_drake.engines.preparation import FUNCTIONS, prepare
-    from tetra_drake.evolution.progress import Display
+    from tetra_drake.evolution.progress import Progress
 
     title, numbers = "compiled functions", itertools.count(1)
-    with Display(sys.stdout) as display:
+    with Progress(sys.stdout) as display:
         prepare(lambda: display.stage(title, min(next(numbers), FUNCTIONS - 1), FUNCTIONS))
         display.stage(title, FUNCTIONS, FUNCTIONS)
 

@@ -15,7 +15,7 @@ from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
 from tetra_drake.evolution.manifest import Manifest, Method, RunRecord, read_manifest
-from tetra_drake.evolution.progress import Display, Progress
+from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
 from tetra_drake.files import check_folder, given_path
@@ -92,7 +92,7 @@ def evolve(
     _check_functions("evolve", optimizer=optimizer, objective=objective)
     make_executor = maker_of(executor)
     if progress is True:
-        progress = Display(sys.stdout)
+        progress = Progress(sys.stdout)
     if not isinstance(progress, Progress | None) and progress is not False:
         problem = f"found {progress!r}, expected True or an evolution.progress.Progress"
         raise InputError("evolve", "progress", problem)

@@ -1,5 +1,6 @@
 """kill -9 at random moments, Ctrl-C, SIGTERM: what is resumed ends as if nothing had happened."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -30,21 +31,14 @@ def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=
             time.sleep(after)
             os.killpg(process.pid, sign) if sign == signal.SIGINT else process.send_signal(sign)
         _, messages = process.communicate(timeout=60)
-    wait_until_gone(process.pid)
     assert "leaked" not in messages or sign == signal.SIGKILL
-    return process.returncode
-
-
-def wait_until_gone(session):
-    """Waits for all processes of a session to end."""
     deadline = time.monotonic() + 10.0
-    while time.monotonic() < deadline:
-        try:
-            os.killpg(session, 0)
-        except ProcessLookupError:
-            return
-        time.sleep(0.05)
-    raise AssertionError("processes are left over")
+    with contextlib.suppress(ProcessLookupError):
+        while True:
+            os.killpg(process.pid, 0)
+            assert time.monotonic() < deadline, "processes are left over"
+            time.sleep(0.05)
+    return process.returncode
 
 
 @pytest.fixture(scope="module")

@@ -33,6 +33,5 @@ def test_what_is_given_from_python_has_its_module_and_fields_in_its_name():
     ):
         method = Method.of(small_scenario(), objective=objective, optimizer=scaled)
         assert (method.objective, method.optimizer) == (name, f"{HERE}.scaled")
-        assert method.given_from_python == ["objective", "optimizer"]
     built_in = Method(objective="fitness", optimizer="SteadyState")
     assert built_in == Method.of(small_scenario())

@@ -3,7 +3,7 @@
 import io
 from dataclasses import replace
 
-from tetra_drake.evolution.progress import Display, overview
+from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.trials import TrialStatus
 
 FRESH = TrialStatus(number=0, evaluations_at_most=140)
@@ -12,16 +12,14 @@ STATUS = replace(FRESH, iteration=9, evaluations=40, failures=1, **BEST)
 ENDED = replace(STATUS, evaluations=100, best_fitness=6.0, stop="levelled off")
 
 
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
-def test_the_overview_is_of_all_trials_and_shows_the_fittest_gait():
-    text = overview([STATUS, ENDED, FRESH])
+def test_a_line_is_about_all_trials_and_shows_the_fittest_gait():
+    stream = io.StringIO()
+    for statuses in ([FRESH], [STATUS, ENDED, FRESH]):
+        Progress(stream).show(statuses)
+    first, second = stream.getvalue().splitlines()
+    assert first == "evaluations: 0 of 140"
     for part in ("6.00", "5.00 in", "1 of 3 trials", "2 failed"):
-        assert part in text
-    assert overview([FRESH]) == ""
+        assert part in second
 
 
 def test_plain_lines_come_now_and_then_and_at_the_end_with_one_time_left(monkeypatch):
@@ -29,7 +27,7 @@ def test_plain_lines_come_now_and_then_and_at_the_end_with_one_time_left(monkeyp
     monkeypatch.setattr("tetra_drake.evolution.progress.time.monotonic", lambda: now[0])
     stream = io.StringIO()
     status = replace(STATUS)
-    with Display(stream) as progress:
+    with Progress(stream) as progress:
         for second in range(25):
             now[0] = 100.0 + second
             progress.show([status])
@@ -53,7 +51,7 @@ def test_the_time_left_counts_no_compilation_and_waits_until_it_is_known(monkeyp
     monkeypatch.setattr("tetra_drake.evolution.progress.compiling_time", lambda: compiled[0])
     stream = io.StringIO()
     moments = [(0, 0, 0), (38, 30, 8), (51, 30, 20), (101, 75, 20), (125, 75, 50)]
-    with Display(stream) as progress:
+    with Progress(stream) as progress:
         for now[0], compiled[0], done in moments:
             progress.stage("gaits", done, 100)
     left = [line.partition("of 100")[2] for line in stream.getvalue().splitlines()]
@@ -63,8 +61,9 @@ def test_the_time_left_counts_no_compilation_and_waits_until_it_is_known(monkeyp
 
 def test_a_terminal_shows_one_bar_for_the_run_and_one_per_stage(monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    stream = Terminal()
-    with Display(stream) as progress:
+    stream = io.StringIO()
+    stream.isatty = lambda: True
+    with Progress(stream) as progress:
         progress.show([STATUS, ENDED, FRESH])
         progress.stage("best gaits", 2, 5)
         progress.say("hello")

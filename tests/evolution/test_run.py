@@ -11,24 +11,40 @@ from helpers.synthetic_run import write_run
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.trials import ALL_DONE
+from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.settings.units import INCH
 
 
-def test_a_run_loads_as_tables(run_small):
-    run = load_run(run_small(seed=11))
-    assert run.manifest.seed == 11
-    assert len(run.evaluations) == 2 * 42
-    assert run.evaluations["weight_3"].iloc[20] == run.vector(0, 20)[2]
-    failed = run.evaluations["failure"].notna()
-    assert failed.any() and failed.equals(run.evaluations["fitness"].isna())
-    walked = run.evaluations[~failed]
-    np.testing.assert_array_equal(walked["distance_in"], walked["distance"] / INCH)
+def test_every_evaluation_is_a_row_of_a_table_and_iterations_follow_from_them(run_small):
+    run = load_run(run_small(seed=11, population=12, iterations=15))
+    assert run.manifest.seed == 11 and len(run.evaluations) == 2 * 42
+    table = run.evaluations.query("trial == 1")
+    assert table["index"].tolist() == list(range(42))
+    assert table["iteration"].tolist() == [0] * 12 + [1 + i // 2 for i in range(30)]
+    assert table["placed"].iloc[:12].tolist() == list(range(12))
+    for row in table.to_dict("records"):
+        expected = Bowl()(Task(run.vector(1, row["index"])))
+        assert row["weight_3"] == run.vector(1, row["index"])[2]
+        if expected.failure:
+            assert row["failure"] == expected.failure and math.isnan(row["fitness"])
+        else:
+            assert row["fitness"] == expected.fitness
+            assert {name: row[name] for name in expected.metrics} == expected.metrics
+            assert row["distance_in"] == row["distance"] / INCH
+    assert 0 < table["failure"].notna().sum() < 42
+
     means = run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness")
     assert means.shape == (16, 2)
-    last = run.iterations.iloc[-1]
-    best = run.evaluations.set_index(["trial", "index"]).loc[(1, last["best_evaluation"])]
-    assert last["best_distance"] == best["distance"]
+    for row in run.iterations.query("trial == 1").to_dict("records"):
+        so_far = table[table["iteration"] <= row["iteration"]].set_index("index")
+        members = so_far.dropna(subset="placed").drop_duplicates("placed", keep="last")
+        assert row["mean_fitness"] == pytest.approx(members["fitness"].mean(), rel=1e-12)
+        assert row["best_fitness"] == members["fitness"].max()
+        best = so_far.loc[row["best_evaluation"]]
+        assert (best["fitness"], best["distance"]) == (row["best_fitness"], row["best_distance"])
+    assert run.iterations["stop"].dropna().to_dict() == dict.fromkeys((15, 31), ALL_DONE)
 
 
 def test_a_run_in_progress_loads_and_is_left_alone(run_small):

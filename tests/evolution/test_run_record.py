@@ -1,6 +1,5 @@
 """Run directories: what is refused, repaired and reported, and how runs are resumed."""
 
-import hashlib
 import json
 import os
 from unittest.mock import Mock
@@ -23,13 +22,14 @@ def create(directory):
     return record
 
 
-def test_the_manifest_holds_seed_versions_and_method_and_the_scenario_its_own_file(tmp_path):
+def test_the_manifest_holds_seed_versions_and_method_and_proves_the_scenario(tmp_path, refused):
     with create(tmp_path) as run:
         assert read_manifest(tmp_path) == run.manifest
     assert (run.manifest.scenario, run.manifest.seed) == (small_scenario(), 5)
-    raw = json.loads((tmp_path / "manifest.json").read_text())
-    text = (tmp_path / "scenario.yaml").read_bytes()
-    assert raw["scenario_sha256"] == hashlib.sha256(text).hexdigest()
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text(scenario.read_text().replace("population: 12", "population: 3"))
+    with refused(scenario, "", "manifest.json"):
+        RunRecord.resume(tmp_path)
 
 
 CHANGED = {"run": "x", "seed": 6, "versions": {}, "objective": "x", "optimizer": "CmaEs"}
@@ -43,14 +43,9 @@ CHANGED = {"run": "x", "seed": 6, "versions": {}, "objective": "x", "optimizer":
 def test_a_damaged_or_changed_manifest_is_reported(tmp_path, refused, key, value, named):
     with create(tmp_path):
         pass
-    manifest, scenario = tmp_path / "manifest.json", tmp_path / "scenario.yaml"
-    whole = manifest.read_text()
-    manifest.write_text(json.dumps(json.loads(whole) | {key: value}))
+    manifest = tmp_path / "manifest.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {key: value}))
     with refused(manifest, named):
-        RunRecord.resume(tmp_path)
-    manifest.write_text(whole)
-    scenario.write_text(scenario.read_text().replace("population: 12", "population: 3"))
-    with refused(scenario, "", "manifest.json"):
         RunRecord.resume(tmp_path)
 
 
@@ -115,13 +110,10 @@ def holding(**changes):
 DAMAGES = [
     ("evaluations", 4, lambda line: line.replace(b'"index": 3', b'"index": 4'), "checksum"),
     ("evaluations", 4, lambda line: line.partition(b', "crc"')[0] + b"}\n", "checksum"),
-    ("evaluations", 4, lambda line: b"{nonsense\n", "checksum"),
     ("iterations", 9, holding(run="another"), "run another"),
-    ("iterations", 9, holding(trial=1), "trial 1"),
     ("evaluations", 7, holding(index=7), "index"),
     ("evaluations", 7, holding(genome=[2.0] * 20), "genome"),
     ("evaluations", 7, holding(metrics={"distance": []}), "metrics"),
-    ("iterations", 5, holding(best_fitness=1.0), "best_fitness"),
     ("iterations", 5, holding(best_evaluation=41), "best_evaluation"),
     # What only a search that is repeated can tell
     ("evaluations", 20, holding(genome=[2.0] * 26), "genome"),

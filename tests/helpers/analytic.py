@@ -39,7 +39,7 @@ class Bowl:
         chance = hash(tuple(genome.tolist()))
         time.sleep(self.delay * (chance % 97) / 97)
         if chance % self.fails_every == 0:
-            return Evaluation.failed("fell off the table")
+            return Evaluation(failure="fell off the table")
         fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
         metrics = {"distance": 10.0 + fitness, **measures(genome)}
         return Evaluation(fitness, metrics, wall_time=self.delay)

@@ -1,4 +1,4 @@
-"""The optimisers: what all have in common, then each but the thesis's by itself."""
+"""The optimisers: what all have in common, then each by itself."""
 
 import dataclasses
 import math
@@ -42,7 +42,7 @@ def bowl(vector):
 
 
 def failing(vector):
-    return Evaluation.failed("fell")
+    return Evaluation(failure="fell")
 
 
 def run(kind, evaluate=bowl, *, budget=600, **options):
@@ -150,6 +150,21 @@ def test_batches_that_fail_as_a_whole_teach_nothing_and_stop_nothing(kind):
     batches, _ = optimise(optimizer, bowl, 900)
     if kind in LEARNING:
         assert fitnesses(batches).max() > -1.5
+
+
+def test_the_mean_fitness_of_the_steady_state_never_falls_and_rises_much():
+    _, iterations = run(SteadyState(population=20), budget=420)
+    means = np.array([iteration.report["mean_fitness"] for iteration in iterations])
+    assert (np.diff(means) >= -1e-12).all()
+    assert means[-1] > 0.6 * means[0]
+
+
+def test_a_trial_ends_when_the_mean_fitness_levels_off_and_not_for_want_of_one():
+    kind = SteadyState(population=12, stop_after=20, stop_window=10)
+    _, level = run(kind, lambda vector: Evaluation(1.0))
+    assert [iteration.stop for iteration in level] == [None] * 21 + ["mean fitness levelled off"]
+    _, failed = run(kind, failing)
+    assert {(each.report["mean_fitness"], each.stop) for each in failed} == {(None, None)}
 
 
 def test_it_begins_with_a_random_sample_and_goes_on_from_the_mean_of_its_best_quarter(monkeypatch):

@@ -11,7 +11,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any, Union
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluators import Lent, MakeExecutor, check_guard, deaf_to_ctrl_c
+from tetra_drake.evolution.evaluators import LentExecutor, MakeExecutor, check_guard, deaf_to_ctrl_c
 from tetra_drake.machine import available_cores, check_package
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ GivenExecutor = Union[Executor, MakeExecutor, "Client"]
 
 
 @contextlib.contextmanager
-def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator[Lent]:
+def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator[LentExecutor]:
     """Context manager: executor on all workers of a Dask cluster, for evolve().
 
     Args:
@@ -52,7 +52,7 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         yield executor_of(client)
 
 
-def executor_of(client: Client) -> Lent:
+def executor_of(client: Client) -> LentExecutor:
     """Executor on a Dask client. Raises InputError if the client is closed or asynchronous, or a
     worker has another version of this package or of Drake."""
     if client.asynchronous or client.status != "running":
@@ -65,14 +65,14 @@ def executor_of(client: Client) -> Lent:
                 problem = f"{name} on worker {worker}: found {theirs!r}, expected '{ours}' as here"
                 raise InputError("executor", "", problem)
     # Dask refuses a key that has killed its worker. Without `pure`, a resumed run has new keys.
-    return Lent(client.get_executor(pure=False), sum(client.nthreads().values()))
+    return LentExecutor(client.get_executor(pure=False), sum(client.nthreads().values()))
 
 
 def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
     """The function that makes executors, for an argument of evolve(). Raises InputError if the
     argument is neither an executor nor a Dask client nor a function."""
     if isinstance(executor, Executor):
-        return Lent(executor)
+        return LentExecutor(executor)
     dask = sys.modules.get("distributed")
     if dask and isinstance(executor, dask.Client):
         return executor_of(executor)

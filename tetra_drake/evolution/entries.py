@@ -25,18 +25,17 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NoReturn
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, make_folder, read_bytes, writing
 from tetra_drake.optimizers.base import Evaluation, Task
-from tetra_drake.scenario.metrics import METRICS, wrong_metric
-from tetra_drake.settings.units import INCH
+from tetra_drake.scenario.metrics import wrong_metric
 
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
@@ -64,13 +63,15 @@ def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
     return metrics
 
 
-_Count = Annotated[int, Field(ge=0, lt=2**31)]
+WholeNumber = Annotated[int, Field(ge=0, lt=2**31)]
+"""Type of numbers that count or number something."""
 
 
 class Line(BaseModel):
     """Content of a line in a record: keys with their types. Undeclared keys are kept."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False, extra="allow")
+    __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
 
     identity: ClassVar[tuple[str, ...]] = ()
     """Keys whose values together differ from line to line."""
@@ -78,17 +79,6 @@ class Line(BaseModel):
     def content(self) -> dict[str, Any]:
         """The keys that the line has, with their values."""
         return self.model_dump(exclude_unset=True)
-
-    @classmethod
-    def column_types(cls) -> dict[str, str]:
-        """Types of the table's columns for numbers that may be missing, by key."""
-        types = {}
-        for key, field in cls.model_fields.items():
-            if field.annotation == float | None:
-                types[key] = "float"
-            elif field.annotation == _Count | None:
-                types[key] = "Int64"
-        return types
 
 
 class Draws(Line):
@@ -103,8 +93,8 @@ class EvaluationLine(Line):
 
     identity = ("index",)
 
-    index: _Count
-    iteration: _Count
+    index: WholeNumber
+    iteration: WholeNumber
     genome: Annotated[list[float], Field(min_length=1)] | None
     """Parameters of the gait; None in a thinned run."""
     metrics: Annotated[dict[str, Any], AfterValidator(_checked)]
@@ -114,7 +104,7 @@ class EvaluationLine(Line):
     wall_time_s: float
     engine: str
     draws: Draws | None = None
-    placed: _Count | None = None
+    placed: WholeNumber | None = None
     """Index in the population; None if the gait was dropped. Optimisers without a population leave
     the key out."""
 
@@ -146,41 +136,28 @@ class EvaluationLine(Line):
             draws=None if self.draws is None else self.draws.content(),
         )
 
-    def row(self, *, parameters: Sequence[str], bodies: Sequence[str]) -> dict[str, Any]:
-        """The line as a row of a table: one column for each number. `parameters` are the columns of
-        the genome; `bodies` are the names of the bodies."""
-        row = self.content()
-        genome = row.pop("genome") or [math.nan] * len(parameters)
-        row |= dict.fromkeys(METRICS, math.nan) | row.pop("metrics")
-        for body, share in zip(bodies, row.pop("lifted_shares", []), strict=False):
-            row[f"lifted_{body}"] = share
-        row["distance_in"] = row["distance"] / INCH
-        if draws := row.pop("draws", None):
-            row |= {f"draws_{name}": numbers for name, numbers in draws.items()}
-            row["worst_distance"] = min(draws["distance"])
-        return row | dict(zip(parameters, genome, strict=True))
-
 
 class IterationLine(Line):
     """Line of an iteration. The keys after `stop` are the optimiser's report."""
 
     identity = ("iteration",)
 
-    iteration: _Count
-    evaluations: _Count
+    iteration: WholeNumber
+    evaluations: WholeNumber
     best_fitness: float | None
-    best_evaluation: _Count | None
+    best_evaluation: WholeNumber | None
     stop: str | None
     mean_fitness: float | None = None
 
 
 class EliteLine(Line):
-    """Line of an elite on disturbed robots; see analysis.elites."""
+    """Line of an elite, the fittest gait of a cell of the map, on disturbed robots; see
+    study.elites."""
 
     identity = ("trial", "index")
 
-    trial: _Count
-    index: _Count
+    trial: WholeNumber
+    index: WholeNumber
     kept: Annotated[float, Field(ge=0, le=1)]
     mean_distance: float | None
 
@@ -259,8 +236,10 @@ class RecordFile:
 
     def repair(self) -> None:
         """Cuts off an incomplete last line."""
-        content = _content(self.path)
-        if content and not content.endswith(b"\n"):
+        if not os.path.lexists(self.path):
+            return
+        content = read_bytes(self.path, "record", most=MOST)
+        if not content.endswith(b"\n"):
             with writing(self.path):
                 os.truncate(self.path, content.rfind(b"\n") + 1)
 
@@ -286,28 +265,21 @@ def json_line(entry: Mapping[str, Any]) -> str:
     return f'{text}, "crc": "{zlib.crc32(text.encode()):08x}"}}\n'
 
 
-def _content(path: Path) -> bytes:
-    """Lines of a file, unpacked if it is compressed; empty if there is none. Raises InputError if
-    the file cannot be read or is damaged."""
-    if not os.path.lexists(path):
-        return b""
-    content = read_bytes(path, "record", most=MOST)
-    if path.suffix != _PACKED:
-        return content
-    unpacking = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=MOST)
-    try:
-        content = unpacking.decompress(content, MOST)
-    except lzma.LZMAError as error:
-        raise InputError(path, "", f"cannot be read: {error}") from error
-    if not unpacking.eof or unpacking.unused_data:
-        raise InputError(path, "", f"is cut, or has more than {MOST // 2**20} MB of lines")
-    return content
-
-
 def _entries(path: Path) -> Iterator[dict[str, Any]]:
-    """The JSON objects of a file's lines. A line has a checksum, unless the file is compressed. A
-    kill may have cut the last line, but not of a compressed file."""
-    content, is_packed = _content(path), path.suffix == _PACKED
+    """The JSON objects of a file's lines; none if there is no file. A line has a checksum, unless
+    the file is compressed. A kill may have cut the last line, but not of a compressed file."""
+    if not os.path.lexists(path):
+        return
+    content, is_packed = read_bytes(path, "record", most=MOST), path.suffix == _PACKED
+    if is_packed:
+        unpacking = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=MOST)
+        try:
+            content = unpacking.decompress(content, MOST)
+        except lzma.LZMAError as error:
+            raise InputError(path, "", f"cannot be read: {error}") from error
+        if not unpacking.eof or unpacking.unused_data:
+            raise InputError(path, "", f"is cut, or has more than {MOST // 2**20} MB of lines")
+
     for number, line in enumerate(io.BytesIO(content), start=1):
         is_whole, problem = line.endswith(b"\n"), ""
         if not (is_whole or is_packed):

@@ -29,7 +29,7 @@ from tetra_drake.evolution.manifest import Method
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
-from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
+from tetra_drake.scenario.disturbances import draws_of_iteration
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
 
@@ -44,9 +44,9 @@ _SEEDS_KEPT = 32
 """Size of the cache of draws, in seeds; larger than the number of concurrent evaluations."""
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class GaitEvaluation:
-    """Evaluates vectors by simulating their gaits.
+    """Fitness function of evolution: it simulates the gait of a vector.
 
     The result is the same in any process, bit for bit, unless the time budget runs out.
     """
@@ -54,6 +54,14 @@ class GaitEvaluation:
     scenario: Scenario
     objective: Objective | None = None
     """Function to maximise; None for the objective of the scenario."""
+
+    def __post_init__(self) -> None:
+        self.records = bool(getattr(self.objective, "needs_trajectory", False))
+        """True if the objective needs the trajectory of each simulation."""
+        self._space = ParameterSpace.of(self.scenario)
+        # All vectors of an iteration share the same disturbed scenarios.
+        draws = functools.partial(draws_of_iteration, self.scenario)
+        self._draws = functools.lru_cache(_SEEDS_KEPT)(draws)
 
     def __call__(self, task: Task) -> Evaluation:
         """Fitness and metrics of a vector, or the reason of its failure. Draws are simulated one
@@ -95,11 +103,6 @@ class GaitEvaluation:
     def __reduce__(self) -> tuple[object, ...]:
         return GaitEvaluation, (self.scenario, self.objective)  # without the caches
 
-    @property
-    def records(self) -> bool:
-        """True if the objective needs the trajectory of each simulation."""
-        return bool(getattr(self.objective, "needs_trajectory", False))
-
     def _simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
         """Scenario and gait of each simulation of a task: one, or one per draw."""
         gait = self._space.gait(task.vector, name=str(task))
@@ -111,20 +114,20 @@ class GaitEvaluation:
         try:
             result = simulation()
         except (SimulationFailure, TimeBudgetExceeded) as error:
-            failed = Evaluation.failed(f"{_KINDS[type(error)]}: {error}")
-            return dataclasses.replace(failed, wall_time=error.wall_time)
+            failure = f"{_KINDS[type(error)]}: {error}"
+            return Evaluation(failure=failure, wall_time=error.wall_time)
         except InputError as error:
             if scenario is self.scenario:
                 raise
-            return Evaluation.failed(f"no start: {error}")
+            return Evaluation(failure=f"no start: {error}")
         fitness = self._fitness(result)
         metrics, wall_time = result.metrics.to_json(), result.wall_time
         if not math.isfinite(fitness):
-            reason = "diverged: the fitness is not finite"
-            return Evaluation(-math.inf, failure=reason, wall_time=wall_time)
+            failure = "diverged: the fitness is not finite"
+            return Evaluation(failure=failure, wall_time=wall_time)
         if unmet := unmet_requirements(result.metrics, self.scenario.require):
-            reason = f"requirement: {'; '.join(unmet)}"
-            return Evaluation(-math.inf, metrics, reason, wall_time)
+            failure = f"requirement: {'; '.join(unmet)}"
+            return Evaluation(-math.inf, metrics, failure, wall_time)
         return Evaluation(fitness, metrics, wall_time=wall_time)
 
     def _combined(self, task: Task, draws: Sequence[Evaluation]) -> Evaluation:
@@ -133,17 +136,6 @@ class GaitEvaluation:
         if settings is not None and task.seed is not None:
             evaluation = combine(draws, settings.tail)
         return dataclasses.replace(evaluation, engine=self.scenario.engine_name)
-
-    @functools.cached_property
-    def _space(self) -> ParameterSpace:
-        return ParameterSpace.of(self.scenario)
-
-    @functools.cached_property
-    def _draws(self) -> Callable[[IterationSeed], list[Scenario]]:
-        """Function from a seed to disturbed scenarios. It is cached, so all vectors of an iteration
-        share the same scenario objects."""
-        draws = functools.partial(draws_of_iteration, self.scenario)
-        return functools.lru_cache(_SEEDS_KEPT)(draws)
 
     def _fitness(self, result: SimulationResult) -> float:
         if self.objective is None:

@@ -91,7 +91,8 @@ def in_lanes(evaluate: GaitEvaluation, workers: int) -> Iterator[Submit]:
 
 @contextlib.contextmanager
 def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterator[Submit]:
-    """Evaluator on an executor of concurrent.futures.
+    """Evaluator on an executor of concurrent.futures. It shuts the executor down, unless it is a
+    LentExecutor.
 
     If a worker dies, its future raises the error of the executor, such as BrokenExecutor. A task
     for an executor that is broken or shut down raises InputError.
@@ -115,7 +116,20 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
     finally:
         for future in list(running):
             future.cancel()
-        executor.shutdown(wait=is_done)
+        if not isinstance(make, LentExecutor):
+            executor.shutdown(wait=is_done)
+
+
+@dataclass(frozen=True)
+class LentExecutor:
+    """An executor of the user, as a MakeExecutor. An evaluator does not shut it down."""
+
+    executor: Executor
+    workers: int | str = "its executor's"
+    """Number of its workers, or a text about it."""
+
+    def __call__(self, workers: int) -> Executor:
+        return self.executor
 
 
 class WorkerProcesses(Executor):
@@ -174,21 +188,6 @@ def deaf_to_ctrl_c() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@dataclass(frozen=True)
-class Lent(Executor):
-    """An executor of the user, as a MakeExecutor: it is not shut down."""
-
-    executor: Executor
-    workers: int | str = "its executor's"
-
-    def __call__(self, workers: int) -> Executor:
-        return self
-
-    def submit(self, function: Callable[..., Any], /, *args: Any, **more: Any) -> Future[Any]:
-        """See Executor.submit()."""
-        return self.executor.submit(function, *args, **more)
 
 
 def finished(

@@ -80,11 +80,6 @@ class Method:
     def __str__(self) -> str:
         return f"optimiser {self.optimizer}, objective {self.objective}"
 
-    @property
-    def given_from_python(self) -> list[str]:
-        """Which of "objective" and "optimizer" come from Python, not from the scenario."""
-        return [part for part, name in vars(self).items() if "." in name]
-
 
 def _name(given: object) -> str:
     """Name of a function, class or instance. Outside this package it includes the module, and the
@@ -102,7 +97,7 @@ def _name(given: object) -> str:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a run: scenario, seed, installed versions and method."""
+    """Definition of a run: scenario, seed, versions of the packages, and method."""
 
     scenario: Scenario
     seed: int
@@ -259,7 +254,7 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
             if given == recorded:
                 continue
             problem = f"the run was made with {recorded}, not {given}"
-            if part in ours.given_from_python:
+            if "." in recorded:
                 call = f"tetra_drake.evolve(None, {str(directory)!r}, resume=True, {part}=...)"
                 problem += f"; resume it from Python: {call}"
             raise InputError(directory, part, problem)

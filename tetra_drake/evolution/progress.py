@@ -15,36 +15,24 @@ from tetra_drake.formatting import duration, rounded
 from tetra_drake.kernels.compiling import compiling_time
 
 if TYPE_CHECKING:
-    from rich.progress import TaskID
+    from rich import progress
 
 _LINE_PERIOD = 10.0  # s, between plain lines, and before the time left is estimated
 
 
 class Progress(contextlib.AbstractContextManager["Progress"]):
-    """Receiver of a run's messages and progress. This base class shows nothing but warnings."""
+    """Display of a run's progress and messages on a stream.
 
-    def __exit__(self, *_: object) -> None:
-        return None
+    A terminal gets one bar per stage. Another stream gets a line when a stage begins and ends, and
+    every ten seconds. Both show the time left for all trials. Without a stream, nothing is shown
+    but warnings, as Python warnings. A display of your own overrides say(), warn() and stage().
+    """
 
-    def say(self, text: str) -> None:
-        """Receives information for the user."""
+    _bars: progress.Progress | None = None
 
-    def warn(self, text: str) -> None:
-        """Receives a warning for the user; here it becomes a Python warning."""
-        warnings.warn(text, RuntimeWarning, stacklevel=3)
-
-    def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Receives the state of all trials, after each evaluation and about once per second."""
-
-    def stage(self, title: str, done: int, total: int, text: str = "") -> None:
-        """Receives the progress of one stage of the run: `done` of `total`, and a remark."""
-
-
-class Display(Progress):
-    """Progress on a stream. A terminal gets one bar per stage. Another stream gets a line when a
-    stage begins and ends, and every ten seconds. Both show the time left for all trials."""
-
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO | None = None) -> None:
+        if stream is None:
+            return
         from rich import progress
         from rich.console import Console
 
@@ -61,41 +49,59 @@ class Display(Progress):
             # The clock stands still while kernels are compiled.
             get_time=lambda: time.monotonic() - compiling_time(),
         )
-        self._stages: dict[str, TaskID] = {}
+        self._stages: dict[str, progress.TaskID] = {}
         """The bar of each stage."""
         self._printed = -math.inf
         """Time at which the last plain line was printed."""
         self._line = ""
         """The last plain line."""
 
-    def __enter__(self) -> Progress:
-        self._bars.start()
-        return self
-
     def __exit__(self, *_: object) -> None:
-        if not self._plain:
+        if self._bars is not None and not self._plain:
             self._bars.stop()
 
     def say(self, text: str) -> None:
-        """Prints the text, above the bars."""
-        self._bars.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
+        """Prints information for the user, above the bars."""
+        if self._bars is not None:
+            self._bars.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
     def warn(self, text: str) -> None:
-        """Prints the text to stderr, above the bars."""
-        print(f"tetra-drake: {text}", file=sys.stderr, flush=True)
+        """Prints a warning to stderr, above the bars."""
+        if self._bars is None:
+            warnings.warn(text, RuntimeWarning, stacklevel=3)
+        else:
+            print(f"tetra-drake: {text}", file=sys.stderr, flush=True)
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Shows the evaluations of all trials. A trial that ended early needs no more."""
+        """Shows the stage "evaluations" of all trials, with the fittest gait and the numbers of
+        finished trials and failures. evolve() calls it after each evaluation, and about once per
+        second."""
         done = sum(status.evaluations for status in statuses)
+        # A trial that ended early needs no more evaluations.
         total = sum(s.evaluations if s.stop else s.evaluations_at_most for s in statuses)
-        self.stage("evaluations", done, total, overview(statuses))
+        fittest = max(statuses, key=lambda status: status.best_fitness)
+        ended = sum(status.stop is not None for status in statuses)
+        failures = sum(status.failures for status in statuses)
+        parts = []
+        if fittest.iteration >= 0:
+            units, fitness = fittest.units, rounded(fittest.best_fitness)
+            distance = rounded(fittest.best_distance / units.length)
+            parts.append(f"best gait {distance} {units.length_name} (fitness {fitness})")
+        if len(statuses) > 1:
+            parts.append(f"{ended} of {len(statuses)} trials finished")
+        if failures:
+            parts.append(f"{failures} failed")
+        self.stage("evaluations", done, total, ", ".join(parts))
 
     def stage(self, title: str, done: int, total: int, text: str = "") -> None:
-        """Moves the bar of the stage, or prints a line if one is due."""
+        """Moves the bar of one stage of the run, or prints a line if one is due: `done` of `total`,
+        a text, and the time left."""
+        if self._bars is None:
+            return
+        self._bars.start()
         now, begins = time.monotonic(), title not in self._stages
         if begins:
-            bar = self._bars.add_task(title, total=total, completed=done, text="")
-            self._stages[title] = bar
+            self._stages[title] = self._bars.add_task(title, total=total, completed=done, text="")
         bar = self._stages[title]
         self._bars.update(bar, completed=done, total=total)
         parts, stage = [text] if text else [], self._bars.tasks[bar]
@@ -109,20 +115,3 @@ class Display(Progress):
         if due and line != self._line:
             self._printed, self._line = now, line
             self.say(line)
-
-
-def overview(statuses: Sequence[TrialStatus]) -> str:
-    """Summary in one line: the fittest gait, finished trials, failures."""
-    fittest = max(statuses, key=lambda status: status.best_fitness)
-    ended = sum(status.stop is not None for status in statuses)
-    failures = sum(status.failures for status in statuses)
-    parts = []
-    if fittest.iteration >= 0:
-        units, fitness = fittest.units, rounded(fittest.best_fitness)
-        distance = rounded(fittest.best_distance / units.length)
-        parts.append(f"best gait {distance} {units.length_name} (fitness {fitness})")
-    if len(statuses) > 1:
-        parts.append(f"{ended} of {len(statuses)} trials finished")
-    if failures:
-        parts.append(f"{failures} failed")
-    return ", ".join(parts)

@@ -20,6 +20,7 @@ from tetra_drake.evolution.entries import (
     REMEDY,
     EvaluationLine,
     RecordFile,
+    WholeNumber,
 )
 from tetra_drake.evolution.manifest import MANIFEST, Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
@@ -30,6 +31,7 @@ from tetra_drake.robot.gait import Gait, ParameterSpace, Vector, load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.units import INCH
 
 if TYPE_CHECKING:
     import pandas
@@ -221,24 +223,38 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
     """The lines of one file of all trials, as a table."""
     import pandas
 
-    parameters = _parameters(manifest.scenario)
+    kind, parameters = LINES[name], _parameters(manifest.scenario)
     bodies = manifest.scenario.robot.blueprint().bodies
     rows = []
     for trial in range(manifest.scenario.evolution.trials):
         file = RecordFile.of(directory, manifest.run, name, trial=trial)
         for number, line in enumerate(file.read()):
-            if not isinstance(line, EvaluationLine):
-                rows.append({"trial": trial, **line.content()})
+            row = {"trial": trial, **line.content()}
+            rows.append(row)
+            if kind is not EvaluationLine:
                 continue
-            if line.genome is not None and len(line.genome) != len(parameters):
-                found = f"a genome of {len(line.genome)} numbers"
+            genome = row.pop("genome") or [math.nan] * len(parameters)
+            if len(genome) != len(parameters):
+                found = f"a genome of {len(genome)} numbers"
                 file.refuse(number, f"is damaged: found {found}, expected {len(parameters)}")
-            rows.append({"trial": trial, **line.row(parameters=parameters, bodies=bodies)})
-    types = LINES[name].column_types() | dict.fromkeys((*METRICS, "distance_in"), "float")
-    columns = None if rows else ["trial", *LINES[name].model_fields, *METRICS, "distance_in"]
+            row |= dict.fromkeys(METRICS, math.nan) | row.pop("metrics")
+            for body, share in zip(bodies, row.pop("lifted_shares", []), strict=False):
+                row[f"lifted_{body}"] = share
+            row["distance_in"] = row["distance"] / INCH
+            if draws := row.pop("draws", None):
+                row |= {f"draws_{key}": numbers for key, numbers in draws.items()}
+                row["worst_distance"] = min(draws["distance"])
+            row |= dict(zip(parameters, genome, strict=True))
+
+    columns = None if rows else ["trial", *kind.model_fields, *METRICS, "distance_in"]
     table = pandas.DataFrame(rows, columns=columns)
-    kinds = {column: kind for column, kind in types.items() if column in table}
-    return table.astype(kinds).copy()  # copy() joins the blocks that astype() makes per column
+    # What may be missing would otherwise decide the type of its column.
+    types = dict.fromkeys((*METRICS, "distance_in"), "float")
+    for key, field in kind.model_fields.items():
+        if field.annotation in (float | None, WholeNumber | None):
+            types[key] = "float" if field.annotation == float | None else "Int64"
+    types = {column: type_ for column, type_ in types.items() if column in table}
+    return table.astype(types).copy()  # copy() joins the blocks that astype() makes per column
 
 
 def _parameters(scenario: Scenario) -> list[str]:

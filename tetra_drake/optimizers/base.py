@@ -16,28 +16,24 @@ from tetra_drake.scenario.disturbances import IterationSeed
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Outcome of one vector. A failure has fitness -inf; it has metrics only if the simulation was
-    completed."""
+    """Fitness and metrics of one vector. A failure has fitness -inf; it has metrics only if the
+    simulation was completed."""
 
-    fitness: float
+    fitness: float = -math.inf
     metrics: Mapping[str, Any] = field(default_factory=dict)
     """Metrics in the form of Metrics.to_json()."""
     failure: str | None = None
+    """Reason of a failure; None for a success."""
     wall_time: float = 0.0
     """Wall time in s. Simulations that run side by side on a core share the time of the core."""
     engine: str = ""
     draws: Mapping[str, Sequence[float]] | None = None
     """Fitness and distance (m) of each draw of disturbances; None without disturbances."""
 
-    @classmethod
-    def failed(cls, reason: str) -> Evaluation:
-        """A failed evaluation with this reason."""
-        return cls(fitness=-math.inf, failure=reason)
-
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A vector to evaluate, numbered as in the record."""
+    """A vector to evaluate, with its numbers in the record."""
 
     vector: Vector
     trial: int = 0
@@ -57,7 +53,7 @@ Evaluate = Callable[[Task], Evaluation]
 
 @dataclass(frozen=True)
 class Iteration:
-    """Outcome of an optimiser's iteration: its report on the evaluations."""
+    """What an optimiser reports after it got the evaluations of an iteration."""
 
     report: Mapping[str, Any]
     """Numbers to record with the iteration, by name; an unknown number is None."""

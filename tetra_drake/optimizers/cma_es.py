@@ -8,13 +8,14 @@ found.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import MIDDLE, Generational, Matrix, Ranges
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
@@ -52,6 +53,8 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
     A search starts at the mean of the best quarter of a random sample of its own. Without a sample,
     the first starts in the middle of the ranges, the others at random points.
 
+    A failure counts as worse than every success. A batch of failures teaches nothing.
+
     The report also has the number of the search (`start`), its restarts (`restart`), and `sigma`:
     the root mean square of the standard deviations, in units of the ranges.
     """
@@ -65,7 +68,24 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
         """The search whose points are being evaluated; None for points of a random sample."""
 
     ask = _one_thread(Generational.ask)
-    tell = _one_thread(Generational.tell)
+
+    @_one_thread
+    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
+        """Takes the evaluations of a batch. A batch that was cut teaches nothing."""
+        iteration = super().tell(evaluations)
+        fitnesses = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
+        has_walked = np.isfinite(fitnesses)
+        if not has_walked.any() or len(fitnesses) < len(self._points):
+            return iteration
+
+        least = np.min(fitnesses[has_walked])
+        fitnesses[~has_walked] = least - abs(least) - 1.0
+        if self._current is not None:
+            self._current.learn(self._points, fitnesses)
+        else:
+            ranked = self._points[np.argsort(-fitnesses, kind="stable")]
+            self._begin(ranked[: max(1, len(ranked) // 4)].mean(axis=0))
+        return iteration
 
     def _draw(self) -> Matrix:
         rising = [search for search in self._searches if not search.has_stalled]
@@ -76,36 +96,28 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
             self._current = max(rising, key=lambda search: search.best)
         elif self.settings.sample:
             self._current = None
+            self._report = {"start": None, "restart": 0, "sigma": None}
             return self._ranges.random(self.settings.sample, self.generator)
         elif self._searches:
             self._current = self._begin(self._ranges.random(1, self.generator)[0])
         else:
             self._current = self._begin(np.full(self._ranges.size, MIDDLE))
-        return self._current.draw()
+
+        search = self._current
+        points, start = search.draw(), self._searches.index(search)
+        self._report = {"start": start, "restart": search.restarts, "sigma": search.sigma}
+        return points
 
     def _begin(self, start: Vector) -> Search:
         search = Search(self.settings.population, self._ranges, self.generator, start)
         self._searches.append(search)
         return search
 
-    def _learn(self, fitnesses: Vector) -> None:
-        if self._current is not None:
-            self._current.learn(self._points, fitnesses)
-            return
-        ranked = self._points[np.argsort(-fitnesses, kind="stable")]
-        self._begin(ranked[: max(1, len(ranked) // 4)].mean(axis=0))
-
-    def _state(self) -> Mapping[str, Any]:
-        current = self._current
-        if current is None:
-            return {"start": None, "restart": 0, "sigma": None}
-        start = self._searches.index(current)
-        return {"start": start, "restart": current.restarts, "sigma": current.sigma}
-
 
 @dataclass(frozen=True)
 class Box:
-    """Points between 0 and 1. A root is an angle in half turns, so every root is a valid point."""
+    """Search space of parameters between 0 and 1. A root is an angle in half turns, so that every
+    root is a valid point."""
 
     size: int
 
@@ -134,54 +146,54 @@ class Search:
         self.evaluations = self.restarts = 0
         self.best = -math.inf
         """Fitness of the best point."""
+        self.best_point = start
+        self.sigma = SIGMA
+        """Standard deviation of the parameters (root mean square) in the last population."""
+        self.has_stalled = False
+        """True if the best fitness has hardly risen in the last PATIENCE evaluations."""
         self._rises: list[tuple[int, float]] = []
         """Number of evaluations and best fitness after each batch."""
-        self.best_point = start
         self._drawn: Matrix = np.empty((0, 0))
-        """Roots that were drawn last. pycma needs two dimensions, so a single parameter gets an
+        """Roots of the last population. pycma needs two dimensions, so a single parameter gets an
         unused second one."""
-        self._strategy = self._make_strategy()
-
-    @property
-    def sigma(self) -> float:
-        """Standard deviation of the parameters (root mean square)."""
-        return float(np.sqrt(np.mean(self._strategy.stds**2)))
-
-    @property
-    def has_stalled(self) -> bool:
-        """True if the best fitness has hardly risen in the last PATIENCE evaluations."""
-        earlier = [best for count, best in self._rises if count <= self.evaluations - PATIENCE]
-        return bool(earlier) and self.best - earlier[-1] <= RISE * (self.best - earlier[0])
+        self._strategy: Any = None
+        """pycma's search; None before each start."""
 
     def draw(self) -> Matrix:
         """Draws a population of points."""
+        import cma
+
+        if self._strategy is None:
+            best = self._ranges.roots(self.best_point)
+            options = {
+                "popsize": self._population,
+                "tolx": TOLERANCE,
+                "randn": lambda *shape: self._generator.standard_normal(shape),
+                "seed": math.nan,  # does not seed numpy's global generator
+                "verbose": -10,  # no output, and no file of options
+            }
+            start = np.pad(best, (0, max(0, 2 - len(best))))
+            self._strategy = cma.CMAEvolutionStrategy(start, SIGMA, options)
         self._drawn = np.array(self._strategy.ask())
+        self.sigma = float(np.sqrt(np.mean(self._strategy.stds**2)))
         return self._ranges.from_roots(self._drawn[:, : self._ranges.size])
 
     def learn(self, points: Matrix, fitnesses: Vector) -> None:
-        """Takes the evaluated points and their fitnesses."""
+        """Takes the fitnesses of the points from draw()."""
         self.evaluations += len(points)
         best = int(np.argmax(fitnesses))
         if fitnesses[best] > self.best:
             self.best, self.best_point = float(fitnesses[best]), points[best].copy()
         self._rises.append((self.evaluations, self.best))
+        earlier = [best for count, best in self._rises if count <= self.evaluations - PATIENCE]
+        self.has_stalled = bool(
+            earlier and self.best - earlier[-1] <= RISE * (self.best - earlier[0])
+        )
+
         told, size = self._drawn, self._ranges.size
         told[:, :size] = np.copysign(self._ranges.roots(points), told[:, :size])
         self._strategy.tell(list(told), (-fitnesses).tolist(), check_points=False)
         if self._strategy.stop():
             self.restarts += 1
             self._population = round(GROWTH * self._population)
-            self._strategy = self._make_strategy()
-
-    def _make_strategy(self) -> Any:
-        import cma
-
-        options = {
-            "popsize": self._population,
-            "tolx": TOLERANCE,
-            "randn": lambda *shape: self._generator.standard_normal(shape),
-            "seed": math.nan,  # does not seed numpy's global generator
-            "verbose": -10,  # no output, and no file of options
-        }
-        roots = np.pad(self._ranges.roots(self.best_point), (0, max(0, 2 - len(self.best_point))))
-        return cma.CMAEvolutionStrategy(roots, SIGMA, options)
+            self._strategy = None

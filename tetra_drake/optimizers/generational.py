@@ -1,8 +1,8 @@
-"""Random search, and the common parts of optimisers that learn from whole batches."""
+"""Random search, and what it shares with optimisers that learn from whole batches."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -24,29 +24,26 @@ MIDDLE = 0.5
 
 
 class Ranges:
-    """Scale of the varying parameters: 0 and 1 are the bounds of random gaits.
+    """Search space of an optimiser: the free parameters, scaled so that random gaits have values
+    between 0 and 1.
 
-    A search may leave these bounds. Only floors (lower limits) are respected.
+    A search may leave this range. Only floors (lower limits) are respected.
     """
 
     def __init__(self, space: ParameterSpace) -> None:
         self._space = space
-        self._free = space.high > space.low
-        self._free[TAU_B] &= not space.couples_tau_b
-        self._width = (space.high - space.low)[self._free]
-        self.size = len(self._width)
-        self.floors = (space.floors - space.low)[self._free] / self._width
+        self.free = space.high > space.low
+        """True for each parameter of a gait that is free."""
+        self.free[TAU_B] &= not space.couples_tau_b
+        self.width = (space.high - space.low)[self.free]
+        """Range of each free parameter in random gaits."""
+        self.size = len(self.width)
+        self.floors = (space.floors - space.low)[self.free] / self.width
 
     def random(self, count: int, generator: np.random.Generator) -> Matrix:
-        """Scaled points of random gaits."""
+        """Points (scaled vectors) of random gaits, one per row."""
         vectors = np.array([self._space.random(generator) for _ in range(count)])
-        return (vectors - self._space.low)[:, self._free] / self._width
-
-    def vector(self, point: Vector) -> Vector:
-        """The parameter vector of a scaled point. Values below a floor are raised to it."""
-        vector = self._space.low.copy()
-        vector[self._free] += point * self._width
-        return self._space.repair(np.maximum(vector, self._space.floors))
+        return (vectors - self._space.low)[:, self.free] / self.width
 
     def from_roots(self, roots: Matrix) -> Matrix:
         """Converts roots to points: floor + root^2 / (4 (MIDDLE - floor)). A parameter without a
@@ -69,10 +66,10 @@ SettingsT = TypeVar("SettingsT")
 
 @dataclass(eq=False)
 class Generational(Generic[SettingsT]):
-    """Random search. Subclasses draw points in another way, and learn from a whole batch at once.
+    """Random search: each batch is a sample of random gaits. Optimisers that learn from whole
+    batches extend it; they draw in another way.
 
-    A failure counts as worse than every success. A batch of failures teaches nothing. The report
-    has mean_fitness over the successes.
+    The report has mean_fitness over the gaits that did not fail.
     """
 
     space: ParameterSpace
@@ -84,31 +81,22 @@ class Generational(Generic[SettingsT]):
     def __post_init__(self) -> None:
         self._ranges = Ranges(self.space)
         self._points: Matrix = np.empty((0, self._ranges.size))
-        """Points that were drawn last."""
+        """Points of the last batch."""
+        self._report: dict[str, Any] = {}
+        """Numbers about the search, for the report."""
 
     def ask(self) -> list[Vector]:
-        """The next batch."""
+        """The vectors of the next batch. Values below a floor are raised to it."""
         self._points = self._draw()
-        return [self._ranges.vector(point) for point in self._points]
+        vectors = np.tile(self.space.low, (len(self._points), 1))
+        vectors[:, self._ranges.free] += self._points * self._ranges.width
+        return [self.space.repair(np.maximum(each, self.space.floors)) for each in vectors]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the evaluations of a batch."""
-        fitnesses = np.array([evaluation.fitness for evaluation in evaluations])
-        is_finite = np.isfinite(fitnesses)
-        mean = json_number(mean_fitness(fitnesses))
-        report = {"mean_fitness": mean, "population": len(self._points), **self._state()}
-        if is_finite.any() and len(evaluations) == len(self._points):
-            least = np.min(fitnesses[is_finite])
-            self._learn(np.where(is_finite, fitnesses, least - abs(least) - 1.0))
-        return Iteration(report)
+        """Reports on the evaluations of a batch."""
+        mean = mean_fitness(np.array([evaluation.fitness for evaluation in evaluations]))
+        counts = {"mean_fitness": json_number(mean), "population": len(self._points)}
+        return Iteration(counts | self._report)
 
     def _draw(self) -> Matrix:
-        """Draws the points of the next batch."""
         return self._ranges.random(GAITS, self.generator)
-
-    def _learn(self, fitnesses: Vector) -> None:
-        """Learns from the fitnesses of the points of the last batch. All are finite."""
-
-    def _state(self) -> Mapping[str, Any]:
-        """Numbers about the search, for the report."""
-        return {}

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from tetra_drake.errors import InputError
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import Generational, Matrix
-from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
 from tetra_drake.scenario.metrics import METRICS
 
@@ -33,13 +30,17 @@ SIGMA = 0.5
 
 
 class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
-    """An optimiser that fills a map of gaits.
+    """Optimiser that fills a map of gaits, by CMA-MAE.
 
-    Each emitter draws a part of the batch. The archive (the map) rates a vector by the difference
-    between its fitness and the threshold of its cell. A vector that failed or lacks a measure never
-    enters the archive; it is rated below all others. A batch of such vectors teaches nothing. The
-    report also has `elites`: the number of cells with a gait. A measure that is infinite or NaN for
-    all gaits of a batch raises InputError, unless the map has gaits.
+    The map is a grid over two metrics, the measures; pyribs calls it archive. Several emitters draw
+    a part of each batch. The archive rates a vector by the difference between its fitness and the
+    threshold of its cell.
+
+    A vector that failed or lacks a measure never enters the map; it is rated below all others. A
+    batch of such vectors teaches nothing. If a measure is infinite or NaN for all gaits of a batch,
+    and the map is empty, tell() raises InputError.
+
+    The report also has `elites`: the number of cells with a gait.
     """
 
     def __post_init__(self) -> None:
@@ -76,7 +77,7 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
         return self._ranges.from_roots(self._roots)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Adds a batch to the archive; then the emitters learn from it."""
+        """Adds a batch to the archive. The emitters learn from it, unless it was cut."""
         objective = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
         rows = [[e.metrics.get(name) for name in self.settings.measures] for e in evaluations]
         measures = np.array(rows, dtype=float)  # None becomes NaN
@@ -89,32 +90,24 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
                     raise InputError("scenario", f"optimizer.measures.{name}", problem)
         enters = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
         if enters.any():
-            self._add(objective, measures, enters)
-        return super().tell(evaluations)
-
-    def _add(self, objective: Vector, measures: Matrix, enters: npt.NDArray[np.bool_]) -> None:
-        """Adds the vectors that enter the archive. A whole batch then teaches the emitters."""
-        count = len(objective)
-        status, value = np.zeros(count, np.int32), np.zeros(count)
-        added = self._archive.add(
-            solution=self._roots[:count][enters],
-            objective=objective[enters],
-            measures=measures[enters],
-        )
-        if self._archive.empty or count < len(self._roots):
-            return
-        status[enters], value[enters] = added["status"], added["value"]
-        value[~enters] = np.min(added["value"]) - 1.0
-        objective[~enters] = np.min(objective[enters])
-        measures[~enters] = measures[enters][0]  # unused by the emitters
-        for i, emitter in enumerate(self._emitters):
-            batch = slice(i * BATCH, (i + 1) * BATCH)
-            emitter.tell(
-                solution=self._roots[batch],
-                objective=objective[batch],
-                measures=measures[batch],
-                add_info={"status": status[batch], "value": value[batch]},
+            added = self._archive.add(
+                solution=self._roots[: len(objective)][enters],
+                objective=objective[enters],
+                measures=measures[enters],
             )
-
-    def _state(self) -> Mapping[str, Any]:
-        return {"elites": len(self._archive)}
+            if not self._archive.empty and len(objective) == len(self._roots):
+                status, value = np.zeros(len(objective), np.int32), np.zeros(len(objective))
+                status[enters], value[enters] = added["status"], added["value"]
+                value[~enters] = np.min(added["value"]) - 1.0
+                objective[~enters] = np.min(objective[enters])
+                measures[~enters] = measures[enters][0]  # unused by the emitters
+                for i, emitter in enumerate(self._emitters):
+                    batch = slice(i * BATCH, (i + 1) * BATCH)
+                    emitter.tell(
+                        solution=self._roots[batch],
+                        objective=objective[batch],
+                        measures=measures[batch],
+                        add_info={"status": status[batch], "value": value[batch]},
+                    )
+        self._report = {"elites": len(self._archive)}
+        return super().tell(evaluations)

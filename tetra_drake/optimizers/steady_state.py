@@ -6,9 +6,8 @@ is at least 1 - p.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -36,12 +35,10 @@ class SteadyStateOptimizer:
     generator: np.random.Generator
     settings: kinds.SteadyState
 
-    def __post_init__(self) -> None:
-        self._steps = mutation_steps(self.space, self.settings)
-        self._asked: list[Vector] = []
-        self._population: list[Vector] = []
-        self._fitnesses: Vector = np.empty(0)
-        self._means: list[float] = []
+    _asked: list[Vector] = field(init=False, default_factory=list)
+    _population: list[Vector] = field(init=False, default_factory=list)
+    _fitnesses: Vector = field(init=False)
+    _means: list[float] = field(init=False, default_factory=list)
 
     def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
@@ -49,15 +46,14 @@ class SteadyStateOptimizer:
         if not self._population:
             self._asked = [space.random(generator) for _ in range(settings.population)]
         else:
-            drawn = functools.partial(
-                select_parent, self._fitnesses, tournament=settings.tournament, generator=generator
+            size = settings.tournament
+            first, second = (
+                select_parent(self._fitnesses, tournament=size, generator=generator)
+                for _ in range(2)
             )
-            parents = self._population[drawn()], self._population[drawn()]
-            swap, change = settings.crossover_probability, settings.mutation_probability
-            children = cross_over(*parents, probability=swap, generator=generator)
-            mutation = draw_mutation(self._steps, probability=change, generator=generator)
-            mutants = [mutate(each, mutation=mutation, floors=space.floors) for each in children]
-            self._asked = [space.repair(mutant) for mutant in mutants]
+            parents = self._population[first], self._population[second]
+            children = make_children(*parents, space, settings, generator)
+            self._asked = [space.repair(child) for child in children]
         return [vector.copy() for vector in self._asked]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
@@ -88,23 +84,10 @@ class SteadyStateOptimizer:
 
 
 def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
-    """Index of the best of a tournament. Among equals the first drawn wins (listing A.3.2)."""
+    """Index of the fittest of a tournament: members drawn at random, with replacement. Among equals
+    the first drawn wins (listing A.3.2)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)
     return int(candidates[np.argmax(fitnesses[candidates])])
-
-
-def select_victim(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
-    """Index of the worst of a tournament. Among equals the last drawn counts (listing A.3.5)."""
-    candidates = generator.integers(0, len(fitnesses), size=tournament)[::-1]
-    return int(candidates[np.argmin(fitnesses[candidates])])
-
-
-def cross_over(
-    first: Vector, second: Vector, *, probability: float, generator: np.random.Generator
-) -> tuple[Vector, Vector]:
-    """Two children: copies of the parents. Each parameter is swapped with this probability."""
-    swapped = generator.random(len(first)) >= 1.0 - probability
-    return np.where(swapped, second, first), np.where(swapped, first, second)
 
 
 def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector:
@@ -120,20 +103,32 @@ def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector
     return np.where(space.low == space.high, 0.0, steps)
 
 
-def draw_mutation(steps: Vector, *, probability: float, generator: np.random.Generator) -> Vector:
-    """Random changes of all parameters. A parameter changes with this probability, by at most its
-    step, up or down. As in the listing, both children of an iteration get the same changes."""
-    sign = np.where(generator.random(len(steps)) > 0.5, 1.0, -1.0)
-    moved = generator.random(len(steps)) >= 1.0 - probability
-    size = steps * generator.random(len(steps))
-    return np.where(moved, sign * size, 0.0)
+def make_children(
+    first: Vector,
+    second: Vector,
+    space: ParameterSpace,
+    settings: kinds.SteadyState,
+    generator: np.random.Generator,
+) -> list[Vector]:
+    """Two children of two parents, by crossover and mutation (listing A.3.3, A.3.4).
 
+    A child is a copy of a parent; with `crossover_probability` a parameter is swapped with the
+    other child. With `mutation_probability` a parameter moves up or down, by at most its step.
 
-def mutate(vector: Vector, *, mutation: Vector, floors: Vector) -> Vector:
-    """Adds a mutation to a vector. A parameter that would fall to its floor or below stays as it
-    is. As in the listing (A.3.3, A.3.4), only reductions are checked."""
-    moved = vector + mutation
-    return np.where((mutation < 0.0) & ~(moved > floors), vector, moved)
+    As in the listing, both children get the same changes, and only reductions are checked: a
+    parameter that would fall to its floor or below stays as it is.
+    """
+    steps, count = mutation_steps(space, settings), len(first)
+    swapped = generator.random(count) >= 1.0 - settings.crossover_probability
+    children = np.where(swapped, second, first), np.where(swapped, first, second)
+
+    sign = np.where(generator.random(count) > 0.5, 1.0, -1.0)
+    moves = generator.random(count) >= 1.0 - settings.mutation_probability
+    change = np.where(moves, sign * (steps * generator.random(count)), 0.0)
+    return [
+        np.where((change < 0.0) & ~(child + change > space.floors), child, child + change)
+        for child in children
+    ]
 
 
 def find_place(
@@ -141,12 +136,13 @@ def find_place(
 ) -> int | None:
     """Index of the member that a child with fitness `child` replaces; None if there is none.
 
-    If the child is fitter than the worst of a tournament, it replaces this member. Otherwise, if it
-    is fitter than the worst of the population, it replaces that member.
+    If the child is fitter than the worst of a tournament, it replaces this member; among equals the
+    last drawn counts (listing A.3.5). Otherwise, if it is fitter than the worst of the population,
+    it replaces that member.
     """
-    victim = select_victim(fitnesses, tournament=tournament, generator=generator)
-    worst = int(np.argmin(fitnesses))
-    for member in (victim, worst):
+    drawn = generator.integers(0, len(fitnesses), size=tournament)[::-1]
+    victim = int(drawn[np.argmin(fitnesses[drawn])])
+    for member in (victim, int(np.argmin(fitnesses))):
         if child > fitnesses[member]:
             return member
     return None
