@@ -64,7 +64,8 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     """MuJoCo's model of a robot, with a tendon for each cable and a motor for each driven one.
 
     If actuators bear the whole tension, tendons have no law: a motor for each cable exerts its
-    tension. Motors are in the order of their cables; for their names see motor_names().
+    tension. Motors are in the order of their cables. A motor has the name of its oscillator; if
+    this drives several cables, the name of the cable is added.
 
     Args:
         robot: the robot at its start.
@@ -225,9 +226,12 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
 def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
     """Adds a tendon for each cable and a motor for each driven cable, or for all cables if motors
     exert their tensions."""
-    structure = robot.structure
+    structure, motors = robot.structure, {}
+    for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
+        for cable in (structure.cable_names[i] for i in group):
+            motors[cable] = oscillator if len(group) == 1 else f"{oscillator} {cable}"
     tendons, actuators = add_element(model, "tendon"), add_element(model, "actuator")
-    width, motors = structure.least_radius / 2, motor_names(structure)
+    width = structure.least_radius / 2
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]
@@ -241,16 +245,6 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
             motor = motors.get(name, name)
             # A motor's force lengthens its tendon, ours shortens it.
             add_element(actuators, "motor", name=motor, tendon=name, gear="-1")
-
-
-def motor_names(structure: Structure) -> dict[str, str]:
-    """Names of the motors by their cables: names of oscillators. If an oscillator drives several
-    cables, the name of the cable is added."""
-    names = {}
-    for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
-        for cable in (structure.cable_names[i] for i in group):
-            names[cable] = oscillator if len(group) == 1 else f"{oscillator} {cable}"
-    return names
 
 
 def _add_pushes(model: Element, world: Element, structure: Structure) -> None:

@@ -5,7 +5,6 @@ import itertools
 import threading
 import time
 from concurrent.futures import CancelledError
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,8 +12,6 @@ import xarray
 from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.engines.lanes.batch import LaneBatch, processor_lanes
-from tetra_drake.engines.lanes.dynamics import Solver
-from tetra_drake.engines.lanes.tables import shared
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
@@ -192,18 +189,6 @@ def test_robots_that_differ_in_numbers_alone_share_a_batch(short):
     others = {"tetrahedra": 3, "cables.slack": True, "contacts": "all", "actuation": sides}
     for change in ({f"robot.{key}": value} for key, value in others.items()):
         assert not batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
-
-
-def test_a_table_of_indices_that_somebody_adds_is_part_of_the_kind(short):
-    """Else a kernel would take a robot whose indices lead elsewhere in its tables."""
-    solver = Solver.of(Robot.of(short).model)
-
-    class Added(NamedTuple):
-        solver: object
-        table: np.ndarray
-
-    one, same, other = (shared(Added(solver, np.array([index]))) for index in (1, 1, 2))
-    assert one == same != other
 
 
 def test_scenarios_and_gaits_have_to_fit(short):

@@ -170,17 +170,25 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
         ended = pass_marks(constants, lanes, log, live)
     is_running = clock[STATUS] == RUNNING
 
-    arrive(constants, lanes)
+    # Modes and forces at the beginning of the step.
+    robot, forces, state = constants.robot, lanes.forces, lanes.step.state
+    move_robot(robot, state, forces)
+    for i in range(lanes.drives.shape[0]):
+        forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
+    contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
+    compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
+    observe(lanes.tally, robot, clock[TIME], lanes.signals, forces)
+
     step = select(is_running, aim(constants, lanes), 0.0)
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
     foresee_signals(constants, lanes, log, live)
-    drives, at_end = lanes.drives, lanes.forces.drives
+    drives, at_end = lanes.drives, forces.drives
     for i in range(drives.shape[0]):  # predicted, for the forces at the end of the step
         drives[i, actuator.RATE] = at_end[i, actuator.RATE]
         at_end[i, actuator.DRIVE] = drives[i, actuator.DRIVE] + step * drives[i, actuator.RATE]
-    robot, solver, signals = constants.robot, constants.solver, lanes.end_signals
-    error = take_step(robot, solver, lanes.step, lanes.modes, lanes.forces, signals, step, live)
+    solver, signals = constants.solver, lanes.end_signals
+    error = take_step(robot, solver, lanes.step, lanes.modes, forces, signals, step, live)
     for i in range(drives.shape[0]):  # corrected, with the mean of the rates at both ends
         rate = 0.5 * (drives[i, actuator.RATE] + at_end[i, actuator.RATE])
         lanes.end_drives[i] = drives[i, actuator.DRIVE] + step * rate
@@ -204,18 +212,6 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     ended |= any_lane(status != clock[STATUS])
     clock[STATUS] = status
     return ended
-
-
-@inlined
-def arrive(constants: Constants, lanes: LaneState) -> None:
-    """Computes modes and forces at the beginning of the step, and adds them to the tally."""
-    robot, forces, state = constants.robot, lanes.forces, lanes.step.state
-    move_robot(robot, state, forces)
-    for i in range(lanes.drives.shape[0]):
-        forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
-    contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
-    compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
-    observe(lanes.tally, robot, lanes.clock[TIME], lanes.signals, forces)
 
 
 @inlined
