@@ -11,6 +11,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from helpers.actuations import SIDES
 from helpers.anchored import BAR, floating_prism
 from helpers.kernels import Stepper
 from helpers.structures import (
@@ -120,8 +121,7 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
 
 def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
     changes = BRIEF | {"engine": "!Compiled", "cpg.signals": "live", "gait_bounds.mirrored": True}
-    sides = [["outer bottom_left"], ["outer bottom_right"]]
-    changes |= {"robot.tetrahedra": 2, "robot.actuation": sides}
+    changes |= {"robot.tetrahedra": 2} | SIDES
     row = Robot.of(load_scenario("coulomb").with_changes(changes))
     scenario = row.scenario.with_changes(
         {"robot": row_as_kind(row), "objective": {"speed": "1 s/m"}}

@@ -278,7 +278,7 @@ class _StepAimer:
         self._jacobian_is_old = False
 
     def follow(self, other: _StepAimer) -> None:
-        """Goes on where the aimer of a copied robot is."""
+        """Copies the state of another aimer."""
         self._last_time, self._last_velocities = other._last_time, other._last_velocities
         self._acceleration, self._longest = other._acceleration, other._longest
         self._jacobian_is_old = other._jacobian_is_old

@@ -110,8 +110,10 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
 
 
 def is_pulled(robot: Robot) -> bool:
-    """True if MuJoCo's tendons lack the law of the cables: where actuators have drives, where
-    driven cables go slack, and with tendon_faults()."""
+    """True if MuJoCo's tendons cannot exert the tensions, so that this package computes them.
+
+    This is so if actuators have drives, if driven cables go slack, and with tendon_faults().
+    """
     structure = robot.structure
     faults = tendon_faults(structure.cables, slack=structure.slack).values()
     loosens = structure.slack and robot.driven.size > 0
@@ -262,10 +264,10 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
 def _add_push(
     actuators: Element, world: Element, name: str, place: np.ndarray, laws: np.ndarray
 ) -> None:
-    """Adds an actuator along each axis of the world that pushes the node after the blank of `name`.
+    """Adds actuators that push a node along the axes of the world.
 
-    The three numbers of each law are a constant force, and the force per displacement from `place`
-    and per velocity.
+    `name` is a word, a blank, and the name of the node. The three numbers of each law are a
+    constant force, and the force per displacement from `place` and per velocity.
     """
     add_element(world, "site", name=name, pos=place)
     ends = {"site": name.partition(" ")[2], "refsite": name}

@@ -3,11 +3,11 @@
 All lanes do the same iteration: forces, prediction of the next mode change, signals, one step. If
 the step of a lane is rejected, the lane repeats it with a shorter step in the next iteration.
 
-The listing's network does not depend on the robot. It runs ahead in its own steps, and its signals
-are interpolated. (Signals computed beforehand, one lane at a time, would make one lane slower by a
-tenth, and eight lanes by a fifth.) A `live` network takes the same steps as the robot, by Heun's
-method. An explicit method is enough because the network is slow. ROS2 without its matrix is Heun's
-method, so both together are of order 2.
+The network of the thesis's listing does not depend on the robot. It runs ahead in its own steps,
+and its signals are interpolated. (If signals were computed beforehand, one lane at a time, one lane
+would be slower by a tenth, and eight lanes by a fifth.) A `live` network takes the same steps as
+the robot, by Heun's method. An explicit method is enough because the network is slow. ROS2 without
+its matrix is Heun's method, so both together are of order 2.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class Log(NamedTuple):
     """Times at which each simulation stops or is sampled, and its samples; a row per robot."""
 
     place: Annotated[Table, "lanes", int]
-    """Place of the simulation in each lane."""
+    """Row of these tables for the robot in each lane; see `places`."""
     marks: Annotated[Table, "places", "marks"]
     """Times (s) at which a step must end, ascending; infinite after the last."""
     passed: Annotated[Table, "places", int]
@@ -266,7 +266,7 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def fate(constants: Constants, lanes: LaneState) -> Real:
-    """Status of each lane after a step. Lanes that do not run have one, too."""
+    """Status of each lane after a step: running or failed. Only lanes that run use it."""
     state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):

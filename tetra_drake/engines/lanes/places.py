@@ -59,11 +59,11 @@ is live."""
 
 @functools.partial(compiled, nogil=True)
 def advance(parts: LaneParts, rounds: int) -> None:
-    """Simulates until a robot has ended and no robot waits, at most `rounds`. A robot has ended at
-    its pause, or failed. The last round is cut short if no robot is left.
+    """Simulates the robots in the lanes for a number of rounds of ROUND steps.
 
-    The robots that wait at first begin together with a round, so that their clearances are due
-    together.
+    Returns earlier if no robot is left, or after a round in which a robot has ended and no robot
+    waits. A robot has ended at its pause, or if it has failed. The robots that wait at first begin
+    together with a round, so that their clearances are due together.
     """
     constants, lanes, log, _, places, readings, live = unpacked(parts)
     clock, robot, state = lanes.clock, constants.robot, lanes.step.state
@@ -96,7 +96,8 @@ def advance(parts: LaneParts, rounds: int) -> None:
 
 @functools.partial(compiled, nogil=True)
 def exchange(parts: LaneParts) -> None:
-    """Puts robots that have ended back to their places, and robots that wait in idle lanes."""
+    """Moves robots that have ended from their lanes back to the tables, and waiting robots from the
+    tables to idle lanes."""
     constants, lanes, log, memory, places, _, _ = unpacked(parts)
     clock, held, queue = by_lane(lanes.clock), by_lane(lanes.signals), places.queue
     searched = by_lane(lanes.forces.near_struts.p_WN)

@@ -191,7 +191,7 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
 
 @inlined
 def motion_at(nodes: Table, row: int, turn: Vector3) -> Real:
-    """Largest component of the motion of a row of `nodes` as its body turns."""
+    """Largest component of turn x p, with the vector p from a body's origin to a row of `nodes`."""
     x, y, z = cross(turn, vector_at(nodes, row, P_BN_W))
     return larger(larger(abs(x), abs(y)), abs(z))
 
