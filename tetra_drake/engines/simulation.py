@@ -267,8 +267,9 @@ class Simulation:
         if indices is None:
             return list(range(self.count))
         places = np.asarray(indices)
-        valid = places.ndim == 1 and np.issubdtype(places.dtype, np.integer)
-        if places.size and not (valid and ((places >= 0) & (places < self.count)).all()):
+        are_whole = places.size == 0 or np.issubdtype(places.dtype, np.integer)
+        fit = places.ndim == 1 and are_whole and ((places >= 0) & (places < self.count)).all()
+        if not fit:
             problem = f"found {indices}, expected a list of integers from 0 to {self.count - 1}"
             raise InputError("Simulation", "indices", problem)
         return [int(place) for place in places]

@@ -201,7 +201,7 @@ class Relief(Section):
     @property
     def plane_slope(self) -> float | None:
         """Slope (rad) along +x, if the terrain is a plane through the origin; otherwise None."""
-        return None
+        return 0.0 if self.is_flat else None
 
     @property
     def where(self) -> str:
@@ -243,10 +243,6 @@ class Flat(Relief):
 
     is_flat = True
     place = ""
-
-    @property
-    def plane_slope(self) -> float:
-        return 0.0
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         aside = scale * ASIDE

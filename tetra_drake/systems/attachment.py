@@ -48,9 +48,8 @@ def DeclareOutput(
     sources: set[DependencyTicket],
 ) -> None:
     """Declares an output port of a system. `read` gives its numbers in a context."""
-    this: Any = weakref.proxy(
-        system
-    )  # a port that refers to the system would keep it alive for ever
+    # A reference to the system in its port would keep it alive for ever.
+    this: Any = weakref.proxy(system)
     system.DeclareVectorOutputPort(
         name,
         size,

@@ -90,10 +90,10 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, inputs)
         size, table = self._forces.cable_forces.size, CableNetwork._table
         moved = functools.partial(table, moves_only=True)
-        DeclareOutput(self, "cable_forces", size, table, inputs)
         DeclareOutput(self, "tensions", count, lambda s, c: table(s, c)[:, cable.TENSION], inputs)
         DeclareOutput(self, "lengths", count, lambda s, c: moved(s, c)[:, cable.LENGTH], motion)
         DeclareOutput(self, "rates", count, lambda s, c: moved(s, c)[:, cable.RATE], motion)
+        DeclareOutput(self, "cable_forces", size, table, inputs)
         DeclareOutput(self, "ends", 6 * count, CableNetwork._ends_of_cables, motion)
 
     def _table(

@@ -95,14 +95,12 @@ class GroundContact(LeafSystem):
         sources = {self._state.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
         table, rows, discrete = GroundContact._table, GroundContact._modes, {self.xd_ticket()}
-        normal, point = contact.NORMAL, contact.STICK_POINT
-        DeclareOutput(self, "ground_forces", 3 * count, table, sources)
-        DeclareOutput(self, "normal_forces", count, lambda s, c: table(s, c)[:, normal], sources)
-        DeclareOutput(
-            self, "friction_forces", 2 * count, lambda s, c: table(s, c)[:, :normal], sources
-        )
-        DeclareOutput(self, "mode_table", modes.size, rows, discrete)
+        n, point = contact.NORMAL, contact.STICK_POINT
+        DeclareOutput(self, "normal_forces", count, lambda s, c: table(s, c)[:, n], sources)
+        DeclareOutput(self, "friction_forces", 2 * count, lambda s, c: table(s, c)[:, :n], sources)
         DeclareOutput(self, "modes", 3 * count, lambda s, c: rows(s, c)[:, :point], discrete)
+        DeclareOutput(self, "mode_table", modes.size, rows, discrete)
+        DeclareOutput(self, "ground_forces", 3 * count, table, sources)
 
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
