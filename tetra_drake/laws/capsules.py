@@ -175,7 +175,7 @@ class Touch(NamedTuple):
 def time_to_pass(
     struts: Struts, law: StrutContactLaw, nodes: Table, near: NearStruts, horizon: Real
 ) -> Real:
-    """Longest step (s), at most `horizon`, in which no strut can pass through another.
+    """Longest step (s), at most `horizon`, that cannot carry a strut through another.
 
     The step also ends before the next collision begins, unless it is short compared with the
     collision. The forces must have been computed for the same `nodes`.

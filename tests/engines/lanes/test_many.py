@@ -186,8 +186,8 @@ def test_robots_that_differ_in_numbers_alone_share_a_batch(short):
     for change in (stiff, wide, moved):
         assert batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
     others = {"robot.tetrahedra": 3, "robot.cables.slack": True, "robot.contacts": "all"} | SIDES
-    for change in ({key: value} for key, value in others.items()):
-        assert not batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
+    for key, value in others.items():
+        assert not batch.begin(1, walk_of(Robot.of(short.with_changes({key: value})))), key
 
 
 def test_scenarios_and_gaits_have_to_fit(short):

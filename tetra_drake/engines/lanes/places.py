@@ -61,9 +61,9 @@ is live."""
 def advance(parts: LaneParts, rounds: int) -> None:
     """Simulates the robots in the lanes for a number of rounds of ROUND steps.
 
-    Returns earlier if no robot is left, or after a round in which a robot has ended and no robot
-    waits. A robot has ended at its pause, or if it has failed. The robots that wait at first begin
-    together with a round, so that their clearances are due together.
+    Returns earlier if no robot is left, or after a round if a robot has ended and no robot waits. A
+    robot has ended at its pause, or if it has failed. The robots that wait at first begin together
+    with a round, so that their clearances are due together.
     """
     constants, lanes, log, _, places, readings, live = unpacked(parts)
     clock, robot, state = lanes.clock, constants.robot, lanes.step.state
