@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray
 from helpers.actuations import LIMITED
-from helpers.anchored import scenario_of
+from helpers.anchored import BAR, scenario_of
 from helpers.converged import shortly
 from helpers.quantities import with_unit
 from helpers.states import body_velocities
@@ -51,13 +51,12 @@ class Wound(Robot):
 
 def swaying(actuation: Actuation, *, damping: float) -> Scenario:
     """A bar between the ends of a frame, for 80 ms."""
-    make = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.016}
     law = {"stiffness": STIFFNESS, "damping": damping, "free_length": FREE_LENGTH}
     bars, between = {"frame": "ad", "bar": "bc"}, {"passive": "ab", "driven": "cd"}
     along = {"a": 0.0, "b": LENGTH, "c": 2.0 * LENGTH, "d": 3.0 * LENGTH}
     tree = {
         "nodes": {name: [x, 0.0, 0.5] for name, x in along.items()},
-        "struts": {name: make | {"pairs": [[*ends]]} for name, ends in bars.items()},
+        "struts": {name: BAR | {"pairs": [[*ends]]} for name, ends in bars.items()},
         "cables": {name: law | {"pairs": [[*ends]]} for name, ends in between.items()},
         "actuated": {"one": ["driven c d"]},
         "gravity": 0.0,

@@ -8,8 +8,7 @@ import pytest
 from helpers.converged import shortly
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -24,7 +23,6 @@ from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.ground import make_surface
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.sdf import make_sdf
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -129,13 +127,3 @@ def test_the_deflection_of_a_foot_that_rolls_and_pivots_is_how_far_it_slid():
 
     assert error(40) < 1e-4
     assert error(40) / error(80) == pytest.approx(4.0, rel=0.1)
-
-
-def test_drake_reads_feet_and_struts_of_the_sdf_as_collision_shapes():
-    feet = {"robot.struts.bar.contact_radius": "8 mm"}
-    robot, builder = Robot.of(load_scenario("prism").with_changes(feet)), DiagramBuilder()
-    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-    text = make_sdf(robot.structure, robot.structure.initial_state, name="prism")
-    Parser(plant).AddModelsFromString(text, "sdf")
-    plant.Finalize()
-    assert plant.num_collision_geometries() == 6 + 3

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from helpers.anchored import HUNG, SWINGING, scenario_of, supported_prism
+from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
 from helpers.bars import ACROSS, CROSSED, RADIUS, STIFFNESS, loose_bars
 from helpers.converged import CONVERGED, shortly
 from helpers.hanging import HANGING, MASS
@@ -128,13 +128,12 @@ def test_what_hangs_swings_as_analysis_says(make, expected, atol, engine):
 
 def bent_body_and_bar() -> Robot:
     """Two bodies, one of three different moments, and a cable that hangs loose between them."""
-    make = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.016}
     bent = {"a": [0, 0, 0.5], "b": [0.1, 0, 0.5], "c": [0.1, 0.06, 0.5], "d": [0.1, 0.06, 0.52]}
     pairs = {"bent": [["a", "b"], ["b", "c"], ["c", "d"]], "bar": [["e", "f"]]}
     slack = {"pairs": [["b", "e"]], "stiffness": 1.0, "damping": 0.0, "free_length": 99.0}
     tree = {
         "nodes": bent | {"e": [0.3, 0.0, 0.5], "f": [0.45, 0.05, 0.6]},
-        "struts": {name: make | {"pairs": its} for name, its in pairs.items()},
+        "struts": {name: BAR | {"pairs": its} for name, its in pairs.items()},
         "cables": {"loose": slack},
         "gravity": 0.0,
     }

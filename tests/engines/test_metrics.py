@@ -10,20 +10,15 @@ from tetra_drake.laws.curves import travelling_index
 from tetra_drake.robot.measures import off_ground
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.scenario import Scenario
-
-
-def short_walk() -> Scenario:
-    """Three tetrahedra on Coulomb friction for 2 s."""
-    changes = {"robot.tetrahedra": 3, "cpg.start_up": "0.2 s", "cpg.gain": "3 lbf"}
-    changes |= {"simulation.duration": "2.0 s", "simulation.steady_from": "0.5 s"}
-    changes |= {"simulation.sample_period": "1e-3 s", "friction.stiffness": "0 N/m"}
-    return load_scenario("coulomb").with_changes(changes | {"engine": "!Compiled"})
 
 
 def test_tallied_metrics_are_those_of_the_trajectory():
-    short = short_walk()
-    robot = Robot.of(short)
+    # Three tetrahedra on Coulomb friction for 2 s.
+    changes = {"robot.tetrahedra": 3, "cpg.start_up": "0.2 s", "cpg.gain": "3 lbf"}
+    changes |= {"simulation.duration": "2.0 s", "simulation.steady_from": "0.5 s"}
+    changes |= {"simulation.sample_period": "1e-3 s", "friction.stiffness": "0 N/m"}
+    changes["engine"] = "!Compiled"
+    robot = Robot.of(load_scenario("coulomb").with_changes(changes))
     walk, motion = simulated(robot, seed=3)
     structure, metrics = robot.structure, walk.metrics
     steady = walk.trajectory.sel(time=slice(0.5, None))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.structures import unit_inertias
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.engines.mjcf import make_mjcf
@@ -59,11 +59,13 @@ def test_motors_have_the_names_of_the_groups(study):
 def test_drake_has_the_bodies_of_the_sdf_and_its_cables_the_tensions_at_rest(study):
     structure, state = study.robot.structure, study.robot.equilibrium.state
     builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     text = make_sdf(structure, state, name=study.robot.scenario.name)
     Parser(plant).AddModelsFromString(text, "sdf")
     nodes = [plant.GetFrameByName(f"node {name}") for name in structure.node_names]
     plant.Finalize()
+    feet = np.count_nonzero(structure.contact_radius[structure.contacts])
+    assert plant.num_collision_geometries() == len(structure.struts) + feet
     bodies = [plant.GetBodyByName(name) for name in structure.bodies]
     assert [body.default_mass() for body in bodies] == pytest.approx(structure.mass)
     inertia = [body.default_unit_inertia().CopyToFullMatrix3() for body in bodies]

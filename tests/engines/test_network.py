@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray
+from helpers.actuations import SIDES
 from helpers.converged import CONVERGED, shortly
 
 from tetra_drake.engines.simulate import simulate
@@ -19,7 +20,6 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
 
 BOTH = pytest.mark.parametrize("engine", ["!Drake", "!Compiled"])
-SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
 
 def walk(scenario: Scenario, gait: Gait, engine: str | Compiled) -> xarray.Dataset:

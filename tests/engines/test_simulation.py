@@ -199,7 +199,7 @@ NAN = np.where(np.arange(16).reshape(2, 8) == 12, math.nan, 0.0)
         (lambda two: two.result(1), "result", ("robot 1 is at 0 s",)),
         *(
             (lambda two, i=indices: two.reset(indices=i), "indices", ("0 to 1",))
-            for indices in ([2], [0.5], 1)
+            for indices in ([2], [0.5], 1, [[]])
         ),
         *(
             (lambda two, a={key: value}: Simulation(two.scenario, **a), key, (repr(value),))

@@ -1,11 +1,10 @@
 """A ball on a loose tether: it falls freely, then the tether catches it."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from helpers.anchored import BAR, LINE, scenario_of
+from helpers.anchored import LINE, scenario_of
 from scipy.integrate import solve_ivp
 
 from tetra_drake.engines.simulate import simulate
@@ -15,26 +14,19 @@ from tetra_drake.scenario.scenario import Scenario
 DROP, G = 0.5, 9.80665  # m until the tether of 1 m is taut, m/s^2
 
 
-TETHER: dict[str, Any] = {
-    "nodes": {"hook": [0.0, 0.0, 2.0], "ball": [0.0, 0.0, 1.5], "p": [5.0, 0, 0], "q": [6.0, 0, 0]},
-    "struts": {"idle": BAR | {"pairs": [["p", "q"]]}},
-    "cables": {"tether": LINE | {"pairs": [["hook", "ball"]], "free_length": 1.0}},
-    "anchors": {"hook": "xyz", "p": "xyz", "q": "xyz"},
-    "masses": {"ball": 1.0},
-}
-"""A ball that hangs by a tether, and a bar that is held."""
-
-
 def dropped(engine: str, *, damping: float) -> Scenario:
-    """The ball dropped from half a metre below its hook."""
-    tree = {**TETHER, "cables": {"tether": TETHER["cables"]["tether"] | {"damping": damping}}}
-    tree["actuated"] = {"motor": ["tether hook ball"]}
-    lifted = 0.5 + G / LINE["stiffness"]  # from where it hangs
-    changes = {
-        "robot.offsets": [["0 m", "0 m", "0 m"], ["0 m", "0 m", f"{lifted!r} m"]],
-        "simulation.sample_period": "5 ms",
-        "friction.stiffness": "0 N/m",  # the only one that MuJoCo knows
+    """A ball that is dropped from half a metre below its hook, on a tether of 1 m."""
+    tether = LINE | {"pairs": [["hook", "ball"]], "free_length": 1.0, "damping": damping}
+    tree = {
+        "nodes": {"hook": [0.0, 0.0, 2.0], "ball": [0.0, 0.0, 1.5]},
+        "cables": {"tether": tether},
+        "anchors": {"hook": "xyz"},
+        "masses": {"ball": 1.0},
+        "actuated": {"motor": ["tether hook ball"]},
+        "offsets": [[0.0, 0.0, 0.5 + G / LINE["stiffness"]]],  # from where it hangs
     }
+    # MuJoCo knows no stiffness of friction.
+    changes = {"simulation.sample_period": "5 ms", "friction.stiffness": "0 N/m"}
     return scenario_of(tree, duration=1.0, engine=engine, **changes)
 
 

@@ -21,3 +21,6 @@ LIMITED = {
 }
 LIMITED["winch"] = LIMITED["winch"].model_copy(update={"max_force": 6.0})
 """Actuators whose limits bind in a walk, but for the force."""
+
+SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
+"""A row of tetrahedra whose bottom cables are driven by an oscillator at each side."""

@@ -77,19 +77,8 @@ def test_actuators_bear_what_the_cable_does_not_and_follow_their_commands(kind):
         assert own.load == own.pull == pulls.tension - pulls.beside
 
 
-@pytest.mark.parametrize(
-    ("refused", "words"),
-    [
-        (
-            lambda: friction.friction_force(FrictionLaw(99, np.zeros(9)), slides()[0]),
-            "law",
-        ),
-        (
-            lambda: actuator_force(Actuator(99, np.zeros(4)), 0.2, 0.3, 0.0, 0.0, CABLE),
-            "kind of actuators",
-        ),
-    ],
-)
-def test_an_unknown_law_is_refused(refused, words):
-    with pytest.raises(ValueError, match=f"unknown {words}"):
-        refused()
+def test_an_unknown_law_is_refused():
+    with pytest.raises(ValueError, match="unknown law"):
+        friction.friction_force(FrictionLaw(99, np.zeros(9)), slides()[0])
+    with pytest.raises(ValueError, match="unknown kind of actuators"):
+        actuator_force(Actuator(99, np.zeros(4)), 0.2, 0.3, 0.0, 0.0, CABLE)

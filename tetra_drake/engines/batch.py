@@ -144,7 +144,7 @@ class SerialBatch(Batch):
     def __init__(
         self, start: Callable[[DrivenRobot], LoneRobot], robots: Sequence[DrivenRobot], places: int
     ) -> None:
-        """Puts robots in the first of the places. `start` puts one at its start."""
+        """Starts robots in the first of the places, with the function `start`."""
         super().__init__(robots[0].robot.structure, places)
         self._start = start
         self._robots: list[LoneRobot | None] = [None] * places

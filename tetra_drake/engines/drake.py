@@ -29,7 +29,6 @@ from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
-from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import HeldSignals
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -50,10 +49,8 @@ _GROWTH = 3.0
 """Factor by which the longest step grows with each step until the next mode change."""
 _RENEW_FROM = 8e-4
 """Step (s) that needs a new Jacobian after a mode change; shorter ones mostly converge without."""
-
-
-FINEST, COARSEST = 2e-5, 5e-3
-"""Limits of the default of the target accuracy."""
+_FINEST, _COARSEST = 2e-5, 5e-3
+"""Limits of the default target accuracy."""
 
 
 class DrakeEngine(Engine):
@@ -190,8 +187,21 @@ class _DiagramRobot(LoneRobot):
 
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
-    """Drake's Simulator of a robot's diagram, with the integrator settings of a scenario."""
-    accuracy = settings.accuracy or default_accuracy(robot.structure)
+    """Drake's Simulator of a robot's diagram, with the integrator settings of a scenario.
+
+    The default target accuracy is half the least damping ratio of a cable, within limits. The
+    damping ratio c / (2 sqrt(k m)) is for the reduced mass m of the two bodies that the cable
+    joins. A structure without elastic cables has the finest accuracy.
+    """
+    structure = robot.structure
+    is_elastic = structure.cables["stiffness"] > 0.0
+    cables, ends = structure.cables[is_elastic], structure.cable_ends[is_elastic]
+    per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
+    per_reduced_mass = per_mass[structure.carriers[ends]].sum(axis=1)
+    ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
+    by_damping = min(_COARSEST, max(_FINEST, 0.5 * min(ratios, default=0.0)))
+
+    accuracy = settings.accuracy or by_damping
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
     integrator.set_target_accuracy(accuracy)
@@ -199,20 +209,6 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
         window = _WITNESS_WINDOW * min(1.0, accuracy / 1e-3)
         simulator.get_mutable_context().SetAccuracy(window / _WITNESS_WINDOW_PER_ACCURACY)
     return simulator
-
-
-def default_accuracy(structure: Structure) -> float:
-    """Target accuracy for a structure: half the least damping ratio of a cable, within limits.
-
-    The damping ratio c / (2 sqrt(k m)) of a cable is for the reduced mass m of its two bodies. A
-    structure without elastic cables has the finest accuracy.
-    """
-    is_elastic = structure.cables["stiffness"] > 0.0
-    cables, ends = structure.cables[is_elastic], structure.cable_ends[is_elastic]
-    per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
-    per_reduced_mass = per_mass[structure.carriers[ends]].sum(axis=1)
-    ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
-    return min(COARSEST, max(FINEST, 0.5 * min(ratios, default=0.0)))
 
 
 class _Work:
@@ -282,7 +278,7 @@ class _StepAimer:
         self._jacobian_is_old = False
 
     def follow(self, other: _StepAimer) -> None:
-        """Goes on where the aimer of a copied robot is."""
+        """Copies the state of another aimer."""
         self._last_time, self._last_velocities = other._last_time, other._last_velocities
         self._acceleration, self._longest = other._acceleration, other._longest
         self._jacobian_is_old = other._jacobian_is_old

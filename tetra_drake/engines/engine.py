@@ -69,7 +69,7 @@ class Engine:
         return SerialBatch(start, robots, places or len(robots))
 
     def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
-        """Puts one robot at its start. Raises the errors of start()."""
+        """A single robot at its start, for a SerialBatch. Raises the errors of start()."""
         raise NotImplementedError
 
     def simulate(

@@ -64,7 +64,8 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     """MuJoCo's model of a robot, with a tendon for each cable and a motor for each driven one.
 
     If actuators bear the whole tension, tendons have no law: a motor for each cable exerts its
-    tension. Motors are in the order of their cables; for their names see motor_names().
+    tension. Motors are in the order of their cables. A motor has the name of its oscillator; if
+    this drives several cables, the name of the cable is added.
 
     Args:
         robot: the robot at its start.
@@ -109,8 +110,10 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
 
 
 def is_pulled(robot: Robot) -> bool:
-    """True if MuJoCo's tendons lack the law of the cables: where actuators have drives, where
-    driven cables go slack, and with tendon_faults()."""
+    """True if MuJoCo's tendons cannot exert the tensions, so that this package computes them.
+
+    This is so if actuators have drives, if driven cables go slack, and with tendon_faults().
+    """
     structure = robot.structure
     faults = tendon_faults(structure.cables, slack=structure.slack).values()
     loosens = structure.slack and robot.driven.size > 0
@@ -225,9 +228,12 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
 def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
     """Adds a tendon for each cable and a motor for each driven cable, or for all cables if motors
     exert their tensions."""
-    structure = robot.structure
+    structure, motors = robot.structure, {}
+    for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
+        for cable in (structure.cable_names[i] for i in group):
+            motors[cable] = oscillator if len(group) == 1 else f"{oscillator} {cable}"
     tendons, actuators = add_element(model, "tendon"), add_element(model, "actuator")
-    width, motors = structure.least_radius / 2, motor_names(structure)
+    width = structure.least_radius / 2
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]
@@ -241,16 +247,6 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
             motor = motors.get(name, name)
             # A motor's force lengthens its tendon, ours shortens it.
             add_element(actuators, "motor", name=motor, tendon=name, gear="-1")
-
-
-def motor_names(structure: Structure) -> dict[str, str]:
-    """Names of the motors by their cables: names of oscillators. If an oscillator drives several
-    cables, the name of the cable is added."""
-    names = {}
-    for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
-        for cable in (structure.cable_names[i] for i in group):
-            names[cable] = oscillator if len(group) == 1 else f"{oscillator} {cable}"
-    return names
 
 
 def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
@@ -268,10 +264,10 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
 def _add_push(
     actuators: Element, world: Element, name: str, place: np.ndarray, laws: np.ndarray
 ) -> None:
-    """Adds an actuator along each axis of the world that pushes the node after the blank of `name`.
+    """Adds actuators that push a node along the axes of the world.
 
-    The three numbers of each law are a constant force, and the force per displacement from `place`
-    and per velocity.
+    `name` is a word, a blank, and the name of the node. The three numbers of each law are a
+    constant force, and the force per displacement from `place` and per velocity.
     """
     add_element(world, "site", name=name, pos=place)
     ends = {"site": name.partition(" ")[2], "refsite": name}

@@ -85,8 +85,22 @@ class SimulationQueue:
         return [job.future for job in jobs]
 
     def _work(self) -> None:
-        crew = _Crew(self._driven, record=self._record)
-        while (jobs := self._take(crew)) is not None:
+        crew = _Crew(self._driven, self._record)
+        while True:
+            with self._changed:
+                while not (self._closing or self._waiting or crew.jobs):
+                    self._changed.wait()
+                if not crew.jobs and len(self._waiting) == 1:
+                    self._changed.wait(_GATHERING)
+                if self._closing:
+                    break
+                count = len(crew.idle)
+                if not crew.jobs:
+                    share = math.ceil(len(self._waiting) / len(self._threads))
+                    lanes = engine_of(self._waiting[0].scenario).lanes if self._waiting else 0
+                    count = min(share, lanes)
+                jobs = [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
+
             refused = [job for job in jobs if not crew.begin(job)]
             with self._changed:
                 self._waiting.extendleft(reversed(refused))
@@ -95,22 +109,6 @@ class SimulationQueue:
             except Exception as error:  # all jobs in the batch fail with it
                 crew.give_up(error)
         crew.give_up(CancelledError())
-
-    def _take(self, crew: _Crew) -> list[_Job] | None:
-        """Waits for jobs for the idle places of a thread; None at the end of the queue."""
-        with self._changed:
-            while not (self._closing or self._waiting or crew.jobs):
-                self._changed.wait()
-            if not crew.jobs and len(self._waiting) == 1:
-                self._changed.wait(_GATHERING)
-            if self._closing:
-                return None
-            count = len(crew.idle)
-            if not crew.jobs:
-                share = math.ceil(len(self._waiting) / len(self._threads))
-                lanes = engine_of(self._waiting[0].scenario).lanes if self._waiting else 0
-                count = min(share, lanes)
-            return [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
 
     def _driven(self, job: _Job) -> DrivenRobot:
         """The robot of a job. Gaits on the same scenario share a robot."""
@@ -125,30 +123,31 @@ class SimulationQueue:
         return DrivenRobot.of(robot, driver)
 
 
+@dataclass
 class _Crew:
     """Simulations of one thread: a batch, and the jobs in its places."""
 
-    def __init__(self, driven: Callable[[_Job], DrivenRobot], *, record: bool) -> None:
-        """`driven` makes the robot of a job."""
-        self.jobs: dict[int, _Job] = {}
-        """Jobs by place."""
-        self.idle: list[int] = []
-        """Places without a job."""
-        self._driven, self._record = driven, record
-        self._engine: Engine | None = None
-        self._batch: Batch | None = None
+    driven: Callable[[_Job], DrivenRobot]
+    """Function that makes the robot of a job."""
+    record: bool
+    jobs: dict[int, _Job] = field(default_factory=dict)
+    """Jobs by place."""
+    idle: list[int] = field(default_factory=list)
+    """Places without a job."""
+    engine: Engine | None = None
+    batch: Batch | None = None
 
     def begin(self, job: _Job) -> bool:
         """Puts a job in an idle place. Returns False if it must wait until all places are idle."""
         try:
-            robot, engine = self._driven(job), engine_of(job.scenario)
-            if self._batch and engine is self._engine and self._batch.begin(self.idle[0], robot):
+            robot, engine = self.driven(job), engine_of(job.scenario)
+            if self.batch and engine is self.engine and self.batch.begin(self.idle[0], robot):
                 place = self.idle.pop(0)
             elif self.jobs:
                 return False
             else:
-                self._batch = engine.start([robot], places=engine.lanes, record=self._record)
-                self._engine, self.idle, place = engine, list(range(1, engine.lanes)), 0
+                self.batch = engine.start([robot], places=engine.lanes, record=self.record)
+                self.engine, self.idle, place = engine, list(range(1, engine.lanes)), 0
         except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
             return True
@@ -158,7 +157,7 @@ class _Crew:
 
     def advance(self) -> None:
         """Simulates for a short time, and removes finished jobs."""
-        batch = self._batch
+        batch = self.batch
         if batch is None or not self.jobs:
             return
         batch.advance(briefly=True)
@@ -185,4 +184,4 @@ class _Crew:
         """Ends all jobs with the same error."""
         for job in self.jobs.values():
             job.future.set_exception(error)
-        self.jobs, self.idle, self._batch = {}, [], None
+        self.jobs, self.idle, self.batch = {}, [], None

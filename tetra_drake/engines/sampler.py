@@ -34,7 +34,7 @@ class Sampler:
         """Time (s) and continuous state at the end of the latest step."""
 
     def follow(self, other: Sampler) -> None:
-        """Goes on with copies of another sampler's samples."""
+        """Copies the samples of another sampler."""
         self._samples, self._latest = other._samples.copy(), other._latest
 
     def after_step(self, context: Context) -> None:

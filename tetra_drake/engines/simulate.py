@@ -86,7 +86,8 @@ def simulate(
     given = gait if command is None else command
     if given is None:
         raise InputError("simulate", "gait", "is needed, or a command, or a controller")
-    robot = driven_robot(scenario, _driver(given, scenario), steering=steering)
+    driver = given if isinstance(given, Command) else given_gait(given, scenario)
+    robot = driven_robot(scenario, driver, steering=steering)
     return engine_of(scenario).simulate(robot, record=record, viewer=viewer)
 
 
@@ -133,7 +134,10 @@ def simulate_many(
     threads = min(threads_for(workers, source="simulate_many"), max(1, len(gaits)))
     if not all(engine_of(each).has_threads for each in scenarios):
         threads = 1
-    drivers = [_driver(gait, each) for gait, each in zip(gaits, scenarios, strict=True)]
+    drivers: list[Driver] = [
+        gait if isinstance(gait, Command) else given_gait(gait, each)
+        for gait, each in zip(gaits, scenarios, strict=True)
+    ]
     with SimulationQueue(threads, record=record) as queue:
         futures = queue.submit(zip(scenarios, drivers, strict=True))
         outcomes: list[Outcome] = []
@@ -145,10 +149,6 @@ def simulate_many(
                 failure.gait = None if isinstance(driver, Command) else driver
                 outcomes.append(failure)
         return outcomes
-
-
-def _driver(given: GivenGait | Command, scenario: Scenario) -> Driver:
-    return given if isinstance(given, Command) else given_gait(given, scenario)
 
 
 def check_scenario(scenario: Scenario) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import numbers
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -86,7 +87,7 @@ class Simulation:
         """The robot without disturbances. Its structure has the names of nodes and cables."""
         self._first_readings = first_readings(self.robot)
         check_whole("Simulation", "count", count, least=1, most=MOST_ROBOTS)
-        self._threads = threads_for(workers, source="Simulation")
+        threads = threads_for(workers, source="Simulation")
         check_type("Simulation", "record", record, bool)
         check_type("Simulation", "name", name, str)
         if viewer is not None:
@@ -94,9 +95,12 @@ class Simulation:
         self._listing_steps = _listing_steps(control_period, scenario)
         self.control_period = self._listing_steps * scenario.cpg.listing_step
         """Time (s) between actions."""
-        self._name, self._record, self._viewer = name, record, viewer
-        self._robots = [self.robot] * count
-        self._batch = self._new_batch()
+        self.count = count
+        """Number of robots."""
+        self._name, self._robots = name, [self.robot] * count
+        start = functools.partial(engine_of(scenario).start, places=count, threads=threads)
+        self._new_batch = functools.partial(start, record=record, viewer=viewer)
+        self._batch: Batch = self._new_batch([self._driven(self.robot)])
         self._owner, self._is_whole = threading.RLock(), True
         shape = count, self.robot.driven.size
         self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
@@ -104,11 +108,6 @@ class Simulation:
         self.rest: np.ndarray = np.empty(shape)
         """Actions (N, actions) with which the robots start; they rest."""
         self.reset()
-
-    @property
-    def count(self) -> int:
-        """Number of robots."""
-        return len(self._robots)
 
     @property
     def failures(self) -> list[SimulationFailure | None]:
@@ -163,7 +162,7 @@ class Simulation:
                 draws = [draw_disturbances(self.scenario, each) for each in seeds]
                 robots = [controlled_robot(disturbed(self.scenario, draw)) for draw in draws]
             if not self._is_whole:
-                self._batch = self._new_batch()
+                self._batch = self._new_batch([self._driven(self.robot)])
             self._is_whole = False
             for place, robot in zip(places, robots, strict=True):
                 cables = robot.starting_cables()
@@ -253,16 +252,6 @@ class Simulation:
         finally:
             self._owner.release()
 
-    def _new_batch(self) -> Batch:
-        first, engine = self._driven(self.robot), engine_of(self.scenario)
-        return engine.start(
-            [first],
-            places=self.count,
-            record=self._record,
-            viewer=self._viewer,
-            threads=self._threads,
-        )
-
     def _driven(self, robot: Robot) -> DrivenRobot:
         samples = robot.first_signals[np.newaxis]
         return DrivenRobot(robot=robot, name=self._name, samples=samples)
@@ -278,8 +267,9 @@ class Simulation:
         if indices is None:
             return list(range(self.count))
         places = np.asarray(indices)
-        valid = places.ndim == 1 and np.issubdtype(places.dtype, np.integer)
-        if places.size and not (valid and ((places >= 0) & (places < self.count)).all()):
+        are_whole = places.size == 0 or np.issubdtype(places.dtype, np.integer)
+        fit = places.ndim == 1 and are_whole and ((places >= 0) & (places < self.count)).all()
+        if not fit:
             problem = f"found {indices}, expected a list of integers from 0 to {self.count - 1}"
             raise InputError("Simulation", "indices", problem)
         return [int(place) for place in places]

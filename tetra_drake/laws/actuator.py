@@ -77,7 +77,7 @@ class ActuatorForce(NamedTuple):
 
 
 class Exertion(NamedTuple):
-    """Load, pull and speed limit of an actuator at an instant, and the length of its cable."""
+    """Load and pull of an actuator at an instant, and the length of its cable."""
 
     load: Real
     """Force (N) that it bears. For a direct force this is the tension, as for a motor in its
@@ -238,8 +238,10 @@ class ActuatorKind(Section):
         return Actuator(self.kind, np.array(Limits(**dict(self))))
 
     def excess(self, signal: float, *, free_length: float) -> str:
-        """Text if signals up to `signal` (N) exceed the actuator's limits; empty if they do not.
-        `free_length` (m) is the least commanded free length with these signals."""
+        """Words that say how signals up to `signal` (N) exceed the actuator's limits.
+
+        Empty if they do not. `free_length` (m) is the least free length that they command.
+        """
         return ""
 
     def drives(self, cables: DrivenCables) -> Any:

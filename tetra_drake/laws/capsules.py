@@ -175,15 +175,16 @@ class Touch(NamedTuple):
 def time_to_pass(
     struts: Struts, law: StrutContactLaw, nodes: Table, near: NearStruts, horizon: Real
 ) -> Real:
-    """Time (s), at most `horizon`, within which no strut can pass through another unseen. No
-    collision begins before its end, unless the time is short against the collision.
+    """Longest step (s), at most `horizon`, that cannot carry a strut through another.
 
-    The forces must have been computed for the same `nodes`.
+    The step also ends before the next collision begins, unless it is short compared with the
+    collision. The forces must have been computed for the same `nodes`.
 
     Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
     pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
-    least half of the difference of `near` and the largest distance that touches, whenever the
-    latest search was: so a robot moves alike, whatever others move in the lanes beside it.
+    least half of the difference of `near` and the largest distance that touches. This bound does
+    not depend on the time of the latest search. So a robot moves alike beside any other robots in
+    the lanes.
     """
     if not law.acts:
         return horizon

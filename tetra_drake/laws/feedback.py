@@ -4,8 +4,8 @@ Each pathway has a gain. Feedback with opposite signs on extensor and flexor shi
 one side. Feedback with equal signs excites or calms both neurons. In Taga (1991), angles act with
 opposite signs and loads with equal signs.
 
-What a sense reads must be smooth within a step of an integrator. Forces are smooth, and modes are
-constant there. The sign of a gap jumps.
+Feedback must be smooth within a step of an integrator. Forces are smooth there, and modes are
+constant. The sign of a gap jumps, so feedback must not depend on it.
 
 To add a pathway: a field of Gains, and its part of sense(). All engines have the state, the modes
 and Forces. A constant of the robot is a field of Senses, which robot.robot fills in.

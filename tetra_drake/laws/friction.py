@@ -251,14 +251,8 @@ def reset_force(slide: Slide, law: ResetConstants) -> Vector2:
     force_1, force_2 = tangent_force(slide.t1, law), tangent_force(slide.t2, law)
     if not any_lane(law.per_load > 0.0):
         return force_1, force_2
-    factor = load_factor(slide, law)
-    return factor * force_1, factor * force_2
-
-
-@inlined
-def load_factor(slide: Slide, law: ResetConstants) -> Real:
-    """Factor by which the load multiplies the friction of the reset integrator."""
-    return select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
+    by_load = select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
+    return by_load * force_1, by_load * force_2
 
 
 @inlined
@@ -277,7 +271,8 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
     """Stiff part of -(time d/dv + time² d/dx) of the friction: components 11, 12 and 22. For the
     reset integrator these are damping and stiffness in stick."""
     stiffness = time * law.stiffness * (1.0 + law.stiction_switch)
-    damping = time * (law.stiction_damping + stiffness) * load_factor(slide, law)
+    by_load = select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
+    damping = time * (law.stiction_damping + stiffness) * by_load
     along_1 = select(slide.t1.mode == STICK, damping, 0.0)
     along_2 = select(slide.t2.mode == STICK, damping, 0.0)
     return along_1, 0.0 * damping, along_2

@@ -35,7 +35,7 @@ from tetra_drake.kernels.lanes import (
     minimum,
     select,
 )
-from tetra_drake.laws.height_files import HeightPath
+from tetra_drake.laws.height_files import HeightFile, HeightPath
 from tetra_drake.laws.kinematics import P_WN
 from tetra_drake.laws.vectors import Vector3, put_vector
 from tetra_drake.settings.quantities import Angle, Length
@@ -201,7 +201,7 @@ class Relief(Section):
     @property
     def plane_slope(self) -> float | None:
         """Slope (rad) along +x, if the terrain is a plane through the origin; otherwise None."""
-        return None
+        return 0.0 if self.is_flat else None
 
     @property
     def where(self) -> str:
@@ -214,15 +214,19 @@ class Relief(Section):
     @property
     def text(self) -> str:
         """Description of the terrain, such as "incline (slope 5 deg)"."""
-        return type(self).__name__.lower() + settings_text(self)
+        kind = type(self).__name__.lower() if self.is_ground else "no ground"
+        return kind + settings_text(self)
 
     @property
     def paths(self) -> dict[str, str]:
         """Paths of the files that settings name, by key."""
-        return {}
+        return {key: file.path for key, file in self if isinstance(file, HeightFile)}
 
     def save(self, folder: Path) -> None:
         """Writes the files of the terrain to the folder of a record, under new names."""
+        for _, file in self:
+            if isinstance(file, HeightFile):
+                file.save(folder)
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         """Heights of the terrain on a grid.
@@ -240,10 +244,6 @@ class Flat(Relief):
     is_flat = True
     place = ""
 
-    @property
-    def plane_slope(self) -> float:
-        return 0.0
-
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         aside = scale * ASIDE
         return Grid(np.zeros((3, 3)), (-aside, -aside), (aside, aside))
@@ -254,10 +254,6 @@ class Nothing(Flat):
 
     is_ground = False
     place = "without ground"
-
-    @property
-    def text(self) -> str:
-        return "no ground"
 
 
 class Incline(Relief):
@@ -393,13 +389,6 @@ class HeightField(Relief):
     """File of heights in m."""
     cell: Length = Field(gt=0)
     """Distance between neighbours, along x and y."""
-
-    @property
-    def paths(self) -> dict[str, str]:
-        return {"file": self.file.path}
-
-    def save(self, folder: Path) -> None:
-        self.file.save(folder)
 
     def grid(self, *, ahead: float, scale: float, source: object) -> Grid:
         heights = self.file.heights

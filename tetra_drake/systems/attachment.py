@@ -10,8 +10,9 @@ from __future__ import annotations
 import contextlib
 import math
 import numbers
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple, Self
+import weakref
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,7 @@ from pydrake.multibody.tree import BodyIndex, Frame, FrameIndex, RigidBody
 from pydrake.systems.framework import (
     BasicVector,
     Context,
+    DependencyTicket,
     DiagramBuilder,
     LeafSystem,
     System,
@@ -34,6 +36,26 @@ from pydrake.systems.primitives import Adder
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.model import WORLD
+
+SystemT = TypeVar("SystemT", bound=LeafSystem)
+
+
+def DeclareOutput(
+    system: SystemT,
+    name: str,
+    size: int,
+    read: Callable[[SystemT, Context], np.ndarray],
+    sources: set[DependencyTicket],
+) -> None:
+    """Declares an output port of a system. `read` gives its numbers in a context."""
+    # A reference to the system in its port would keep it alive for ever.
+    this: Any = weakref.proxy(system)
+    system.DeclareVectorOutputPort(
+        name,
+        size,
+        lambda context, output: output.SetFromVector(np.ravel(read(this, context))),
+        sources,
+    )
 
 
 class Nodes(NamedTuple):

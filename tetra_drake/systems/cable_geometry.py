@@ -16,7 +16,7 @@ from pydrake.geometry import (
     SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, OutputPort
+from pydrake.systems.framework import Context, LeafSystem
 
 from tetra_drake.robot.structure import PASSIVE_COLOUR
 
@@ -39,11 +39,26 @@ class CableGeometry(LeafSystem):
     other as a telescope's do.
     """
 
-    def __init__(self, *, lengths: np.ndarray, frames: list[list[FrameId]]) -> None:
-        """`lengths` (cables,) in m and `frames` are of the pieces of each cable."""
+    def __init__(self, scene_graph: SceneGraph, name: str, *, lengths: Mapping[str, float]) -> None:
+        """Registers the pieces with a source of that name. `lengths` has the length (m) of each
+        cable by its name at the start."""
         super().__init__()
-        self._lengths, self._frames = lengths, frames
-        self._ends = self.DeclareVectorInputPort("ends", 6 * len(frames))
+        self.source = scene_graph.RegisterSource(name)
+        """The source of the pieces in the scene."""
+        self._pieces: list[tuple[float, list[FrameId]]] = []
+        """Length (m) and frames of the pieces of each cable."""
+        properties = MakePhongIllustrationProperties(PASSIVE_COLOUR)
+        radius = min(lengths.values()) / SLENDERNESS
+        for cable, length in lengths.items():
+            frames = []
+            for piece in (f"{cable} {i}" for i in range(PIECES)):
+                frame = scene_graph.RegisterFrame(self.source, GeometryFrame(piece))
+                shown = GeometryInstance(RigidTransform(), Cylinder(radius, SHARE * length), piece)
+                shown.set_illustration_properties(properties)
+                scene_graph.RegisterGeometry(self.source, frame, shown)
+                frames.append(frame)
+            self._pieces.append((SHARE * length, frames))
+        self._ends = self.DeclareVectorInputPort("ends", 6 * len(lengths))
         self.DeclareAbstractOutputPort(
             "geometry_pose",
             lambda: AbstractValue.Make(FramePoseVector()),
@@ -53,39 +68,10 @@ class CableGeometry(LeafSystem):
 
     def _calc_poses(self, context: Context, output: AbstractValue) -> None:
         poses, ends = output.get_mutable_value(), self._ends.Eval(context).reshape(-1, 2, 3)
-        for (p_WA, p_WB), length, frames in zip(ends, self._lengths, self._frames, strict=True):
+        for (p_WA, p_WB), (length, frames) in zip(ends, self._pieces, strict=True):
             distance = np.linalg.norm(p_WB - p_WA)
             along = (p_WB - p_WA) / distance
             R_WC = RotationMatrix.MakeFromOneVector(along, 2)
             places = np.linspace(length / 2, distance - length / 2, PIECES)
             for frame, place in zip(frames, places, strict=True):
                 poses.set_value(frame, RigidTransform(R_WC, p_WA + place * along))
-
-
-def AddCableGeometry(
-    builder: DiagramBuilder,
-    scene_graph: SceneGraph,
-    ends: OutputPort,
-    *,
-    lengths: Mapping[str, float],
-) -> CableGeometry:
-    """Shows cables in a SceneGraph. `ends` is a port of CableNetwork, `lengths` has the length (m)
-    of each cable by its name at the start."""
-    source = scene_graph.RegisterSource(ends.get_system().get_name())
-    properties = MakePhongIllustrationProperties(PASSIVE_COLOUR)
-    radius = min(lengths.values()) / SLENDERNESS
-    frames: list[list[FrameId]] = []
-    for name, length in lengths.items():
-        frames.append([])
-        for piece in range(PIECES):
-            frame = scene_graph.RegisterFrame(source, GeometryFrame(f"{name} {piece}"))
-            shape = Cylinder(radius, SHARE * length)
-            shown = GeometryInstance(RigidTransform(), shape, f"{name} {piece}")
-            shown.set_illustration_properties(properties)
-            scene_graph.RegisterGeometry(source, frame, shown)
-            frames[-1].append(frame)
-    pieces = CableGeometry(lengths=SHARE * np.array(list(lengths.values())), frames=frames)
-    geometry = builder.AddNamedSystem(f"{ends.get_system().get_name()}_geometry", pieces)
-    builder.Connect(ends, geometry.get_input_port())
-    builder.Connect(geometry.get_output_port(), scene_graph.get_source_pose_port(source))
-    return pieces

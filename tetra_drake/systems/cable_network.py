@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from tetra_drake.laws.model import Model
 from tetra_drake.settings.refusals import hint
 from tetra_drake.systems.attachment import (
     Attach,
+    DeclareOutput,
     Nodes,
     check_constants,
     check_frame,
@@ -32,7 +34,7 @@ from tetra_drake.systems.attachment import (
     check_part,
     checked_numbers,
 )
-from tetra_drake.systems.cable_geometry import AddCableGeometry
+from tetra_drake.systems.cable_geometry import CableGeometry
 
 _LEAST_LENGTH = 1e-9
 """Least length (m) of a cable at the start. The direction of a shorter one is not known."""
@@ -84,14 +86,15 @@ class CableNetwork(LeafSystem):
         if drives:
             self._drives = self.DeclareVectorInputPort("drives", drives)
             inputs.add(self._drives.ticket())
-            self.DeclareVectorOutputPort("drive_rates", drives, self._calc_drive_rates, inputs)
+            DeclareOutput(self, "drive_rates", drives, CableNetwork._drive_rates, inputs)
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, inputs)
-        self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
-        self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, motion)
-        self.DeclareVectorOutputPort("rates", count, self._calc_rates, motion)
-        size = self._forces.cable_forces.size
-        self.DeclareVectorOutputPort("cable_forces", size, self._calc_table, inputs)
-        self.DeclareVectorOutputPort("ends", 6 * count, self._calc_ends, motion)
+        size, table = self._forces.cable_forces.size, CableNetwork._table
+        moved = functools.partial(table, moves_only=True)
+        DeclareOutput(self, "tensions", count, lambda s, c: table(s, c)[:, cable.TENSION], inputs)
+        DeclareOutput(self, "lengths", count, lambda s, c: moved(s, c)[:, cable.LENGTH], motion)
+        DeclareOutput(self, "rates", count, lambda s, c: moved(s, c)[:, cable.RATE], motion)
+        DeclareOutput(self, "cable_forces", size, table, inputs)
+        DeclareOutput(self, "ends", 6 * count, CableNetwork._ends_of_cables, motion)
 
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
@@ -117,26 +120,13 @@ class CableNetwork(LeafSystem):
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._table(context, output.get_mutable_value())
 
-    def _calc_tensions(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._table(context)[:, cable.TENSION])
-
-    def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._table(context, moves_only=True)[:, cable.LENGTH])
-
-    def _calc_rates(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._table(context, moves_only=True)[:, cable.RATE])
-
-    def _calc_table(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._table(context).ravel())
-
-    def _calc_ends(self, context: Context, output: BasicVector) -> None:
+    def _ends_of_cables(self, context: Context) -> np.ndarray:
         self._table(context, moves_only=True)
-        p_WN = self._forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
-        output.SetFromVector(p_WN[self._ends].ravel())
+        return self._forces.nodes[self._ends, kinematics.P_WN : kinematics.P_WN + 3]
 
-    def _calc_drive_rates(self, context: Context, output: BasicVector) -> None:
+    def _drive_rates(self, context: Context) -> np.ndarray:
         self._table(context)
-        output.SetFromVector(self._forces.drives[:, actuator.RATE])
+        return self._forces.drives[:, actuator.RATE]
 
 
 @dataclass(frozen=True)
@@ -216,8 +206,11 @@ def AddCables(
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None and names:
-        shown = dict(zip(names, lengths, strict=True))
-        AddCableGeometry(builder, scene_graph, network.GetOutputPort("ends"), lengths=shown)
+        shown = CableGeometry(scene_graph, name, lengths=dict(zip(names, lengths, strict=True)))
+        builder.AddNamedSystem(f"{name}_geometry", shown)
+        builder.Connect(network.GetOutputPort("ends"), shown.get_input_port())
+        poses = scene_graph.get_source_pose_port(shown.source)
+        builder.Connect(shown.get_output_port(), poses)
     return network
 
 

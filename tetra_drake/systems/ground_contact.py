@@ -28,6 +28,7 @@ from tetra_drake.laws.mode_change import mode_margin, modes_after_step, next_mod
 from tetra_drake.laws.model import Model
 from tetra_drake.systems.attachment import (
     Attach,
+    DeclareOutput,
     Nodes,
     check_constants,
     check_frame,
@@ -93,13 +94,13 @@ class GroundContact(LeafSystem):
         self._witnesses = [margin] if witness else []
         sources = {self._state.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
-        self.DeclareVectorOutputPort("normal_forces", count, self._calc_normal, sources)
-        self.DeclareVectorOutputPort("friction_forces", 2 * count, self._calc_friction, sources)
-        self.DeclareVectorOutputPort("modes", 3 * count, self._calc_modes, {self.xd_ticket()})
-        self.DeclareVectorOutputPort(
-            "mode_table", modes.size, self._calc_mode_table, {self.xd_ticket()}
-        )
-        self.DeclareVectorOutputPort("ground_forces", 3 * count, self._calc_table, sources)
+        table, rows, discrete = GroundContact._table, GroundContact._modes, {self.xd_ticket()}
+        n, point = contact.NORMAL, contact.STICK_POINT
+        DeclareOutput(self, "normal_forces", count, lambda s, c: table(s, c)[:, n], sources)
+        DeclareOutput(self, "friction_forces", 2 * count, lambda s, c: table(s, c)[:, :n], sources)
+        DeclareOutput(self, "modes", 3 * count, lambda s, c: rows(s, c)[:, :point], discrete)
+        DeclareOutput(self, "mode_table", modes.size, rows, discrete)
+        DeclareOutput(self, "ground_forces", 3 * count, table, sources)
 
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
@@ -142,21 +143,6 @@ class GroundContact(LeafSystem):
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._table(context, output.get_mutable_value())
-
-    def _calc_normal(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._table(context)[:, contact.NORMAL])
-
-    def _calc_friction(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._table(context)[:, : contact.NORMAL].ravel())
-
-    def _calc_table(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._table(context).ravel())
-
-    def _calc_modes(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._modes(context)[:, : contact.STICK_POINT].ravel())
-
-    def _calc_mode_table(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._modes(context).ravel())
 
 
 def AddGroundContact(

@@ -7,6 +7,7 @@ import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
 from tetra_drake.laws import oscillator
+from tetra_drake.systems.attachment import DeclareOutput
 
 
 class MatsuokaCpg(LeafSystem):
@@ -48,7 +49,8 @@ class MatsuokaCpg(LeafSystem):
         self.DeclareContinuousState(BasicVector(state))
         sources = {self.xc_ticket()}
         self.DeclareVectorOutputPort("signals", neurons // 2, self._calc_signals, sources)
-        self.DeclareVectorOutputPort("neurons", neurons, self._calc_neurons, sources)
+        u = oscillator.U
+        DeclareOutput(self, "neurons", neurons, lambda s, c: s._neurons(c)[:, u].clip(0.0), sources)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Rates of u and v (Eq. 7)."""
@@ -69,6 +71,3 @@ class MatsuokaCpg(LeafSystem):
         signals = output.get_mutable_value()
         oscillator.oscillator_output(self._neurons(context), signals)
         signals *= self._gain
-
-    def _calc_neurons(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(np.maximum(0.0, self._neurons(context)[:, oscillator.U]))

@@ -6,18 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.systems.framework import (
-    BasicVector,
-    Context,
-    DiscreteValues,
-    EventStatus,
-    LeafSystem,
-)
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
+from tetra_drake.systems.attachment import DeclareOutput
 
 Law = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of a robot to its signals (m,) in N."""
@@ -42,7 +37,7 @@ class HeldSignals(LeafSystem):
         self._size, self._change = robot.structure.signals, robot.scenario.cpg.listing_step
         self.DeclareDiscreteState(np.concatenate([robot.first_signals, robot.first_signals, [0.0]]))
         tickets = {self.xd_ticket(), self.time_ticket()}
-        self.DeclareVectorOutputPort("signals", self._size, self._calc_signals, tickets)
+        DeclareOutput(self, "signals", self._size, HeldSignals._signals, tickets)
 
     def Hold(self, context: Context, signals: np.ndarray) -> None:
         """Sets the signals (m,) in N from now on."""
@@ -59,9 +54,6 @@ class HeldSignals(LeafSystem):
         before, after = state[: self._size], state[self._size : -1]
         left = 1.0 - (context.get_time() - state[-1]) / self._change
         return after - left * (after - before) if left > 0.0 else after
-
-    def _calc_signals(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._signals(context))
 
 
 class SampledController(HeldSignals):

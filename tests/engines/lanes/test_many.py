@@ -5,16 +5,14 @@ import itertools
 import threading
 import time
 from concurrent.futures import CancelledError
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 import xarray
+from helpers.actuations import SIDES
 from helpers.anchored import HUNG, scenario_of
 
 from tetra_drake.engines.lanes.batch import LaneBatch, processor_lanes
-from tetra_drake.engines.lanes.dynamics import Solver
-from tetra_drake.engines.lanes.tables import shared
 from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
@@ -138,8 +136,7 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
 
 def scenarios_of_their_own(short: Scenario) -> list[Scenario]:
     """Rows of tetrahedra and structures, some of which walk side by side."""
-    sides = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
-    senses = sides | {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)}
+    senses = SIDES | {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)}
     changes = [
         {},
         {"robot.cables.outer_stiffness": "0.21 lbf/in"},
@@ -188,22 +185,9 @@ def test_robots_that_differ_in_numbers_alone_share_a_batch(short):
     moved = {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}
     for change in (stiff, wide, moved):
         assert batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
-    sides = [["outer bottom_left"], ["outer bottom_right"]]
-    others = {"tetrahedra": 3, "cables.slack": True, "contacts": "all", "actuation": sides}
-    for change in ({f"robot.{key}": value} for key, value in others.items()):
-        assert not batch.begin(1, walk_of(Robot.of(short.with_changes(change)))), change
-
-
-def test_a_table_of_indices_that_somebody_adds_is_part_of_the_kind(short):
-    """Else a kernel would take a robot whose indices lead elsewhere in its tables."""
-    solver = Solver.of(Robot.of(short).model)
-
-    class Added(NamedTuple):
-        solver: object
-        table: np.ndarray
-
-    one, same, other = (shared(Added(solver, np.array([index]))) for index in (1, 1, 2))
-    assert one == same != other
+    others = {"robot.tetrahedra": 3, "robot.cables.slack": True, "robot.contacts": "all"} | SIDES
+    for key, value in others.items():
+        assert not batch.begin(1, walk_of(Robot.of(short.with_changes({key: value})))), key
 
 
 def test_scenarios_and_gaits_have_to_fit(short):

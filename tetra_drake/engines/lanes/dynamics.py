@@ -90,17 +90,6 @@ def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tupl
     return turns[0], turns[1], turns[2], moves[0], moves[1], moves[2]
 
 
-@inlined
-def refer_torques(inertia_W: Table, inertia_now: Table, force: Table) -> None:
-    """Converts the torques in `force` (6 bodies,) from `inertia_now` to `inertia_W`: the angular
-    accelerations stay the same."""
-    for body in range(force.size // BLOCK):
-        i = BLOCK * body
-        torque = force[i], force[i + 1], force[i + 2]
-        acceleration = inertia.over_inertia(inertia_now, body, torque)
-        force[i], force[i + 1], force[i + 2] = inertia.times_inertia(inertia_W, body, acceleration)
-
-
 @merged
 def implicit_matrix(
     robot: Model,
@@ -139,27 +128,11 @@ def implicit_matrix(
         add_diagonal(forces.nodes, node, body, diagonal, blocks)
         across = damping * x * y, damping * x * z, damping * y * z
         add_off_diagonal(forces.nodes, node, body, across, blocks)
-    add_masses(robot, forces.inertia, blocks)
-    for i in range(robot.ground.contacts.size):
-        if any_lane(modes[i, contact.CONTACT] != 0.0):
-            add_contact(state, modes, forces, robot.ground, i, time, blocks)
-    anchors = robot.anchors
-    for i in range(anchors.nodes.size):
-        k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
-        c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
-        k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
-        add_diagonal(forces.nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
-
-
-@inlined
-def add_masses(robot: Model, inertia_W: Table, blocks: Table) -> None:
-    """Adds the mass matrix to the blocks. `inertia_W` is Forces.inertia."""
     for body in range(robot.bodies.mass.size):
-        mass = robot.bodies.mass[body]
+        mass, inertia_W = robot.bodies.mass[body], forces.inertia
         if robot.isotropic:
-            moment = robot.bodies.inertia[body, inertia.XX]
             for r in range(3):
-                blocks[body, r, r] += moment
+                blocks[body, r, r] += robot.bodies.inertia[body, inertia.XX]
         else:
             blocks[body, 0, 0] += inertia_W[body, inertia.XX]
             blocks[body, 1, 1] += inertia_W[body, inertia.YY]
@@ -169,6 +142,15 @@ def add_masses(robot: Model, inertia_W: Table, blocks: Table) -> None:
             blocks[body, 1, 2] += inertia_W[body, inertia.YZ]
         for r in range(3, BLOCK):
             blocks[body, r, r] += mass
+    for i in range(robot.ground.contacts.size):
+        if any_lane(modes[i, contact.CONTACT] != 0.0):
+            add_contact(state, modes, forces, robot.ground, i, time, blocks)
+    anchors = robot.anchors
+    for i in range(anchors.nodes.size):
+        k_x, k_y, k_z = vector_at(anchors.stiffness, i, 0)
+        c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
+        k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
+        add_diagonal(forces.nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
 
 
 @inlined

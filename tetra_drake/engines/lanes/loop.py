@@ -3,11 +3,11 @@
 All lanes do the same iteration: forces, prediction of the next mode change, signals, one step. If
 the step of a lane is rejected, the lane repeats it with a shorter step in the next iteration.
 
-The listing's network does not depend on the robot. It runs ahead in its own steps, and its signals
-are interpolated. (Signals computed beforehand, one lane at a time, would make one lane slower by a
-tenth, and eight lanes by a fifth.) A `live` network takes the same steps as the robot, by Heun's
-method. An explicit method is enough because the network is slow. ROS2 without its matrix is Heun's
-method, so both together are of order 2.
+The network of the thesis's listing does not depend on the robot. It runs ahead in its own steps,
+and its signals are interpolated. (If signals were computed beforehand, one lane at a time, one lane
+would be slower by a tenth, and eight lanes by a fifth.) A `live` network takes the same steps as
+the robot, by Heun's method. An explicit method is enough because the network is slow. ROS2 without
+its matrix is Heun's method, so both together are of order 2.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class Log(NamedTuple):
     """Times at which each simulation stops or is sampled, and its samples; a row per robot."""
 
     place: Annotated[Table, "lanes", int]
-    """Place of the simulation in each lane."""
+    """Row of these tables for the robot in each lane; see `places`."""
     marks: Annotated[Table, "places", "marks"]
     """Times (s) at which a step must end, ascending; infinite after the last."""
     passed: Annotated[Table, "places", int]
@@ -170,17 +170,25 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
         ended = pass_marks(constants, lanes, log, live)
     is_running = clock[STATUS] == RUNNING
 
-    arrive(constants, lanes)
+    # Modes and forces at the beginning of the step.
+    robot, forces, state = constants.robot, lanes.forces, lanes.step.state
+    move_robot(robot, state, forces)
+    for i in range(lanes.drives.shape[0]):
+        forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
+    contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
+    compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
+    observe(lanes.tally, robot, clock[TIME], lanes.signals, forces)
+
     step = select(is_running, aim(constants, lanes), 0.0)
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
     foresee_signals(constants, lanes, log, live)
-    drives, at_end = lanes.drives, lanes.forces.drives
+    drives, at_end = lanes.drives, forces.drives
     for i in range(drives.shape[0]):  # predicted, for the forces at the end of the step
         drives[i, actuator.RATE] = at_end[i, actuator.RATE]
         at_end[i, actuator.DRIVE] = drives[i, actuator.DRIVE] + step * drives[i, actuator.RATE]
-    robot, solver, signals = constants.robot, constants.solver, lanes.end_signals
-    error = take_step(robot, solver, lanes.step, lanes.modes, lanes.forces, signals, step, live)
+    solver, signals = constants.solver, lanes.end_signals
+    error = take_step(robot, solver, lanes.step, lanes.modes, forces, signals, step, live)
     for i in range(drives.shape[0]):  # corrected, with the mean of the rates at both ends
         rate = 0.5 * (drives[i, actuator.RATE] + at_end[i, actuator.RATE])
         lanes.end_drives[i] = drives[i, actuator.DRIVE] + step * rate
@@ -204,18 +212,6 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     ended |= any_lane(status != clock[STATUS])
     clock[STATUS] = status
     return ended
-
-
-@inlined
-def arrive(constants: Constants, lanes: LaneState) -> None:
-    """Computes modes and forces at the beginning of the step, and adds them to the tally."""
-    robot, forces, state = constants.robot, lanes.forces, lanes.step.state
-    move_robot(robot, state, forces)
-    for i in range(lanes.drives.shape[0]):
-        forces.drives[i, actuator.DRIVE] = lanes.drives[i, actuator.DRIVE]
-    contact.update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
-    compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
-    observe(lanes.tally, robot, lanes.clock[TIME], lanes.signals, forces)
 
 
 @inlined
@@ -270,7 +266,7 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def fate(constants: Constants, lanes: LaneState) -> Real:
-    """Status of each lane after a step. Lanes that do not run have one, too."""
+    """Status of each lane after a step: running or failed. Only lanes that run use it."""
     state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):

@@ -59,13 +59,14 @@ is live."""
 
 @functools.partial(compiled, nogil=True)
 def advance(parts: LaneParts, rounds: int) -> None:
-    """Simulates until a robot has ended and no robot waits, at most `rounds`. A robot has ended at
-    its pause, or failed. The last round is cut short if no robot is left.
+    """Simulates the robots in the lanes for a number of rounds of ROUND steps.
 
-    The robots that wait at first begin together with a round, so that their clearances are due
-    together.
+    Returns earlier if no robot is left, or after a round if a robot has ended and no robot waits. A
+    robot has ended at its pause, or if it has failed. The robots that wait at first begin together
+    with a round, so that their clearances are due together.
     """
     constants, lanes, log, _, places, readings, live = unpacked(parts)
+    clock, robot, state = lanes.clock, constants.robot, lanes.step.state
     exchange(parts)
     for _ in range(rounds):
         ended = False
@@ -73,7 +74,17 @@ def advance(parts: LaneParts, rounds: int) -> None:
             has_ended = loop.iterate(constants, lanes, log, live)
             if has_ended:
                 read_paused(lanes, log, readings)
-            measure_clearance(constants, lanes)
+
+            # The clearance is due after each ROUND steps, and at the end of a motion.
+            rounds = clock[loop.TRIED] * (1.0 / ROUND)
+            is_due = (clock[loop.STATUS] == loop.RUNNING) & (rounds == floor(rounds))
+            is_due |= (clock[loop.STATUS] == loop.DONE) & (clock[loop.DUE] == math.inf)
+            if any_lane(is_due):
+                before = lanes.tally.clearance[0]
+                move_robot(robot, state, lanes.forces)
+                update_clearance(lanes.tally, robot, state, lanes.forces.nodes)
+                lanes.tally.clearance[0] = select(is_due, lanes.tally.clearance[0], before)
+
             if has_ended:
                 ended = True
                 exchange(parts)
@@ -83,26 +94,12 @@ def advance(parts: LaneParts, rounds: int) -> None:
             return
 
 
-@inlined
-def measure_clearance(constants: Constants, lanes: LaneState) -> None:
-    """Updates the clearance of robots after each ROUND steps, and at the end of their motion."""
-    clock, robot, state = lanes.clock, constants.robot, lanes.step.state
-    rounds = clock[loop.TRIED] * (1.0 / ROUND)
-    is_due = (clock[loop.STATUS] == loop.RUNNING) & (rounds == floor(rounds))
-    is_due |= (clock[loop.STATUS] == loop.DONE) & (clock[loop.DUE] == math.inf)
-    if not any_lane(is_due):
-        return
-    before = lanes.tally.clearance[0]
-    move_robot(robot, state, lanes.forces)
-    update_clearance(lanes.tally, robot, state, lanes.forces.nodes)
-    lanes.tally.clearance[0] = select(is_due, lanes.tally.clearance[0], before)
-
-
 @functools.partial(compiled, nogil=True)
 def exchange(parts: LaneParts) -> None:
-    """Puts robots that have ended back to their places, and robots that wait in idle lanes."""
+    """Moves robots that have ended from their lanes back to the tables, and waiting robots from the
+    tables to idle lanes."""
     constants, lanes, log, memory, places, _, _ = unpacked(parts)
-    clock, queue = by_lane(lanes.clock), places.queue
+    clock, held, queue = by_lane(lanes.clock), by_lane(lanes.signals), places.queue
     searched = by_lane(lanes.forces.near_struts.p_WN)
     for lane in range(log.place.size):
         if clock[loop.STATUS, lane] == loop.RUNNING:
@@ -123,32 +120,25 @@ def exchange(parts: LaneParts) -> None:
             clock[loop.STATUS, lane] = loop.RUNNING
             for node in range(searched.shape[0]):
                 searched[node, 0, lane] = math.inf  # so that near struts are searched
-            if places.holds[place] == 1:
-                hold(constants, lanes, log, lane, places)
-
-
-@inlined
-def hold(constants: Constants, lanes: LaneState, log: Log, lane: int, places: Places) -> None:
-    """Appends the new signals of the robot in a lane to its samples.
-
-    The robot is at a multiple of the listing's step. The signals change within a step, which begins
-    now; the signals of a whole command change in the same way.
-    """
-    place, clock, held = log.place[lane], by_lane(lanes.clock), by_lane(lanes.signals)
-    now = int(clock[loop.TIME, lane] / by_lane(constants.period)[0, lane] + 0.5)
-    for k in range(held.shape[0]):
-        log.recent[place, loop.row_of(now - 1, log), k] = held[k, lane]
-        log.recent[place, loop.row_of(now, log), k] = held[k, lane]
-        log.recent[place, loop.row_of(now + 1, log), k] = places.signals[place, k]
-    clock[loop.SAMPLES, lane] = now + 2.0
-    places.holds[place] = 0
+            if places.holds[place] == 0:
+                continue
+            # New signals become samples. The robot is at a multiple of the listing's step. As in a
+            # whole command, the signals change linearly within the next step.
+            now = int(clock[loop.TIME, lane] / by_lane(constants.period)[0, lane] + 0.5)
+            for k in range(held.shape[0]):
+                log.recent[place, loop.row_of(now - 1, log), k] = held[k, lane]
+                log.recent[place, loop.row_of(now, log), k] = held[k, lane]
+                log.recent[place, loop.row_of(now + 1, log), k] = places.signals[place, k]
+            clock[loop.SAMPLES, lane] = now + 2.0
+            places.holds[place] = 0
 
 
 @inlined
 def read_paused(lanes: LaneState, log: Log, to: Readings) -> None:
     """Writes the readings of robots that have reached their pause to the rows of their places.
 
-    Call it before measure_clearance(), which moves the nodes of all lanes: last digits differ.
+    Call it before the clearance is computed: this moves the nodes of all lanes, and last digits
+    differ.
     """
     clock = by_lane(lanes.clock)
     state, nodes = by_lane(lanes.step.state), by_lane(lanes.forces.nodes)

@@ -47,7 +47,7 @@ from tetra_drake.engines.lanes.touching import (
 from tetra_drake.kernels.compiling import inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, select
 from tetra_drake.laws.forces import Forces, compute_forces, move_robot
-from tetra_drake.laws.inertia import INERTIA_COLUMNS
+from tetra_drake.laws.inertia import INERTIA_COLUMNS, over_inertia, times_inertia
 from tetra_drake.laws.kinematics import P_BN_W, move_bodies
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.vectors import Vector3, cross, vector_at
@@ -148,11 +148,17 @@ def compute_end_forces(
     robot: Model, work: StepMemory, modes: Table, forces: Forces, signals: Table, write_parts: bool
 ) -> None:
     """Writes work.end_force: the forces at work.end. Torques are converted to the mass matrix at
-    the beginning of the step."""
+    the beginning of the step: the angular accelerations stay the same."""
+    force = work.end_force
     move_robot(robot, work.end, forces)
-    compute_forces(robot, work.end, modes, signals, write_parts, forces, work.end_force)
-    if not robot.isotropic:
-        dynamics.refer_torques(work.inertia, forces.inertia, work.end_force)
+    compute_forces(robot, work.end, modes, signals, write_parts, forces, force)
+    if robot.isotropic:
+        return
+    for body in range(force.size // BLOCK):
+        i = BLOCK * body
+        torque = force[i], force[i + 1], force[i + 2]
+        acceleration = over_inertia(forces.inertia, body, torque)
+        force[i], force[i + 1], force[i + 2] = times_inertia(work.inertia, body, acceleration)
 
 
 @inlined
@@ -185,7 +191,7 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
 
 @inlined
 def motion_at(nodes: Table, row: int, turn: Vector3) -> Real:
-    """Largest component of the motion of a row of `nodes` as its body turns."""
+    """Largest component of turn x p, with the vector p from a body's origin to a row of `nodes`."""
     x, y, z = cross(turn, vector_at(nodes, row, P_BN_W))
     return larger(larger(abs(x), abs(y)), abs(z))
 

@@ -45,10 +45,10 @@ class Touching(NamedTuple):
 def add_touching(
     robot: Model, schedule: Schedule, forces: Forces, time: Real, blocks: Table, touching: Touching
 ) -> None:
-    """Writes `touching` for the contacts of struts in the state of `forces`.
+    """Computes the contacts of struts for the implicit matrix, in the state of `forces`.
 
     `blocks` is the factorised matrix without them, `time` is in s. Forces on nodes are overwritten.
-    Each lane has places for its own contacts, so that it does not depend on the other lanes.
+    Each lane numbers its own contacts, so that it does not depend on the other lanes.
     """
     near, nodes, vector = forces.near_struts, forces.nodes, touching.vector
     law = named(contact.NormalForce, robot.strut_contact.normal)
@@ -84,8 +84,10 @@ def add_touching(
 def put_contact(
     touching: Touching, takes_place: Truth, place: Real, spring: Real, damping: Real
 ) -> None:
-    """Puts the contact along `touching.vector` into a place of its own in each lane that takes it.
-    Its weight w is `spring` + `damping`."""
+    """Stores a contact in lanes where `takes_place`, as contact number `place` of the lane.
+
+    Its vector g is `touching.vector`, and its weight w is `spring` + `damping`.
+    """
     size = touching.vector.size
     count = touching.count[0]
     if any_lane(takes_place & (place == count)):
