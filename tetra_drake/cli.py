@@ -127,12 +127,12 @@ _COMMAND = "a file of actuator commands (CSV) instead, as `export` writes"
 _ENGINE = "drake (the diagram), compiled (the same laws), or mujoco (default: the scenario's)"
 
 FitPath = Annotated[Path, Option(metavar="FIT", type=Path)]
-ScenarioName = Annotated[str, Option(help=_SCENARIO, metavar="NAME|FILE")]
-GaitPath = Annotated[Path, Option(help=_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
-GaitSeed = Annotated[Seed, Option(help=_SEED, group="gait")]
-CommandFile = Annotated[File, Option(help=_COMMAND, group="gait")]
-EngineName = Annotated[str, Option(help=_ENGINE, metavar="NAME")]
-StructureName = Annotated[str, Option(help=_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
+ScenarioName = Annotated[str, Option(_SCENARIO, metavar="NAME|FILE")]
+GaitPath = Annotated[Path, Option(_GAIT, metavar="FILE|RUN", type=Path, group="gait")]
+GaitSeed = Annotated[Seed, Option(_SEED, group="gait")]
+CommandFile = Annotated[File, Option(_COMMAND, group="gait")]
+EngineName = Annotated[str, Option(_ENGINE, metavar="NAME")]
+StructureName = Annotated[str, Option(_STRUCTURE, metavar="NAME|FILE|SCENARIO")]
 
 
 def _simulate(

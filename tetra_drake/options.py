@@ -1,6 +1,6 @@
 """Commands as functions: each parameter of a function is an option of its command.
 
-    Seed = Annotated[int, Option(help="random seed", metavar="N", type=partial(integer, least=0))]
+    Seed = Annotated[int, Option("random seed", metavar="N", type=partial(integer, least=0))]
 
     def play(gait: File, *, seed: Seed = 0) -> None:
 
@@ -26,9 +26,12 @@ from tetra_drake.settings.units import quantity_to_si
 BAD_INPUT = 2  # exit status
 
 
-class Option(dict[str, Any]):
-    """Annotation of a parameter's type: arguments of argparse's add_argument(). Options with the
-    same `group` exclude each other."""
+class Option:
+    """Annotation of a parameter's type: help and other arguments of argparse's add_argument().
+    Options with the same `group` exclude each other."""
+
+    def __init__(self, help: str = "", *, group: str = "", **arguments: Any) -> None:
+        self.arguments = {"help": help, "group": group, **arguments}
 
 
 class Parser(argparse.ArgumentParser):
@@ -89,7 +92,7 @@ def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[s
     more: dict[str, Any] = {"help": "", "group": ""}
     for part in (kind, *typing.get_args(kind)):
         for option in getattr(part, "__metadata__", ()):
-            more |= option
+            more |= option.arguments
     more["help"] = f"{more['help']} {text}".strip()
     group = more.pop("group")
     is_required = default is parameter.empty

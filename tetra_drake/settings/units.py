@@ -98,11 +98,10 @@ def fitting(lengths: tuple[float, ...]) -> Units:
     lengths are round in no unit, as in a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
-
-    def digits(units: Units) -> int:
-        return sum(min(_MANY, _digits(length / units.length)) for length in long)
-
-    return min(SYSTEMS.values(), key=digits)
+    return min(
+        SYSTEMS.values(),
+        key=lambda units: sum(min(_MANY, _digits(length / units.length)) for length in long),
+    )
 
 
 _MANY = 6
