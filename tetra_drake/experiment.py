@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING
 
 from tetra_drake.engines.simulate import check_scenario
-from tetra_drake.errors import InputError, SimulationFailure, check_whole
+from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
@@ -91,7 +92,8 @@ def evolve(
     for name, value, least in (("seed", seed, 0), ("workers", workers, 1)):
         if value is not None:
             check_whole("evolve", name, value, least=least)
-    _check_functions("evolve", optimizer=optimizer, objective=objective)
+    for name, function in (("optimizer", optimizer), ("objective", objective)):
+        check_type("evolve", name, function, Callable, NoneType)
     make_executor = maker_of(executor)
     if progress is True:
         progress = Display(sys.stdout)
@@ -190,7 +192,7 @@ def fit(
     from tetra_drake.study.fit import fit_values, save_fit
     from tetra_drake.study.fit_problem import KEPT_EVALUATIONS
 
-    _check_functions("fit", say=say)
+    check_type("fit", "say", say, Callable)
     folder = None if out is None else given_path(out, "fit", "out")
     if folder is not None:
         check_folder(folder)
@@ -208,13 +210,6 @@ def fit(
     if folder is not None:
         save_fit(found, folder)
     return found
-
-
-def _check_functions(source: str, **given: object) -> None:
-    """Raises InputError, naming function `source`, for an argument that cannot be called."""
-    for name, value in given.items():
-        if value is not None and not callable(value):
-            raise InputError(source, name, f"found {value!r:.60}, expected a function")
 
 
 def _simulate_again(

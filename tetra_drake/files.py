@@ -84,8 +84,8 @@ def given_path(path: str | Path, source: str, what: str) -> Path:
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """Names for files or folders, by names that may be any texts, such as those from a file. They
-    are no paths, and different even where upper and lower case are the same."""
+    """Names of files or folders for any texts, by text. They are no paths, and different even where
+    upper and lower case are the same."""
     found: dict[str, str] = {}
     for name in names:
         taken = {other.casefold() for other in found.values()}

@@ -82,7 +82,7 @@ class _Episodes:
         render_mode: str | None,
         most_steps: int | None = None,
     ) -> None:
-        """Robots that have no episodes yet. An episode has at most `most_steps`."""
+        """Makes robots without episodes. An episode has at most `most_steps`."""
         check_type(_SOURCE, "grouped", grouped, bool)
         if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"

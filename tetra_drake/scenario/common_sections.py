@@ -95,7 +95,7 @@ class EvolutionSection(Section):
 
 
 def separate(joined: str) -> list[str]:
-    """Splits a key of `spreads` at its commas into scenario keys."""
+    """Scenario keys in a key that joins them by commas, such as "cpg.gain, robot.density"."""
     return [key.strip() for key in joined.split(",")]
 
 
@@ -130,8 +130,3 @@ class Disturbances(Section):
     tail: float = Field(default=1.0, gt=0, le=1)
     """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
     at risk). 1 is the mean over all draws. At least one draw counts."""
-
-
-def by_separate_key(by_joined: Mapping[str, Value]) -> dict[str, Value]:
-    """Values by scenario key, from values for joined keys."""
-    return {key: value for joined, value in by_joined.items() for key in separate(joined)}

@@ -37,8 +37,8 @@ class Poses:
     """
 
     markers: np.ndarray
-    """Positions (3, markers, 3) of the points whose motion is shown; see Blueprint.markers. The
-    first is T1's bottom left node, or the centre of mass."""
+    """Positions (3, markers, 3), by time, marker and axis, of the points whose motion is shown; see
+    Blueprint.markers. The first is T1's bottom left node, or the centre of mass."""
     centre: np.ndarray
     """Positions (3, 3) of the centre of mass."""
     tip: np.ndarray
@@ -233,8 +233,8 @@ UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
 
 def wrong_metric(metrics: Mapping[str, Any]) -> str:
-    """Name of the first of some metrics in the form of Metrics.to_json() that is of another type
-    there; "" if there is none."""
+    """Name of the first metric whose value has a wrong type; "" if there is none. The values are in
+    the form of Metrics.to_json()."""
     for name, value in metrics.items():
         numbers = value if name == "lifted_shares" else [value]
         kinds = float if name == "lifted_shares" else float | None

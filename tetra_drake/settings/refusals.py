@@ -98,8 +98,8 @@ def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, T
 
 
 def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
-    """Types of a value's part, which pydantic names by key, index or tag. `members` are the types
-    of the value, which also stand for any other name."""
+    """Types of a part of a value, which pydantic names by key, index or tag. For any other name,
+    they are `members`, the types of the value."""
     for member in members:
         if member.get("title") == f"!{part}":
             return [member]
@@ -129,7 +129,8 @@ def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str
 
 
 def joined(key: str, inner: str) -> str:
-    """Dotted key of an inner key, such as "robot.gravity", or "pairs[0]" for "[0]" in "pairs"."""
+    """Dotted key of a key in a section: "robot.gravity" for "gravity" in "robot", or "pairs[0]" for
+    "[0]" in "pairs"."""
     return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 

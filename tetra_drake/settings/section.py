@@ -81,7 +81,7 @@ def attribute_docstrings(owner: type) -> dict[str, str]:
 
 @functools.cache
 def _classes_of(module: str) -> list[ast.ClassDef]:
-    """Classes of a module. For a single class, inspect parses the whole module, too."""
+    """Syntax trees of a module's classes. inspect would parse the module for each class."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return [node for node in tree.body if isinstance(node, ast.ClassDef)]
 
@@ -154,7 +154,7 @@ class Section(BaseModel):
 
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
-        """All lengths (m) in the section. A copy with disturbed numbers keeps them."""
+        """All lengths (m) in the section. A copy with disturbed numbers keeps the original ones."""
         numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
 
@@ -175,8 +175,8 @@ SI."""
 
 
 class Kinds:
-    """Annotation of a union of sections that a tag tells apart, such as `!Coulomb`. A mapping
-    without a tag is of the first kind."""
+    """Annotation of a union of sections. In a file, a tag such as `!Coulomb` gives the kind of a
+    mapping; a mapping without a tag is of the first kind."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
@@ -271,7 +271,8 @@ def value_at(tree: Any, key: str) -> Any:
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
-    """Copy of a tree for a file: `show` makes texts of the quantities."""
+    """Copy of a tree for a file. `show` makes texts of the quantities, by default exact ones in
+    SI."""
     return mapped(
         value, lambda part: show(float(part), part.unit) if isinstance(part, Quantity) else part
     )

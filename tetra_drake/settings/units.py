@@ -94,8 +94,8 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def fitting(lengths: tuple[float, ...]) -> Units:
-    """The units that need the fewest digits for the long ones among lengths (m); metric ones if the
-    lengths are round in no unit, as in a turned robot."""
+    """Units in which lengths (m) need the fewest digits; short ones do not count. They are metric
+    if the lengths are round in no unit, as in a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
     return min(
