@@ -117,7 +117,7 @@ def test_a_run_stands_for_its_scenario_and_its_best_gait():
         (lambda: td.robustness("quick", {}, draws="3"), ("robustness", "draws")),
         (lambda: td.robustness("quick", {}, percent="3"), ("robustness", "percent")),
         (lambda: td.robustness("quick", "gait.json"), ("robustness", "gaits")),
-        (lambda: td.export("runs/demo", "runs/demo", "new", rate="3"), ("export", "rate")),
+        (lambda: td.export("quick", td.seeded_gait("quick"), "a", rate="3"), ("export", "rate")),
         (lambda: td.ParameterSpace.of("quick").repair([1.0]), ("ParameterSpace", "vector")),
         (lambda: td.ParameterSpace.of("quick").gait([-1.0] * 26, name="g"), ("gait g", "")),
     ],

@@ -94,7 +94,7 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def fitting(lengths: tuple[float, ...]) -> Units:
-    """Units in which lengths (m) need the fewest digits; short ones do not count. They are metric
+    """Units that give lengths (m) the fewest digits; short ones do not count. They are metric
     if the lengths are round in no unit, as in a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
