@@ -1,4 +1,4 @@
-"""What several test modules start from."""
+"""Fixtures of several test modules."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -31,7 +31,7 @@ def scenario() -> Scenario:
 
 @pytest.fixture
 def structure(scenario: Scenario) -> Structure:
-    """That of the thesis's robot."""
+    """Structure of the thesis's robot."""
     return Robot.of(scenario).structure
 
 

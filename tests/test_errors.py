@@ -5,12 +5,10 @@ import pytest
 from tetra_drake.errors import InputError
 
 LONG = 100_000 * "x"
+PROBLEMS = {f"found '{LONG}', expected a number": "', expected a number", "word " * 20_000: "word"}
 
 
-@pytest.mark.parametrize(
-    ("problem", "kept"),
-    [(f"found '{LONG}', expected a number", "', expected a number"), ("word " * 20_000, "word")],
-)
+@pytest.mark.parametrize(("problem", "kept"), PROBLEMS.items(), ids=["quotation", "words"])
 def test_little_is_quoted_of_what_is_long(problem, kept):
     error = InputError(LONG[:4000], LONG, problem)
     place, key, told = str(error).split(": ")

@@ -110,15 +110,14 @@ def little_room():
         signal.signal(signal.SIGXFSZ, before)
 
 
-def big_dataset(path):
-    values = np.random.default_rng(0).normal(size=4096)
-    save_dataset(xarray.Dataset({"a": ("time", values)}), path)
+LARGE = xarray.Dataset({"a": ("time", np.random.default_rng(0).normal(size=4096))})
+WRITERS = {
+    "a.html": lambda path: write_whole(path, 5000 * "x"),
+    "a.nc": lambda path: save_dataset(LARGE, path),
+}
 
 
-@pytest.mark.parametrize(
-    ("name", "write"),
-    [("a.html", lambda path: write_whole(path, 5000 * "x")), ("a.nc", big_dataset)],
-)
+@pytest.mark.parametrize(("name", "write"), WRITERS.items(), ids=WRITERS)
 def test_a_full_disk_is_told_in_a_line_and_the_old_file_kept(tmp_path, refused, name, write):
     file = tmp_path / name
     file.write_text("old")

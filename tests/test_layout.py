@@ -92,6 +92,7 @@ HEAVY = {"pydrake", "numba", "scipy", "cma", "ribs", "pandas", "xarray", "matplo
     [
         ("tetra_drake", HEAVY | {"numpy"}),
         ("tetra_drake.cli", HEAVY | {"numpy", "pydantic"}),
+        ("tetra_drake.experiment", HEAVY - {"pydrake", "numba", "scipy"}),
         # And so evaluators, which every worker imports.
         ("tetra_drake.evolution.trials", HEAVY - {"numba", "scipy"}),
     ],

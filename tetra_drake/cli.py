@@ -8,6 +8,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from tetra_drake.scenario.scenario import Scenario
 
 FAILED, INTERRUPTED = 1, 130  # exit statuses beside BAD_INPUT
+
+_say = partial(print, flush=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -91,8 +94,8 @@ def make_parser() -> Parser:
 
 Folder = Annotated[Path, Option(metavar="DIR", type=Path)]
 File = Annotated[Path, Option(metavar="FILE", type=Path)]
-Count = Annotated[int, Option(metavar="N", type=integer(1))]
-Seed = Annotated[int, Option(metavar="N", type=integer(0))]
+Count = Annotated[int, Option(metavar="N", type=partial(integer, least=1))]
+Seed = Annotated[int, Option(metavar="N", type=partial(integer, least=0))]
 Rate = Annotated[
     float, Option(metavar="RATE", type=quantity("Hz", "100 Hz", least="0.001 Hz", most="1 MHz"))
 ]
@@ -105,9 +108,9 @@ Width = Annotated[
 ]
 UnitName = Annotated[str, Option(metavar="UNIT")]
 Size = Annotated[tuple[int, int], Option(metavar="WxH", type=size)]
-FontSize = Annotated[float, Option(metavar="X", type=number(2, 40))]
-FrameRate = Annotated[float, Option(metavar="X", type=number(0.01, 240))]
-PlaybackSpeed = Annotated[float, Option(metavar="X", type=number(0.001, 1000))]
+FontSize = Annotated[float, Option(metavar="X", type=partial(number, least=2, most=40))]
+FrameRate = Annotated[float, Option(metavar="X", type=partial(number, least=0.01, most=240))]
+PlaybackSpeed = Annotated[float, Option(metavar="X", type=partial(number, least=0.001, most=1000))]
 View = Annotated[str, Option(choices=("free", "side", "front", "top"))]
 Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
 Labels = Annotated[list[str], Option(metavar="NAME", nargs="+")]
@@ -658,10 +661,6 @@ def _chosen_gait(
         return chosen, seeded_gait(chosen, WALKING_SEED if seed is None else seed)
     source = load_source(gait, scenario=scenario, warn=_warn)
     return source.scenario.on_engine(engine), source.best
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
 
 
 def _warn(text: str) -> None:

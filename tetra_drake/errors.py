@@ -6,13 +6,23 @@ import functools
 import math
 import numbers
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import NoneType
 from typing import Any, Self
 
 _LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 270, 60, 200, 4096
 """Largest number of characters of key and problem; if they have more, of a key or a quotation, and
 of a problem; of a source."""
-_IN_WORDS = {bool: "True or False", str: "a text", list: "a list", Sequence: "a list"}
+_IN_WORDS = {
+    bool: "True or False",
+    str: "a text",
+    list: "a list",
+    Sequence: "a list",
+    Mapping: "a mapping",
+    Callable: "a function",
+    NoneType: "None",
+    numbers.Real: "a number",
+}
 
 
 class InputError(ValueError):
@@ -52,7 +62,7 @@ def _cut(text: str, length: int) -> str:
 def check_whole(
     source: object, key: str, number: Any, *, least: int, most: int | None = None
 ) -> int:
-    """A whole number. Raises InputError unless it is one, and from `least` to `most`."""
+    """A number as int. Raises InputError unless it is a whole number from `least` to `most`."""
     is_whole = isinstance(number, numbers.Integral) and not isinstance(number, bool)
     if not is_whole or number < least or (most is not None and number > most):
         limits = f"{least} or more" if most is None else f"{least} to {most}"
@@ -60,9 +70,10 @@ def check_whole(
     return int(number)
 
 
-def check_type(source: object, key: str, value: object, *kinds: type) -> None:
-    """Raises InputError unless a value is of one of the kinds."""
-    if not isinstance(value, kinds):
+def check_type(source: object, key: str, value: object, *kinds: Any) -> None:
+    """Raises InputError unless a value is of one of the kinds. True and False are no numbers."""
+    is_truth = isinstance(value, bool) and bool not in kinds
+    if is_truth or not isinstance(value, kinds):
         expected = " or ".join(_IN_WORDS.get(kind, kind.__name__) for kind in kinds)
         raise InputError(source, key, f"found {value!r:.60}, expected {expected}")
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import NoneType
+from typing import TYPE_CHECKING
 
 from tetra_drake.engines.simulate import check_scenario
-from tetra_drake.errors import InputError, SimulationFailure, check_whole
+from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.cluster import GivenExecutor, maker_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
-from tetra_drake.evolution.manifest import Manifest, Method, RunRecord, read_manifest
+from tetra_drake.evolution.manifest import Method, RunRecord, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
@@ -27,10 +29,11 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import SCENARIO, GivenScenario, given_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.study.elites import judge_elites
-from tetra_drake.study.fit import Fit, fit_values, save_fit
-from tetra_drake.study.fit_problem import KEPT_EVALUATIONS, Bounds
-from tetra_drake.study.measurements import Measurement
+
+if TYPE_CHECKING:
+    from tetra_drake.study.fit import Fit
+    from tetra_drake.study.fit_problem import Bounds
+    from tetra_drake.study.measurements import Measurement
 
 
 def evolve(
@@ -89,7 +92,8 @@ def evolve(
     for name, value, least in (("seed", seed, 0), ("workers", workers, 1)):
         if value is not None:
             check_whole("evolve", name, value, least=least)
-    _check_functions("evolve", optimizer=optimizer, objective=objective)
+    for name, function in (("optimizer", optimizer), ("objective", objective)):
+        check_type("evolve", name, function, Callable, NoneType)
     make_executor = maker_of(executor)
     if progress is True:
         progress = Progress(sys.stdout)
@@ -125,23 +129,26 @@ def evolve(
     with record, progress:
         count = getattr(make_executor, "workers", workers or available_cores())
         drawing = f"tetra-drake figures {shlex.quote(str(out))}"
-        progress.say(_introduction(out, record.manifest, count, drawing=drawing if report else ""))
-        for warning in _warnings(record.manifest, is_new=not resume):
-            progress.warn(warning)
+        _introduce(progress, record, count, drawing=drawing if report else "", is_new=not resume)
         trials = open_trials(record, optimizer=optimizer)
         progress.show([trial.status for trial in trials])
         if any(trial.unevaluated for trial in trials) or (resume and objective is not None):
             evaluate = GaitEvaluation(scenario, objective)
             with evaluator_of(
                 evaluate, workers=workers, executor=make_executor, warn=progress.warn
-            ) as evaluator:
+            ) as submit:
                 if resume:
-                    check_fitness(trials, out, evaluator)
-                run_trials(trials, evaluator, show=progress.show)
+                    check_fitness(trials, out, submit)
+                run_trials(trials, submit, show=progress.show)
         if record.manifest.reevaluate if reevaluate is None else reevaluate:
             _simulate_again(record, objective, workers, make_executor, progress)
         if report:
-            _report(out, progress, drawing=drawing)
+            failing = f"the report was not written; try again with: {drawing}"
+            with _completing(progress, failing):
+                from tetra_drake.report.run_page import write_report
+
+                progress.say("drawing figures and the report")
+                write_report(out)
     return load_run(out)
 
 
@@ -182,7 +189,10 @@ def fit(
     Raises:
         InputError: names what cannot be used.
     """
-    _check_functions("fit", say=say)
+    from tetra_drake.study.fit import fit_values, save_fit
+    from tetra_drake.study.fit_problem import KEPT_EVALUATIONS
+
+    check_type("fit", "say", say, Callable)
     folder = None if out is None else given_path(out, "fit", "out")
     if folder is not None:
         check_folder(folder)
@@ -202,13 +212,6 @@ def fit(
     return found
 
 
-def _check_functions(source: str, **given: object) -> None:
-    """Raises InputError, naming function `source`, for an argument that cannot be called."""
-    for name, value in given.items():
-        if value is not None and not callable(value):
-            raise InputError(source, name, f"found {value!r:.60}, expected a function")
-
-
 def _simulate_again(
     record: RunRecord,
     objective: Objective | None,
@@ -218,6 +221,8 @@ def _simulate_again(
 ) -> None:
     """Evaluates the best gaits on the Drake diagram, unless it was the engine of the run. Simulates
     the gaits of a map on disturbed robots."""
+    from tetra_drake.study.elites import judge_elites
+
     directory = record.directory
     if record.manifest.scenario.engine_name != "drake":
         with _completing(progress, "the best gaits were not evaluated on the Drake diagram"):
@@ -239,9 +244,12 @@ def _completing(progress: Progress, failing: str) -> Iterator[None]:
         progress.warn(f"{failing}: {cause}")
 
 
-def _introduction(directory: Path, manifest: Manifest, workers: object, *, drawing: str) -> str:
-    """Introduction to a run: method, scenario, and the files to come. `drawing` is the command that
-    draws them; empty for none."""
+def _introduce(
+    progress: Progress, record: RunRecord, workers: object, *, drawing: str, is_new: bool
+) -> None:
+    """Shows the method, the scenario and the files to come; `drawing` is the command that draws
+    them, empty for none. Warns of other versions, and of what in the robot hardly works."""
+    directory, manifest = record.directory, record.manifest
     text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
     text += str(manifest.scenario)
     if drawing:
@@ -249,26 +257,15 @@ def _introduction(directory: Path, manifest: Manifest, workers: object, *, drawi
             f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "
             f"{directory / 'report.html'}; at any time before: {drawing}"
         )
-    return text
+    progress.say(text)
 
-
-def _warnings(manifest: Manifest, *, is_new: bool) -> Iterator[str]:
-    """Warnings before a search: other versions, and what in the robot hardly works."""
     if others := manifest.other_versions:
-        yield (
+        progress.warn(
             f"the run was begun with {', '.join(others)}; with other versions its record may "
             "differ from the record of an uninterrupted run"
         )
     if is_new:
         robot = Robot.of(manifest.scenario)
-        remarks = start_up_remark(robot), gain_remark(robot), sinking_remark(robot)
-        yield from filter(None, remarks)
-
-
-def _report(directory: Path, progress: Progress, *, drawing: str) -> None:
-    """Writes the report of a run. `drawing` is the command that does so again."""
-    from tetra_drake.report.run_page import write_report
-
-    with _completing(progress, f"the report was not written; try again with: {drawing}"):
-        progress.say("drawing figures and the report")
-        write_report(directory)
+        for remark in (start_up_remark(robot), gain_remark(robot), sinking_remark(robot)):
+            if remark:
+                progress.warn(remark)

@@ -39,7 +39,14 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     _check_no_other(path)
     make_folder(path.parent, source=path)
     with writing(path):
-        _remove_stale(path)
+        ours = re.compile(rf"\.{re.escape(path.stem)}\.(\d+)\.\w{{8}}{re.escape(path.suffix)}")
+        for match in filter(None, map(ours.fullmatch, os.listdir(path.parent))):
+            try:
+                os.kill(int(match[1]), 0)
+            except PermissionError:
+                pass  # a process of another user
+            except (OSError, OverflowError):
+                (path.parent / match[0]).unlink(missing_ok=True)
         handle, name = tempfile.mkstemp(
             dir=path.parent, prefix=f".{path.stem}.{os.getpid()}.", suffix=path.suffix
         )
@@ -68,18 +75,6 @@ def writing(path: str | Path) -> Iterator[None]:
         raise InputError(path, "", f"cannot be written: {_reason(error)}") from error
 
 
-def _remove_stale(path: Path) -> None:
-    """Removes temporary files for `path` that belong to processes that have ended."""
-    ours = re.compile(rf"\.{re.escape(path.stem)}\.(\d+)\.\w{{8}}{re.escape(path.suffix)}")
-    for match in filter(None, map(ours.fullmatch, os.listdir(path.parent))):
-        try:
-            os.kill(int(match[1]), 0)
-        except PermissionError:
-            pass  # a process of another user
-        except (OSError, OverflowError):
-            (path.parent / match[0]).unlink(missing_ok=True)
-
-
 def given_path(path: str | Path, source: str, what: str) -> Path:
     """Converts an argument to a Path. Raises InputError, naming function `source` and argument
     `what`, if it is neither a text nor a Path."""
@@ -89,8 +84,8 @@ def given_path(path: str | Path, source: str, what: str) -> Path:
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """Names for files or folders, by names that may be any texts, such as those from a file. They
-    are no paths, and different even where upper and lower case are the same."""
+    """Names of files or folders for any texts, by text. They are no paths, and different even where
+    upper and lower case are the same."""
     found: dict[str, str] = {}
     for name in names:
         taken = {other.casefold() for other in found.values()}

@@ -104,36 +104,32 @@ class TextTable:
         return [column in self.text_columns for column in range(len(self.headings))]
 
     def text(self) -> str:
-        """The table as aligned lines. Texts and headings are folded where the table is wider than
-        the terminal; numbers never are."""
-        widths, lines = self._widths(shutil.get_terminal_size((_WIDTH, 24)).columns), []
-        aligns = [str.ljust if is_text else str.rjust for is_text in self._holds_texts]
-        for cells in [self.headings, *self.rows]:
-            folded = [
-                textwrap.wrap(cell, width, subsequent_indent="  ") if len(cell) > width else [cell]
-                for cell, width in zip(cells, widths, strict=True)
-            ]
-            for parts in itertools.zip_longest(*folded, fillvalue=""):
-                aligned = zip(aligns, parts, widths, strict=True)
-                lines.append("  ".join(align(part, width) for align, part, width in aligned))
-        return "\n".join(line.rstrip() for line in lines)
-
-    def _widths(self, most: int) -> list[int]:
-        """Widths of the columns, in letters. If the table is wider than `most`, headings of numbers
-        are folded first, then texts; wide columns before narrow ones."""
+        """The table as aligned lines. If it is wider than the terminal, headings of numbers are
+        folded first, then texts; wide columns before narrow ones. Numbers never are."""
         columns, texts = list(zip(self.headings, *self.rows, strict=True)), self._holds_texts
         widths = [max(map(len, cells)) for cells in columns]
         least = [
             _NARROW if is_text else max([_NARROW, *map(len, cells[1:])])
             for cells, is_text in zip(columns, texts, strict=True)
         ]
-        while sum(widths) + 2 * (len(widths) - 1) > most:
+        terminal = shutil.get_terminal_size((_WIDTH, 24)).columns
+        while sum(widths) + 2 * (len(widths) - 1) > terminal:
             foldable = [column for column, width in enumerate(widths) if width > least[column]]
             if not foldable:
                 break
             headed = [column for column in foldable if not texts[column]]
             widths[max(headed or foldable, key=widths.__getitem__)] -= 1
-        return widths
+
+        aligns, lines = [str.ljust if is_text else str.rjust for is_text in texts], []
+        for row in [self.headings, *self.rows]:
+            folded = [
+                textwrap.wrap(cell, width, subsequent_indent="  ") if len(cell) > width else [cell]
+                for cell, width in zip(row, widths, strict=True)
+            ]
+            for parts in itertools.zip_longest(*folded, fillvalue=""):
+                aligned = zip(aligns, parts, widths, strict=True)
+                lines.append("  ".join(align(part, width) for align, part, width in aligned))
+        return "\n".join(line.rstrip() for line in lines)
 
     def html(self) -> str:
         """The table as HTML, as notebooks show it."""
@@ -153,7 +149,8 @@ class TextTable:
         texts = self._holds_texts
         lines = [self.headings, ["---" if is_text else "---:" for is_text in texts]]
         for row in self.rows:
-            cells = zip(row, texts, strict=True)
+            plain = [" ".join(cell.split()).replace("|", "\\|") for cell in row]
+            cells = zip(plain, texts, strict=True)
             lines.append(
                 [cell if is_text else cell.translate(_UNBROKEN) for cell, is_text in cells]
             )

@@ -48,7 +48,7 @@ from tetra_drake.robot.network import AMPLITUDE
 from tetra_drake.robot.readings import Readings, pitch_rates
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import GivenScenario
-from tetra_drake.scenario.metrics import pose_fitness
+from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.scenario import Scenario
 
 try:
@@ -82,7 +82,7 @@ class _Episodes:
         render_mode: str | None,
         most_steps: int | None = None,
     ) -> None:
-        """Robots that have no episodes yet. An episode has at most `most_steps`."""
+        """Makes robots without episodes. An episode has at most `most_steps`."""
         check_type(_SOURCE, "grouped", grouped, bool)
         if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
@@ -160,8 +160,12 @@ class _Episodes:
         scenario, structure = self._scenario, self.simulation.robot.structure
         nodes = np.stack([self._start[place], self._steady[place], readings.p_WN[place]])
         steady_time = scenario.simulation.duration - scenario.simulation.settling_time
-        fitness = pose_fitness(poses_of(structure, nodes, steady_time), scenario.objective)
-        return fitness + scenario.objective.get("rolled", 0.0) * self._rolled[place]
+        poses, objective = poses_of(structure, nodes, steady_time), scenario.objective
+        fitness = 0.0
+        for name, weight in objective.items():
+            if METRICS[name].of_pose:
+                fitness += weight * float(METRICS[name].compute(poses))
+        return fitness + objective.get("rolled", 0.0) * self._rolled[place]
 
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
         """Setpoints (N, driven cables) of the actuators for actions of the environment."""

@@ -1,6 +1,6 @@
 """Commands as functions: each parameter of a function is an option of its command.
 
-    Seed = Annotated[int, Option("random seed", metavar="N", type=integer(0))]
+    Seed = Annotated[int, Option("random seed", metavar="N", type=partial(integer, least=0))]
 
     def play(gait: File, *, seed: Seed = 0) -> None:
 
@@ -108,15 +108,11 @@ def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[s
     return f"--no-{name}" if default is True else f"--{name}", group, more
 
 
-def integer(least: int) -> Callable[[str], int]:
-    """Function that reads an integer of at least `least`."""
-
-    def read(text: str) -> int:
-        if text.isascii() and text.isdecimal() and int(text) >= least:
-            return int(text)
-        raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, {least} or more")
-
-    return read
+def integer(text: str, *, least: int) -> int:
+    """Reads an integer of at least `least` from the text of an option."""
+    if text.isascii() and text.isdecimal() and int(text) >= least:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, {least} or more")
 
 
 def size(text: str) -> tuple[int, int]:
@@ -134,16 +130,12 @@ _PIXELS = range(64, 4097, 2)
 """Sizes of a picture."""
 
 
-def number(least: float, most: float) -> Callable[[str], float]:
-    """Function that reads a number between limits."""
-
-    def read(text: str) -> float:
-        with contextlib.suppress(ValueError):
-            if least <= float(text) <= most:
-                return float(text)
-        raise argparse.ArgumentTypeError(f"found '{text}', expected a number, {least} to {most}")
-
-    return read
+def number(text: str, *, least: float, most: float) -> float:
+    """Reads a number between limits from the text of an option."""
+    with contextlib.suppress(ValueError):
+        if least <= float(text) <= most:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"found '{text}', expected a number, {least} to {most}")
 
 
 def quantity(unit: str, example: str, *, least: str, most: str) -> Callable[[str], float]:

@@ -1,1 +1,1 @@
-"""What several test modules use."""
+"""Builders and examples that several test modules use."""

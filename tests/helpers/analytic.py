@@ -1,4 +1,4 @@
-"""Cheap fitness functions to try the trial loop on, a scenario for it, and a look at its record.
+"""Cheap fitness functions for tests of the trial loop, with a scenario and a reader of its record.
 
 A module of its own so that worker processes can import it.
 """
@@ -58,7 +58,7 @@ TAIL = 0.3
 
 @dataclass(frozen=True)
 class DrawnBowl:
-    """Bowl among three draws, each of which moves it in all directions, for drawn_scenario()."""
+    """Bowl in three draws, for drawn_scenario(). Each draw moves it in all directions."""
 
     delay: float = 0.0
 
@@ -94,7 +94,7 @@ def small_scenario(
 
 
 def drawn_scenario(**options) -> Scenario:
-    """small_scenario() among draws, of which the tail counts."""
+    """small_scenario() with three draws of disturbances and a tail."""
     settings = Disturbances(draws=3, tail=TAIL)
     return small_scenario(**options).with_changes({"disturbances": settings})
 

@@ -1,4 +1,4 @@
-"""What a figure is drawn from."""
+"""Results from which figures are drawn."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from tetra_drake.robot.robot import Robot
 
 
 def result_of(robot: Robot, trajectory: xarray.Dataset, *, name: str = "gait") -> SimulationResult:
-    """A result of which nothing but the motion is known."""
+    """A result with nothing but a motion."""
     unknown: dict[str, Any] = dict.fromkeys(("gait", "metrics", "integrator", "path"))
     return SimulationResult(
         scenario=robot.scenario,

@@ -1,4 +1,4 @@
-"""Robustness of gaits that never were."""
+"""Robustness of two made-up gaits."""
 
 import numpy as np
 import pandas

@@ -30,4 +30,4 @@ UNEVEN: dict[str, Relief] = {
 TERRAINS = {"flat": Flat(), "nothing": Nothing()} | UNEVEN
 
 EXAMPLES = {"actuation": ACTUATIONS, "friction": FRICTIONS, "terrain": TERRAINS}
-"""By key of a scenario."""
+"""Examples by the key of a scenario."""

@@ -1,4 +1,4 @@
-"""Reads what a page made by Meshcat holds."""
+"""Content of a page made by Meshcat."""
 
 import base64
 import gzip
@@ -17,14 +17,14 @@ def read_page(path: Path) -> str:
 
 
 def commands(page: str, kind: str) -> list[Any]:
-    """Those of the commands by which the page builds its scene that are of a kind."""
+    """Commands of one kind among those that build the scene of a page."""
     texts = re.findall(r"octet-binary;base64,([A-Za-z0-9+/=]+)", page)
     packed = map(base64.b64decode, texts)
     return [unpack(command) for command in packed if kind.encode() in command]
 
 
 def unpack(data: bytes) -> Any:
-    """What a command of Meshcat, which is MessagePack, says."""
+    """Content of a command of Meshcat, which is MessagePack."""
     return msgpack.unpackb(data, ext_hook=_floats)
 
 

@@ -17,7 +17,7 @@ from tetra_drake.scenario.structure_files import read_structure
 SPEED = 0.01  # m/s
 PERIOD = 2.0  # s, of the signals
 RADII = (0.008, 0.005, 0.008, 0.005, 0.008, 0.005)
-"""Of the nodes, in m; upper ones are smaller."""
+"""Radii (m) of the nodes; upper ones are smaller."""
 
 
 def make_prism() -> Robot:

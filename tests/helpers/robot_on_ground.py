@@ -39,7 +39,7 @@ class RobotOnGround:
         return forces
 
     def update_at(self, state: np.ndarray) -> bool:
-        """Brings the modes up to date; whether they changed."""
+        """Updates the modes. Returns True if they changed."""
         forces = self.meet(state)
         return update_modes(state, forces.nodes, self.model.ground, forces.frames, self.modes)
 
@@ -55,7 +55,7 @@ class RobotOnGround:
         return forces.nodes, forces.ground_forces
 
     def time_to_change(self, v=REST, a=REST, p=TOUCHING) -> float:
-        """Until the next mode change, at most 9 s, at an acceleration a (m/s²)."""
+        """Time (s) until the next mode change at an acceleration a (m/s²), at most 9 s."""
         state = self.state(v, p)
         acceleration = np.tile([0.0, 0.0, 0.0, *(self.R @ a)], 5)
         forces = self.meet(state)

@@ -14,7 +14,7 @@ from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 
 
 def body_velocities(walk: xarray.Dataset, structure: Structure) -> tuple[np.ndarray, np.ndarray]:
-    """(time, n, 3) each: velocity (m/s) and angular velocity (rad/s) of the bodies, from the nodes:
+    """Velocity (m/s) and angular velocity (rad/s) of the bodies, (time, n, 3) each, from the nodes:
     sum r x (w x r) = 8/3 r^2 w."""
     bodies = len(structure.bodies)
     p_WN, v_WN = (walk[name].values.reshape(-1, bodies, 4, 3) for name in ("p_WN", "v_WN"))
@@ -36,7 +36,7 @@ def disturbed(structure: Structure, seed: int, *, pose: float, speed: float) -> 
 
 
 def mass_matrix(robot: Model, state: np.ndarray) -> np.ndarray:
-    """(6 n, 6 n), of inertias that Drake has turned into World."""
+    """Mass matrix (6 n, 6 n) from inertias that Drake has turned into World."""
     bodies = robot.bodies
     matrix = np.zeros((6 * len(bodies.mass), 6 * len(bodies.mass)))
     for i, (mass, inertia) in enumerate(zip(bodies.mass, bodies.inertia, strict=True)):
@@ -48,7 +48,7 @@ def mass_matrix(robot: Model, state: np.ndarray) -> np.ndarray:
 
 
 def energy_and_momenta(robot: Robot, state: np.ndarray) -> np.ndarray:
-    """(7,): energy of bodies and cables; momentum, and angular momentum about the origin."""
+    """Energy of bodies and cables, momentum, and angular momentum about the origin: (7,)."""
     structure, poses = robot.structure, poses_of(state[np.newaxis])[0]
     velocities, cables = state[poses.size :], structure.cables
     wrench = (mass_matrix(robot.model, state) @ velocities).reshape(-1, 6)

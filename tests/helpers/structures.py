@@ -28,7 +28,7 @@ class Thrown(Structure):
     """A structure whose bodies move at t = 0."""
 
     v_WB: np.ndarray = dataclasses.field(kw_only=True)
-    """(bodies, 6): their angular velocities (rad/s) and velocities (m/s)."""
+    """Angular velocities (rad/s) and velocities (m/s) of the bodies: (bodies, 6)."""
 
     @property
     def initial_state(self) -> np.ndarray:
@@ -52,8 +52,8 @@ def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]
 
 
 def end_on_diagram(robot: Robot) -> np.ndarray:
-    """(bodies, 7): the poses of a robot, which may be thrown, at the end on the diagram, with small
-    errors."""
+    """Poses (bodies, 7) at the end of a simulation on the diagram, with small errors. The robot may
+    be thrown."""
     diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3).set_target_accuracy(1e-9)
@@ -64,13 +64,13 @@ def end_on_diagram(robot: Robot) -> np.ndarray:
 
 
 def poses_of(states: np.ndarray) -> np.ndarray:
-    """(times, bodies, 7): quaternions and positions in states (times, 13 bodies)."""
+    """Quaternions and positions (times, bodies, 7) in states (times, 13 bodies)."""
     bodies = states.shape[1] // 13
     return states[:, : 7 * bodies].reshape(-1, bodies, 7)
 
 
 def unit_inertias(structure: Structure) -> np.ndarray:
-    """(bodies, 3, 3): the inertias over the masses, in the frames of the bodies (m²)."""
+    """Inertias divided by the masses (m²), in the frames of the bodies: (bodies, 3, 3)."""
     xx, yy, zz, xy, xz, yz = structure.unit_inertia.T
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
 
@@ -109,8 +109,8 @@ def recorded_structure(data: Path, name: str) -> dict[str, Any]:
 
 
 def onto_recorded(recorded: dict[str, Any], names: tuple[str, ...], p_WN: np.ndarray) -> np.ndarray:
-    """(3, 4): the turn about z and the shift that bring nodes p_WN (nodes, 3) nearest to where the
-    recorded structure rests."""
+    """Turn about z, and shift, that bring nodes p_WN (nodes, 3) nearest to the nodes at rest of the
+    recorded structure: (3, 4)."""
     theirs = np.array([recorded["nodes_at_rest"][name] for name in names])
     centre, their_centre = p_WN.mean(axis=0), theirs.mean(axis=0)
     x, y, _ = (p_WN - centre).T

@@ -1,4 +1,4 @@
-"""Runs made up for tests of what is shown of them, written as the real ones are."""
+"""Made-up runs, for tests of tables, figures and pages."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -40,7 +40,7 @@ def write_run(
     unfinished: Sequence[int] = (),
     metrics: Mapping[float, Mapping[str, Any]] | None = None,
 ) -> Path:
-    """A run of which each trial is given as its iterations, each as its children.
+    """Writes a run. A trial is given as its iterations, an iteration as its children.
 
     The mean fitness follows from who took whose place. Genomes are random, and the same
     wherever the same fitness is given. `unfinished` trials have not ended. `metrics`: more of them,

@@ -1,4 +1,4 @@
-"""A tally of a walk made up for tests of what is made of it."""
+"""Tally of a made-up walk, for tests of metrics."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from tetra_drake.laws.tally import Tally
 
 
 def make_totals(bodies: int = 5) -> Tally:
-    """That of twelve steady seconds, in which each tetrahedron is lifted one second longer than
-    the one behind it; the struts are 1 cm apart."""
+    """Tally of twelve steady seconds. Each tetrahedron is lifted one second longer than the one
+    behind it; the struts are 1 cm apart."""
     tally = allocate(Tally, {"signals": 4, "cables": 0, "bodies": bodies})
     numbers = {"peak_force": 4.0, "peak_speed": 0.2, "peak_power": 0.5, "work": 0.3}
     numbers |= {"impulse": 96.0, "wound": 4.8, "pulled": 24.0, "limited": 9.6}

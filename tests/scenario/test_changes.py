@@ -5,12 +5,10 @@ import pytest
 
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.yaml_text import parse_yaml
 
 
 def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
@@ -25,7 +23,8 @@ STIFF = "cables: {outer_stiffness: 0.4 lbf/in}"
 
 
 def axial_force(scenario: Scenario) -> float:
-    """Of the cables between two tetrahedra as they start, relative to that of the outer ones."""
+    """Axial force of the cables between two tetrahedra at the start, as a share of the force of the
+    outer ones."""
     structure = Robot.of(scenario).structure
     p_WN = structure.p_WB[structure.carriers] + structure.p_BN
     cables = structure.cables[:6]
@@ -68,18 +67,11 @@ def test_a_mapping_changes_what_it_names_as_in_a_file(load_text, scenario):
     assert scenario.with_changes(stiff).robot == balanced != scenario.robot
 
 
-def test_a_kind_replaces_the_base_with_its_tag_and_changes_keys_without():
-    base = {"friction": parse_yaml("!Coulomb {static: 0.6, kinetic: 0.5}", "file")}
-    with_tag = {"friction": parse_yaml("!Coulomb", "file")}
-    assert merged(base, with_tag) == with_tag
-    changed = merged(base, {"friction": {"static": 0.7}})
-    assert changed == {"friction": base["friction"] | {"static": 0.7}}
-
-
-def test_a_kind_from_python_follows_the_rule_of_files(scenario):
+def test_a_kind_replaces_the_base_with_its_tag_and_changes_keys_without(scenario, load_text):
     coulomb = load_scenario("coulomb")
     whole = coulomb.with_changes({"friction": "!Coulomb {static: 0.6}", "engine": "!Compiled"})
     assert (whole.friction, whole.engine) == (Coulomb(static=0.6), Compiled())
+    assert load_text("friction: !Coulomb\nterrain:").friction == Coulomb()
     changed = coulomb.with_changes({"friction": {"static": 0.6}})
     assert changed.friction == Coulomb(static=0.6, stiffness=300.0)
     assert coulomb.on_engine("compiled") == coulomb.on_engine(None) == coulomb
@@ -103,15 +95,12 @@ def test_a_mapping_of_free_keys_is_replaced_as_a_whole(scenario):
     assert added == scenario.objective | {"speed": 3.0}, "a key with a dot is added"
 
 
-def test_a_section_from_python_replaces_the_base_as_a_whole(scenario):
+def test_a_section_from_python_replaces_the_base_as_a_whole_and_is_checked(scenario, refused):
     mapped = scenario.with_changes({"optimizer": QualityDiversity(draws=3)})
     twist = QualityDiversity(measures={"twist": [0.0, 0.1], "lifted": [0.0, 1.0]})
     assert mapped.with_changes({"optimizer": twist}).optimizer == twist
     robot = scenario.robot.model_copy(update={"strut_length": 0.2, "spacing": 0.05})
     assert scenario.with_changes({"robot": robot}).robot == robot, "which keeps its spacing"
-
-
-def test_a_copy_of_a_section_is_checked(scenario, refused):
     bad = scenario.ground.model_copy(update={"stiffness": -1.0})
     with refused("scenario thesis", "ground.stiffness", "found -1 N/m, expected greater than 0"):
         scenario.with_changes({"ground": bad})

@@ -3,8 +3,6 @@
 import json
 import re
 
-import pytest
-
 from tetra_drake.cli import main
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.keys import PAGE, keys_page, schema_text
@@ -12,15 +10,6 @@ from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.shipped import SCENARIOS, STRUCTURES
 from tetra_drake.settings.refusals import TAG, members_of
-
-
-@pytest.fixture(scope="module")
-def rows() -> dict[str, list[str]]:
-    """The cells of each row of the page by its key."""
-    text = PAGE.read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if line.startswith("| `")]
-    cells = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
-    return {key.strip("`"): rest for key, *rest in cells}
 
 
 def test_the_page_and_the_schemas_are_as_the_kinds_say(capsys):
@@ -59,7 +48,10 @@ def needs_keys(section: str, kind: str) -> bool:
     return False
 
 
-def test_each_key_and_each_metric_is_explained(rows):
+def test_each_key_and_each_metric_is_explained():
+    lines = [line for line in keys_page().splitlines() if line.startswith("| `")]
+    cells = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+    rows = {key.strip("`"): rest for key, *rest in cells}
     for key in load_scenario("robust").values():
         if TAG not in key and not key.startswith(("objective", "disturbances.spreads")):
             assert key in rows, key

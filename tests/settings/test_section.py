@@ -9,7 +9,7 @@ from pydantic import Field
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.settings.quantities import Angle, ByName, Keyed, Length
+from tetra_drake.settings.quantities import Angle, Keyed, Length, by_name
 from tetra_drake.settings.section import Kinds, Section, written
 
 
@@ -34,7 +34,7 @@ class Probe(Section):
 class Settings(Section):
     count: int = Field(ge=2)
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
-    limits: Annotated[dict[str, float], ByName({"a": "N", "share": ""})] = Field(default={})
+    limits: Annotated[dict[str, float], *by_name({"a": "N", "share": ""})] = Field(default={})
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
     groups: Keyed[str, Keyed[str, int]] = Field(default={})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 import tempfile
 from importlib import resources
 from pathlib import Path
@@ -13,7 +14,7 @@ import pandas
 import xarray
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.files import check_folder, given_path, write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.laws import actuator
@@ -73,6 +74,7 @@ def export(
     """
     scenario = given_scenario(scenario)
     gait = given_gait(gait, scenario)
+    check_type("export", "rate", rate, numbers.Real)
     most, duration = 1.0 / scenario.cpg.listing_step, scenario.simulation.duration
     in_range, periods = 0.0 < rate <= most * (1.0 + 1e-9), duration * rate
     if not in_range or abs(periods - round(periods)) > 1e-6 * periods:

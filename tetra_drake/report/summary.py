@@ -91,7 +91,8 @@ def ground_text(scenario: Scenario) -> str:
 
     For example, "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)".
     """
-    return f"{scenario.terrain.text}, {scenario.engine.friction_text(scenario.friction)}"
+    friction, has_cone = scenario.friction, scenario.engine.has_cone
+    return f"{scenario.terrain.text}, {(has_cone and friction.cone_text) or friction.text}"
 
 
 def run_text(run: Run) -> str:

@@ -7,11 +7,12 @@ file.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
+from tetra_drake.errors import InputError
 from tetra_drake.settings.quantities import Keyed, Speed, Time, Value
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
@@ -94,20 +95,17 @@ class EvolutionSection(Section):
 
 
 def separate(joined: str) -> list[str]:
-    """Splits a key of `spreads` at its commas into scenario keys."""
+    """Scenario keys in a key that joins them by commas, such as "cpg.gain, robot.density"."""
     return [key.strip() for key in joined.split(",")]
 
 
-def repeated(all_joined: Iterable[str]) -> str:
-    """The first scenario key that is given twice in joined keys; "" if there is none."""
-    counts = Counter(key for joined in all_joined for key in separate(joined))
-    return next((key for key, count in counts.items() if count > 1), "")
-
-
-def different_keys(by_joined: dict[str, Value]) -> dict[str, Value]:
-    """Validator of values by joined keys, such as "a.b, c.d": each key may be given once."""
-    if key := repeated(by_joined):
-        refuse("", f"'{key}' is given twice")
+def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mapping[str, Value]:
+    """Validator of values by joined keys, such as "a.b, c.d": each key may be given once. Raises
+    InputError, naming `source`, for a key that is given twice."""
+    counts = Counter(key for joined in by_joined for key in separate(joined))
+    for key, count in counts.items():
+        if count > 1:
+            raise InputError(source, key, "is given twice")
     return by_joined
 
 
@@ -132,8 +130,3 @@ class Disturbances(Section):
     tail: float = Field(default=1.0, gt=0, le=1)
     """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
     at risk). 1 is the mean over all draws. At least one draw counts."""
-
-
-def by_separate_key(by_joined: Mapping[str, Value]) -> dict[str, Value]:
-    """Values by scenario key, from values for joined keys."""
-    return {key: value for joined, value in by_joined.items() for key in separate(joined)}

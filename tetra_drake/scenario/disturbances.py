@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.scenario.common_sections import by_separate_key, separate
+from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.scenario import Scenario
 
 IterationSeed = tuple[int, int, int]
@@ -31,7 +31,8 @@ class Draw:
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
-    """The draw with a seed. Its factors do not depend on the scenario's values."""
+    """Draw of the disturbances of a scenario from a seed. Its factors do not depend on the
+    scenario's values."""
     settings = scenario.disturbances
     if settings is None:
         return Draw({})
@@ -63,8 +64,8 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     The values are not checked: the largest changes were checked when the scenario was loaded.
     """
     numbers = scenario.numbers()
-    factors = by_separate_key(draw.factors)
-    changed = scenario.with_numbers({key: x * numbers[key] for key, x in factors.items()})
+    factors = [(key, x) for joined, x in draw.factors.items() for key in separate(joined)]
+    changed = scenario.with_numbers({key: x * numbers[key] for key, x in factors})
     robot, terrain = changed.robot, changed.terrain
     if draw.moves is not None:
         offsets = draw.moves + (robot.offsets or np.zeros_like(draw.moves))

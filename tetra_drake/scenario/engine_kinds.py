@@ -4,7 +4,6 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from tetra_drake.laws.friction import FrictionKind
 from tetra_drake.settings.quantities import Speed, Time
 from tetra_drake.settings.section import Kinds, Section
 
@@ -15,16 +14,15 @@ LONGEST_LOOK_AHEAD = 2e-5
 
 
 class EngineSettings(Section):
-    """Base class of the kinds of engines."""
+    """Engine of a scenario, with its settings: base class of the kinds."""
 
     module: ClassVar[str]
     """Module whose ENGINE simulates; see engines.engine."""
     packages: ClassVar[tuple[str, ...]] = ()
     """Packages that only this engine needs."""
-
-    def friction_text(self, friction: FrictionKind) -> str:
-        """Description of the friction that the engine simulates."""
-        return friction.text
+    has_cone: ClassVar[bool] = False
+    """True if the engine simulates MuJoCo's friction in place of some laws; see
+    FrictionKind.cone_text."""
 
 
 class Drake(EngineSettings):
@@ -70,11 +68,9 @@ class Mujoco(EngineSettings):
 
     module: ClassVar[str] = "tetra_drake.engines.mujoco"
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
+    has_cone: ClassVar[bool] = True
     step: Time = Field(default=0.0625e-3, ge=1e-7, le=1)
     """Time step. A simulation fails at once if it is too long for springs and dampers."""
-
-    def friction_text(self, friction: FrictionKind) -> str:
-        return friction.cone_text or friction.text
 
 
 EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds()]

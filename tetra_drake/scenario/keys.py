@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from tetra_drake.formatting import TextTable
 from tetra_drake.scenario.metrics import METRICS, Metrics
@@ -56,7 +56,7 @@ def keys_page() -> str:
         sections = [member for member in members_of(node, schema) if "$ref" in member]
         for section in sections:
             parts.append(f"## `{key}`" + (f": `{section['title']}`" if "title" in section else ""))
-            parts.append(_line(section["description"]))
+            parts.append(" ".join(section["description"].split()))
             rows = [row for row in keys_in(section, schema, key) if "description" in row[1]]
             parts += [_table_of_keys(rows)] if rows else []
         others += [] if sections else [(key, node)]
@@ -65,8 +65,9 @@ def keys_page() -> str:
     for name, metric in METRICS.items():
         limit = "at most" if metric.is_cost else "at least"
         metrics.append((f"`{name}`", metric.unit or "1", limit, metric.needs or "any", texts[name]))
-    parts += ["## Metrics", _line(Metrics.__doc__ or "")]
-    parts.append(_table("metric", "unit", "`require`", "robots", rows=metrics))
+    headings = ["metric", "unit", "`require`", "robots", "what it is"]
+    parts += ["## Metrics", " ".join((Metrics.__doc__ or "").split())]
+    parts.append(TextTable(headings, metrics, range(5)).markdown())
     return "\n\n".join(parts) + "\n"
 
 
@@ -79,13 +80,7 @@ def _table_of_keys(rows: Iterable[tuple[str, Tree]]) -> str:
         elif default and "unit" not in node:
             default = f"`{default}`"
         cells.append((f"`{key}`", _value(node), default, node["description"]))
-    return _table("key", "value", "default", rows=cells)
-
-
-def _table(*headings: str, rows: Iterable[Sequence[str]]) -> str:
-    """A table of texts in Markdown, whose last column says what something is."""
-    lines = [[*cells, _line(text)] for *cells, text in rows]
-    return TextTable([*headings, "what it is"], lines, range(len(headings) + 1)).markdown()
+    return TextTable(["key", "value", "default", "what it is"], cells, range(4)).markdown()
 
 
 def _value(node: Tree) -> str:
@@ -108,10 +103,6 @@ def _value(node: Tree) -> str:
     if len(lengths) == 2 and node["minItems"] == node["maxItems"]:
         lengths = [f"{node['minItems']} items"]
     return ", ".join([words, *limits, *lengths])
-
-
-def _line(text: str) -> str:
-    return " ".join(text.split()).replace("|", "\\|")
 
 
 if __name__ == "__main__":

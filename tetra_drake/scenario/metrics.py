@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -36,29 +37,14 @@ class Poses:
     """
 
     markers: np.ndarray
-    """Positions (3, markers, 3) of the points whose motion is shown; see Blueprint.markers. The
-    first is T1's bottom left node, or the centre of mass."""
+    """Positions (3, markers, 3), by time, marker and axis, of the points whose motion is shown; see
+    Blueprint.markers. The first is T1's bottom left node, or the centre of mass."""
     centre: np.ndarray
     """Positions (3, 3) of the centre of mass."""
     tip: np.ndarray
     """Positions (3, 3) of the foremost node."""
     since_steady_from: float
     """Time from `simulation.steady_from` to the end."""
-
-    @property
-    def followed(self) -> np.ndarray:
-        """Positions (3, 3) of the first marker."""
-        return self.markers[:, 0]
-
-    @property
-    def followed_way(self) -> np.ndarray:
-        """Displacement (3,) of the followed point from 0 to the end."""
-        return np.asarray(self.followed[2] - self.followed[0])
-
-    @property
-    def steady_centre_way(self) -> np.ndarray:
-        """Displacement (3,) of the centre from `simulation.steady_from` to the end."""
-        return np.asarray(self.centre[2] - self.centre[1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,28 +83,31 @@ class Walk(Poses):
 
 
 def _cost_of_transport(walk: Walk) -> float:
-    x, y, _ = walk.steady_centre_way.tolist()
+    x, y, _ = (walk.centre[2] - walk.centre[1]).tolist()
     carried = walk.weight * max(math.hypot(x, y), LEAST_WAY * walk.scale)
     return float(walk.tally.effort.work[0]) / carried if carried else math.inf
 
 
-def _of_poses(unit: str, note: str, compute: Callable[[Poses], float], **more: Any) -> Any:
-    """Declaration of a metric that is a function of Poses."""
-    return metric(unit, note, compute, of_pose=True, **more)
+_of_poses = functools.partial(metric, of_pose=True)
+"""Declaration of a metric that is a function of Poses."""
 
 
 @dataclass(frozen=True)
 class WalkMetrics:
     """Metrics from positions and signals at a few times."""
 
-    distance: float = _of_poses("m", "along x", lambda walk: walk.followed_way[0])
+    distance: float = _of_poses(
+        "m", "along x", lambda walk: walk.markers[2, 0, 0] - walk.markers[0, 0, 0]
+    )
     """Displacement of x₁ from the start to the end."""
     steady_distance: float = _of_poses(
-        "m", "without the start", lambda walk: walk.followed[2, 0] - walk.followed[1, 0]
+        "m", "without the start", lambda walk: walk.markers[2, 0, 0] - walk.markers[1, 0, 0]
     )
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
     speed: float = _of_poses(
-        "m/s", "of the centre", lambda walk: walk.steady_centre_way[0] / walk.since_steady_from
+        "m/s",
+        "of the centre",
+        lambda walk: (walk.centre[2, 0] - walk.centre[1, 0]) / walk.since_steady_from,
     )
     """Mean speed of the centre along x from `simulation.steady_from` on."""
     twist: float = _of_poses(
@@ -132,12 +121,15 @@ class WalkMetrics:
     lead: float = _of_poses(
         "m",
         "front tip ahead of rear foot",
-        lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
+        lambda walk: walk.tip[2, 0] - walk.markers[2, 0, 0],
         needs=ROW,
     )
     """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
     lateral_drift: float = _of_poses(
-        "m", "sideways", lambda walk: abs(walk.followed_way[1]), is_cost=True
+        "m",
+        "sideways",
+        lambda walk: abs(walk.markers[2, 0, 1] - walk.markers[0, 0, 1]),
+        is_cost=True,
     )
     """Sideways displacement, abs(y₁), at the end."""
     heading_change: float = metric(
@@ -241,8 +233,8 @@ UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
 
 def wrong_metric(metrics: Mapping[str, Any]) -> str:
-    """Name of the first of some metrics in the form of Metrics.to_json() that is of another type
-    there; "" if there is none."""
+    """Name of the first metric whose value has a wrong type; "" if there is none. The values are in
+    the form of Metrics.to_json()."""
     for name, value in metrics.items():
         numbers = value if name == "lifted_shares" else [value]
         kinds = float if name == "lifted_shares" else float | None
@@ -271,12 +263,6 @@ def looks_for_distance(objective: Mapping[str, float]) -> bool:
 def looks_for_turns(objective: Mapping[str, float]) -> bool:
     """True if an objective is about turning, not about distances."""
     return "heading_change" in objective and not looks_for_distance(objective)
-
-
-def pose_fitness(poses: Poses, objective: Mapping[str, float]) -> float:
-    """The part of the fitness that follows from poses alone."""
-    parts = {name: weight for name, weight in objective.items() if METRICS[name].of_pose}
-    return sum(weight * float(METRICS[name].compute(poses)) for name, weight in parts.items())
 
 
 def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:

@@ -1,11 +1,11 @@
 """Kinds of optimisers and their settings."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metrics import UNITS
-from tetra_drake.settings.quantities import ByName, Time
+from tetra_drake.settings.quantities import Time, by_name
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section
 
@@ -63,11 +63,6 @@ class RandomSearch(Section):
     """Random gaits: a baseline."""
 
 
-def _range(number: Any) -> Any:
-    """Type of a range of numbers."""
-    return Annotated[list[number], Field(min_length=2, max_length=2)]
-
-
 CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
@@ -78,9 +73,10 @@ class QualityDiversity(Section):
     gaits above the levels of cells. A level follows the fittest gait of its cell slowly.
     """
 
-    measures: Annotated[dict[str, list[float]], ByName(UNITS, _range)] = Field(
-        default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
-    )
+    measures: Annotated[
+        dict[str, list[float]],
+        *by_name(UNITS, lambda x: Annotated[list[x], Field(min_length=2, max_length=2)]),
+    ] = Field(default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]})
     """Two metrics with their ranges on the map. Values outside belong to the cells at the edge."""
     cells: list[CellCount] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""

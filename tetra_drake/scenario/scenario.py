@@ -36,7 +36,7 @@ from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_structure import RobotKind
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
-from tetra_drake.settings.quantities import ByName
+from tetra_drake.settings.quantities import by_name
 from tetra_drake.settings.refusals import TAG, hint, refuse
 from tetra_drake.settings.section import Section, Tree, flattened, written
 from tetra_drake.settings.units import (
@@ -81,10 +81,10 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: EngineKind = Drake()
-    objective: Annotated[dict[str, float], ByName(_OF_WEIGHTS), Field(min_length=1)]
+    objective: Annotated[dict[str, float], *by_name(_OF_WEIGHTS), Field(min_length=1)]
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
-    require: Annotated[dict[str, float], ByName(UNITS)] = Field(default={})
+    require: Annotated[dict[str, float], *by_name(UNITS)] = Field(default={})
     """Limits of metrics: a gait beyond one counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
@@ -140,7 +140,15 @@ class Scenario(Section):
             if text == _text(theirs.get(key)):  # only the last digits differ
                 text = _text(ours.get(key), exact=True)
             found.append((key.removesuffix(f".{TAG}"), text))
-        return found + _differences_in_order(ours, theirs)
+        # Names in another order; they number the bodies and oscillators of a structure.
+        in_common = [key for key in ours if key in theirs], [key for key in theirs if key in ours]
+        for key, other in zip(*in_common, strict=True):
+            if key != other:
+                pairs = zip(key.split("."), other.split("."), strict=False)
+                shared = itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
+                found.append((".".join(part for part, _ in shared), "another order of names"))
+                break
+        return found
 
     def values(self) -> dict[str, Any]:
         """Values by dotted keys, without the scenario's name. Scenarios with the same values are
@@ -306,19 +314,6 @@ def _text(value: Any, *, exact: bool = False) -> str:
     if exact:
         return text
     return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
-
-
-def _differences_in_order(
-    ours: Mapping[str, Any], theirs: Mapping[str, Any]
-) -> list[tuple[str, str]]:
-    """A mapping with the same names in another order, as a difference; empty if there is none."""
-    in_common = [key for key in ours if key in theirs], [key for key in theirs if key in ours]
-    for key, other in zip(*in_common, strict=True):
-        if key != other:
-            pairs = zip(key.split("."), other.split("."), strict=False)
-            shared = itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
-            return [(".".join(part for part, _ in shared), "another order of names")]
-    return []
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:

@@ -64,11 +64,8 @@ MOST_VALUES = 10**6
 class _Loader(yamlcore.CoreLoader):
     """Loader of YAML 1.2 with tagged kinds. It refuses repeated keys."""
 
-    def __init__(self, stream: str) -> None:
-        super().__init__(stream)
-        self.deep_construct = True  # refuses an alias of what holds it
-
     def get_single_node(self) -> yaml.Node:
+        self.deep_construct = True  # refuses an alias of what holds it
         node = super().get_single_node()
         if node is not None and _expanded(node, {}) > MOST_VALUES:
             problem = f"found aliases that stand for more than {MOST_VALUES} values in all"

@@ -7,11 +7,10 @@ and mappings may have such types, too.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 import pydantic
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, WrapValidator
 from pydantic_core import CoreSchema, core_schema
 
 from tetra_drake.settings.refusals import described
@@ -78,7 +77,7 @@ DampingPerLength = Annotated[float, *quantity("N*s/m^2")]
 Position = Annotated[list[Length], Field(min_length=3, max_length=3)]
 """Coordinates x, y and z."""
 
-EMPTY = {"type": ["object", "null"]}
+EMPTY: dict[str, Any] = {"type": ["object", "null"]}
 """JSON Schema of a mapping that may be left empty in a file."""
 
 Key = TypeVar("Key")
@@ -92,32 +91,34 @@ Keyed = Annotated[
 """Mapping whose keys the user chooses. In a file it may be left empty."""
 
 
-@dataclass(frozen=True)
-class ByName:
-    """Annotation of a mapping from given names, such as metrics, to numbers with units."""
+def by_name(
+    units: Mapping[str, str], value: Callable[[Any], Any] = lambda number: number
+) -> tuple[Any, ...]:
+    """Annotations of a mapping from given names, such as metrics, to numbers with units.
 
-    units: Mapping[str, str]
-    """SI units by name; "" for a number without a unit."""
-    value: Callable[[Any], Any] = lambda number: number
-    """Function that makes the type of a value from the type of its numbers."""
+    `units` has the SI units by name; "" for a number without a unit. `value` makes the type of a
+    value from the type of its numbers.
+    """
+    numbers = {
+        name: Annotated[float, *quantity(unit)] if unit else float for name, unit in units.items()
+    }
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: pydantic.GetCoreSchemaHandler
-    ) -> CoreSchema:
-        def in_order(given: Any, read: pydantic.ValidatorFunctionWrapHandler) -> Any:
-            values = read({} if given is None else given)
-            return {name: values[name] for name in given or ()}
-
-        fields = {}
-        for name, unit in self.units.items():
-            number = Annotated[float, *quantity(unit)] if unit else float
-            value = handler.generate_schema(self.value(number))
-            fields[name] = core_schema.typed_dict_field(value, required=False)
+    def table(_: Any, handler: pydantic.GetCoreSchemaHandler) -> CoreSchema:
+        fields = {
+            name: core_schema.typed_dict_field(
+                handler.generate_schema(value(number)), required=False
+            )
+            for name, number in numbers.items()
+        }
         strict = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
-        table = core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=strict)
-        return core_schema.no_info_wrap_validator_function(in_order, table)
+        return core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=strict)
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: pydantic.GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return handler(schema) | EMPTY
+    def in_order(given: Any, read: pydantic.ValidatorFunctionWrapHandler) -> Any:
+        values = read({} if given is None else given)
+        return {name: values[name] for name in given or ()}
+
+    return (
+        pydantic.GetPydanticSchema(table),
+        WrapValidator(in_order),
+        Field(json_schema_extra=EMPTY),
+    )

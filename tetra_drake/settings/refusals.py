@@ -40,8 +40,6 @@ def input_error(
 
     `tree` is the content of the section, which stands at `key`.
     """
-    from pydantic.json_schema import GenerateJsonSchema
-
     # An unknown key tells why another is missing. A value that fits no member of a union has an
     # error per member: the innermost tells most, then one that is not about the type.
     first = max(
@@ -49,7 +47,7 @@ def input_error(
         key=lambda one: (one["type"] in _UNKNOWN, len(one["loc"]), "_type" not in one["type"]),
     )
     is_unknown, name = first["type"] in _UNKNOWN, str(first["loc"][-1]) if first["loc"] else ""
-    schema = section.model_json_schema(schema_generator=GenerateJsonSchema)  # without texts
+    schema = section.model_json_schema()
     members = kinds = [schema]
     # The place also contains tags and names of union members, which are no keys.
     for part in first["loc"][:-1] if is_unknown else first["loc"]:
@@ -61,7 +59,14 @@ def input_error(
         if inner is not members:
             members, kinds = inner, members if len(members) > 1 else inner
     if is_unknown and name != TAG:
-        advice = _advice(name, members, kinds, schema)
+        # Perhaps a kind or an inner section has the key.
+        meant = [kind["title"] for kind in kinds if "title" in kind and name in kind["properties"]]
+        inner_keys = [inner for member in members for inner, _ in keys_in(member, schema)]
+        meant += [f"'{inner}'" for inner in inner_keys if inner.endswith(f".{name}")]
+        known = [own for one in members for own in one.get("properties", {}) if own != name]
+        advice = (
+            f"did you mean {' or '.join(dict.fromkeys(meant))}?" if meant else hint(name, known)
+        )
         return InputError(source, joined(key, name), f"unknown key; {advice}")
     inner_key, problem = _in_words(first, tree, members)
     if first["type"] == "missing" and "base" in schema["properties"]:
@@ -93,8 +98,8 @@ def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, T
 
 
 def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
-    """Types of a value's part, which pydantic names by key, index or tag. `members` are the types
-    of the value, which also stand for any other name."""
+    """Types of a part of a value, which pydantic names by key, index or tag. For any other name,
+    they are `members`, the types of the value."""
     for member in members:
         if member.get("title") == f"!{part}":
             return [member]
@@ -103,17 +108,6 @@ def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
         if inner := member.get("items") if isinstance(part, int) else item:
             return members_of(inner, schema)
     return members
-
-
-def _advice(name: str, members: list[Tree], kinds: list[Tree], schema: Tree) -> str:
-    """Advice for an unknown key: a kind or an inner section that has it, or a similar key."""
-    meant = [kind["title"] for kind in kinds if "title" in kind and name in kind["properties"]]
-    keys = [key for member in members for key, _ in keys_in(member, schema)]
-    meant += [f"'{key}'" for key in keys if key.endswith(f".{name}")]
-    if meant:
-        return f"did you mean {' or '.join(dict.fromkeys(meant))}?"
-    known = [key for one in members for key in one.get("properties", {}) if key != name]
-    return hint(name, known)
 
 
 def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str, str]:
@@ -135,7 +129,8 @@ def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str
 
 
 def joined(key: str, inner: str) -> str:
-    """Dotted key of an inner key, such as "robot.gravity", or "pairs[0]" for "[0]" in "pairs"."""
+    """Dotted key of a key in a section: "robot.gravity" for "gravity" in "robot", or "pairs[0]" for
+    "[0]" in "pairs"."""
     return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 

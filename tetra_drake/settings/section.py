@@ -22,8 +22,7 @@ from typing import Annotated, Any, ClassVar, Self, Union
 import pydantic
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema
 
 from tetra_drake.errors import InputError
 from tetra_drake.settings.quantities import EMPTY, Quantity
@@ -55,44 +54,36 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
             del node["default"]
         if "unit" in node and isinstance(default, float):
             node["default"] = plainest(default, node["unit"])
+    texts = attribute_docstrings(section)
+    for name, field in section.model_fields.items():
+        if name in texts:
+            schema["properties"][field.alias or name]["description"] = texts[name]
 
 
-class SchemaWithTexts(GenerateJsonSchema):
-    """JSON Schema whose keys are described by the docstrings of attributes.
-
-    The docstrings are read from the source only here. pydantic's own option reads them at every
-    import, which takes 0.15 s.
-    """
-
-    def model_schema(self, schema: core_schema.ModelSchema) -> Tree:
-        """The schema of a section."""
-        section: Any = schema["cls"]
-        made, texts = super().model_schema(schema), attribute_docstrings(section)
-        for name, field in section.model_fields.items():
-            if name in texts:
-                made["properties"][field.alias or name]["description"] = texts[name]
-        return made
-
-
+@functools.cache
 def attribute_docstrings(owner: type) -> dict[str, str]:
-    """Docstrings of the attributes of a class and of its bases, by name."""
-    texts = {}
-    for base in reversed(owner.__mro__):
-        if not base.__module__.startswith("tetra_drake"):
-            continue
-        for attribute, text in itertools.pairwise(_classes_in(base.__module__)[base.__name__].body):
-            if isinstance(attribute, ast.AnnAssign) and isinstance(text, ast.Expr):
-                texts[ast.unparse(attribute.target)] = inspect.cleandoc(
-                    ast.literal_eval(text.value)
-                )
+    """Docstrings of the attributes of a class and of its bases, by name.
+
+    pydantic's own option reads them at every import, which takes 0.15 s.
+    """
+    if not owner.__module__.startswith("tetra_drake"):
+        return {}
+    texts: dict[str, str] = {}
+    for base in reversed(owner.__bases__):
+        texts |= attribute_docstrings(base)
+    (node,) = [node for node in _classes_of(owner.__module__) if node.name == owner.__name__]
+    for attribute, text in itertools.pairwise(node.body):
+        if isinstance(attribute, ast.AnnAssign) and isinstance(text, ast.Expr):
+            words = inspect.cleandoc(ast.literal_eval(text.value))
+            texts[ast.unparse(attribute.target)] = words
     return texts
 
 
 @functools.cache
-def _classes_in(module: str) -> dict[str, ast.ClassDef]:
-    """Syntax trees of a module's classes, by name. inspect would parse the module for each."""
+def _classes_of(module: str) -> list[ast.ClassDef]:
+    """Syntax trees of a module's classes. inspect would parse the module for each class."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
-    return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+    return [node for node in tree.body if isinstance(node, ast.ClassDef)]
 
 
 _CORRECT_NAMES = {
@@ -163,15 +154,9 @@ class Section(BaseModel):
 
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
-        """All lengths (m) in the section. A copy with disturbed numbers keeps them."""
+        """All lengths (m) in the section. A copy with disturbed numbers keeps the original ones."""
         numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
-
-    @classmethod
-    def model_json_schema(cls, *arguments: Any, **options: Any) -> Tree:
-        """JSON Schema of what files may contain, with the texts of the keys."""
-        options.setdefault("schema_generator", SchemaWithTexts)
-        return super().model_json_schema(*arguments, **options)
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
@@ -190,8 +175,8 @@ SI."""
 
 
 class Kinds:
-    """Annotation of a union of sections that a tag tells apart, such as `!Coulomb`. A mapping
-    without a tag is of the first kind."""
+    """Annotation of a union of sections. In a file, a tag such as `!Coulomb` gives the kind of a
+    mapping; a mapping without a tag is of the first kind."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
@@ -286,14 +271,11 @@ def value_at(tree: Any, key: str) -> Any:
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
-    """Copy of a tree for a file: `show` makes texts of the quantities."""
-
-    def write(part: Any) -> Any:
-        if not isinstance(part, Quantity):
-            return part
-        return show(float(part), part.unit) if part.unit else float(part)
-
-    return mapped(value, write)
+    """Copy of a tree for a file. `show` makes texts of the quantities, by default exact ones in
+    SI."""
+    return mapped(
+        value, lambda part: show(float(part), part.unit) if isinstance(part, Quantity) else part
+    )
 
 
 def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:

@@ -94,15 +94,14 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def fitting(lengths: tuple[float, ...]) -> Units:
-    """The units that need the fewest digits for the long ones among lengths (m); metric ones if the
-    lengths are round in no unit, as in a turned robot."""
+    """Units that give lengths (m) the fewest digits; short ones do not count. They are metric
+    if the lengths are round in no unit, as in a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
-
-    def digits(units: Units) -> int:
-        return sum(min(_MANY, _digits(length / units.length)) for length in long)
-
-    return min(SYSTEMS.values(), key=digits)
+    return min(
+        SYSTEMS.values(),
+        key=lambda units: sum(min(_MANY, _digits(length / units.length)) for length in long),
+    )
 
 
 _MANY = 6

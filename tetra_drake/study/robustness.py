@@ -6,15 +6,17 @@ Gaits are simulated in draws of disturbances that evolution never uses.
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import pandas
 
 from tetra_drake.engines.simulate import check_scenario, simulate_many
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type, check_whole
 from tetra_drake.figures.style import (
     OKABE_ITO,
     REFERENCE,
@@ -146,11 +148,18 @@ def robustness(
     Raises:
         InputError: if a gait is for another robot, or `percent` is too large for the scenario.
     """
+    check_type("robustness", "gaits", gaits, Mapping)
+    check_whole("robustness", "draws", draws, least=0)
+    check_whole("robustness", "seed", seed, least=0)
+    check_type("robustness", "alone", alone, bool)
+    check_type("robustness", "percent", percent, numbers.Real, NoneType)
     scenario = given_scenario(scenario)
     walkers = {key: given_gait(gait, scenario) for key, gait in gaits.items()}
     disturbances = scenario.disturbances
-    if disturbances is None or percent is not None:
-        disturbances = default_disturbances(scenario, percent or PERCENT)
+    if percent is not None:
+        disturbances = default_disturbances(scenario, float(percent))
+    elif disturbances is None:
+        disturbances = default_disturbances(scenario)
     scenario = scenario.on_engine("compiled").with_changes({"disturbances": disturbances})
     fresh = fresh_draws(scenario, seed, draws)
     plan: list[_Planned] = [({"what": NOTHING}, Draw({}))]

@@ -14,7 +14,7 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.changes import given_changes
-from tetra_drake.scenario.common_sections import by_separate_key, repeated, separate
+from tetra_drake.scenario.common_sections import different_keys, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
@@ -66,9 +66,7 @@ def sweep(
     walkers = [given_gait(gait, base) for gait in given]
     if not walkers:
         raise InputError("sweep", "gaits", "found none, expected one at least")
-    swept = given_changes(changes, "sweep")
-    if twice := repeated(swept):
-        raise InputError("sweep", twice, "is given twice")
+    swept = different_keys(given_changes(changes, "sweep"), source="sweep")
     changes = {key: _values(key, values) for key, values in swept.items()}
     count = len(walkers) * math.prod(len(values) for values in changes.values())
     if count > MOST:
@@ -124,7 +122,7 @@ def with_joined_changes(scenario: Scenario, by_joined: Mapping[str, Any]) -> Sce
     Raises InputError, naming the key. It advises to join a changed key and another one of its
     section if that helps, because a limit depends on both.
     """
-    changes = by_separate_key(by_joined)
+    changes = {key: value for joined, value in by_joined.items() for key in separate(joined)}
     try:
         return scenario.with_changes(changes)
     except InputError as error:
