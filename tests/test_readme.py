@@ -68,7 +68,7 @@ def test_the_files_of_other_kinds_are_read(work: Path) -> None:
     assert structure.nodes["f"] == pytest.approx([0.5, 0.0, 1.0])
     assert len(structure.struts["rod"].pairs) == 3
     capture, rest = load_fit_file("fit.yaml").measurements
-    assert capture.files == {"log": "log.csv", "command": "command.csv"}
+    assert (capture.log, capture.command) == ("log.csv", "command.csv")
     assert rest.positions == {"n3 z": 0.171}
 
 

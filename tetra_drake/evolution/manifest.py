@@ -80,6 +80,11 @@ class Method:
     def __str__(self) -> str:
         return f"optimiser {self.optimizer}, objective {self.objective}"
 
+    @property
+    def given_from_python(self) -> list[str]:
+        """Those of "objective" and "optimizer" that the scenario does not define."""
+        return [part for part, name in vars(self).items() if "." in name]
+
 
 def _name(given: object) -> str:
     """Name of a function, class or instance. Outside this package it includes the module, and the
@@ -254,7 +259,7 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
             if given == recorded:
                 continue
             problem = f"the run was made with {recorded}, not {given}"
-            if "." in recorded:
+            if part in ours.given_from_python:
                 call = f"tetra_drake.evolve(None, {str(directory)!r}, resume=True, {part}=...)"
                 problem += f"; resume it from Python: {call}"
             raise InputError(directory, part, problem)
