@@ -82,7 +82,7 @@ class Method:
 
     @property
     def given_from_python(self) -> list[str]:
-        """Those of "objective" and "optimizer" that the scenario does not define."""
+        """Names, "objective" or "optimizer", of what came from Python and is not in the scenario."""
         return [part for part, name in vars(self).items() if "." in name]
 
 
