@@ -1,1 +1,1 @@
-"""SIMD lanes and the compilation of kernels. This package is independent of robots."""
+"""Compiled numerical functions (kernels) and SIMD lanes. This package is independent of robots."""

@@ -36,7 +36,7 @@ _OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,  # only C code would call the wrapper
 }
 _MOMENT, _MINUTE = 2.0, 60.0
-"""Time (s) after which a compilation is announced, and time for which no other one is."""
+"""Time (s) after which a compilation is announced, and least time (s) between announcements."""
 _told = -math.inf
 """Time of the last announcement."""
 _SEAL_SIZE = hashlib.sha256().digest_size
@@ -50,7 +50,7 @@ def compiling_time() -> float:
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
-    """Decorator of a kernel that Python calls. The machine code is cached on disk.
+    """Decorator that compiles a kernel for calls from Python. The machine code is cached on disk.
 
     The cache is beside the source or in the user's cache folder. If neither can be written to (as
     in a read-only installation without a home), the kernel is compiled in each process.
@@ -63,8 +63,8 @@ def compiled(function: F, *, nogil: bool = False) -> F:
 
 
 def merged(function: F) -> F:
-    """Decorator of a large kernel. Its source becomes part of kernels that call it. It is compiled
-    separately only if Python calls it."""
+    """Decorator of a large kernel that other kernels call. Its source becomes part of them. It is
+    compiled separately only if Python calls it."""
     return _kernel(function, inline="always")
 
 

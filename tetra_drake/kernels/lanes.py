@@ -293,8 +293,8 @@ overload(inverse_sqrt)(lambda x: _inverse_sqrt_by_newton)
 
 
 def gather(numbers: Table, index: Real, offset: int) -> Real:
-    """numbers[index + offset], with an own index for each lane. `numbers` (size,) has no lanes; an
-    index is a whole number."""
+    """Reads numbers[index + offset], with an own index for each lane. `numbers` (size,) has no
+    lanes; an index is a whole number."""
     return numbers[int(index) + offset]
 
 
@@ -349,7 +349,7 @@ overload(named)(lambda kind, table: lambda kind, table: _named(kind, table))
 
 
 class Field(types.Type):
-    """Numba type of an array of numbers, in lanes or not.
+    """Numba type of an array in kernels. Its numbers are in lanes, or single numbers.
 
     `number` is the numba type of a number. `lengths` has the length of each dimension; None if the
     type does not fix it.
@@ -361,7 +361,9 @@ class Field(types.Type):
 
 
 class FieldArray:
-    """A contiguous array that kernels see as a Field. With `width`, the last axis is the lanes.
+    """Wrapper that passes a contiguous array to kernels, which see a Field.
+
+    With `width`, the last axis of the array is the lanes.
 
     Numbers are float64, or int64 without lanes. The type fixes all lengths but the first, or none
     with `any_size`. Raises ValueError for another array.
@@ -486,7 +488,7 @@ def _lower_setitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
 
 @_intrinsic
 def by_lane(context: Any, field: Any) -> Any:
-    """The memory of a field of lanes, as a field of floats (..., W)."""
+    """View of a field of lanes as a field of floats (..., W), whose last axis is the lanes."""
     width = field.number.width
     floats = Field(types.float64, (*field.lengths, width))
 

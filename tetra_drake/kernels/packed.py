@@ -15,7 +15,7 @@ kernel each array has a reference count. For the constants of a robot, this take
 computation. Moreover, numba hands a NamedTuple to another function as all of its numbers, and
 compiles hundreds of them at each call.
 
-`Packed(values)` writes addresses, lengths and numbers of NamedTuples to one row of words. The
+`Packed(values)` writes addresses, lengths and numbers of NamedTuples to a row of 64-bit words. The
 kernel gets the address of this row. An attribute of a packed NamedTuple is read from there: it is
 the address of a part of the row, a Field in place of an array, an integer or a boolean.
 """
@@ -83,7 +83,7 @@ def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
 
 
 def write_tables(to: NamedTupleT, source: NamedTupleT) -> None:
-    """Writes the numbers of a NamedTuple of tables to another one of the same sizes."""
+    """Copies the numbers of a NamedTuple of tables to another one with tables of equal shapes."""
     for ours, theirs in zip(to, source, strict=True):
         if isinstance(ours, tuple):
             write_tables(ours, theirs)
@@ -92,7 +92,7 @@ def write_tables(to: NamedTupleT, source: NamedTupleT) -> None:
 
 
 class PackedKind(types.Type):
-    """Numba type of packed values: the address of their words.
+    """Numba type of packed values: the address of their 64-bit words.
 
     `members` are the numba types of the values, and `names` their names. In a plain tuple, the
     names are numbers.
@@ -176,7 +176,7 @@ class _Attributes(AttributeTemplate):
 
 
 def _member(context: Any, builder: Any, packed: PackedKind, words: Any, place: int) -> Any:
-    """Emits the reading of a member."""
+    """Emits code that reads a member of packed values."""
     kind: Any = packed.members[place]
     first = sum(map(_words, packed.members[:place]))
 

@@ -8,8 +8,9 @@
 The state of an actuator is called its *drive*: the free length (m) of a winch, or the tension (N)
 of a tension motor. A direct force has no drive.
 
-To add a kind with a drive: a number for it, its force, a line in actuator_force(), and a section.
-Its force says which part of the tension the cable itself exerts beside the actuator.
+To add a kind with a drive, write its number, its force function, a line in actuator_force(), and a
+settings section. The force function also returns the tension that the cable's own spring and damper
+exert beside the actuator.
 """
 
 from __future__ import annotations
@@ -33,14 +34,15 @@ from tetra_drake.settings.quantities import ForceQuantity, Length, Speed, Time
 from tetra_drake.settings.section import Kinds, Section
 
 LIMITS = "limited actuators"
-"""Property that metrics of an actuator's limits need; see ActuatorKind.lacking."""
+"""Name of a property of robots: their actuators have limits. Some metrics need it."""
 
 DIRECT, WINCH, TENSION_MOTOR = range(3)
-"""Kinds of actuators."""
+"""Numbers of the kinds of actuators in kernels."""
 
 DRIVE, RATE, LIMITED, BESIDE, DRIVE_COLUMNS = range(5)
-"""Columns of the table `drives`, and their number: the drive, its rate per s, 1 if a limit binds or
-0, and ActuatorForce.beside. There is a row for each actuator with a drive."""
+"""Columns of the table `drives`, and their number: state of an actuator (its drive), rate of the
+state per s, 1 if a limit binds or 0, and ActuatorForce.beside. Each actuator with a state has a
+row."""
 
 
 class Limits(NamedTuple):
@@ -53,41 +55,41 @@ class Limits(NamedTuple):
 
 
 class Actuator(NamedTuple):
-    """The actuators of all driven cables."""
+    """Kind and limits of a robot's actuators; all driven cables have the same."""
 
     kind: int
     limits: Table
-    """Table of the numbers of Limits."""
+    """The fields of Limits as an array."""
 
 
 class ActuatorForce(NamedTuple):
-    """Tension that an actuator gives its cable, and the rate of its drive."""
+    """Tension of a driven cable, and the rate of its actuator's state (drive)."""
 
     tension: Real
     """Tension in N."""
     tension_per_rate: Real
     """Derivative of the tension with respect to the rate of the length, dT/d(dl/dt), in N s/m."""
     rate: Real
-    """Rate of the drive, per s."""
+    """Rate of the actuator's state, per s."""
     limited: Real
-    """1 if a limit binds, otherwise 0."""
+    """1 if a limit of the actuator binds, otherwise 0."""
     beside: Real
     """Part of the tension (N) that the cable's own spring and damper exert beside the actuator; 0
     if the actuator bears the whole tension."""
 
 
 class Exertion(NamedTuple):
-    """Load and pull of an actuator at an instant, and the length of its cable."""
+    """Forces of an actuator and length of its cable at an instant, to compute work and power."""
 
     load: Real
-    """Force (N) that it bears. For a direct force this is the tension, as for a motor in its
-    place."""
+    """Force (N) that the actuator bears. An ideal actuator counts as bearing the whole tension."""
     pull: Real
-    """Force (N) whose work is the actuator's: the load, or the signal of a direct force."""
+    """Force (N) that does the actuator's work: the signal of an ideal actuator, otherwise the
+    load."""
     left: Real
-    """Length (m) of its cable; the free length if a winch winds it."""
+    """Length (m) of cable that is not wound: free length for a winch, otherwise cable length."""
     limited: Real
-    """1 if a limit binds, otherwise 0."""
+    """1 if a limit of the actuator binds, otherwise 0."""
 
 
 @inlined
@@ -98,8 +100,8 @@ def has_drive(actuator: Actuator) -> bool:
 
 @inlined
 def wound(actuator: Actuator, drive: Any, otherwise: Any) -> Any:
-    """Free length (m) of a cable on a winch, which is the winch's drive; `otherwise` for other
-    actuators. Both may be numbers or tables."""
+    """Free length (m) of driven cables: the state `drive` of winches; `otherwise` if the actuators
+    are no winches. Both may be numbers or arrays."""
     if actuator.kind == WINCH:
         return drive
     return otherwise
@@ -109,8 +111,8 @@ def wound(actuator: Actuator, drive: Any, otherwise: Any) -> Any:
 def exertion(
     actuator: Actuator, drives: Table, drive: int, tension: Real, length: Real, signal: Real
 ) -> Exertion:
-    """Exertion of an actuator on a cable with a tension (N) and a length (m). `drive` is the
-    actuator's row in the table `drives`, if it has a drive."""
+    """Forces of an actuator whose cable has a tension (N) and a length (m). `drive` is the
+    actuator's row in the table `drives`, if it has a state."""
     if not has_drive(actuator):
         return Exertion(load=tension, pull=signal, left=length, limited=0.0 * length)
     load, left = tension - drives[drive, BESIDE], wound(actuator, drives[drive, DRIVE], length)
@@ -121,7 +123,7 @@ def exertion(
 def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
 ) -> ActuatorForce:
-    """Force of an actuator with a drive on a cable with a length (m) that grows at a rate
+    """Force of an actuator with the state `drive` on a cable with a length (m) that grows at a rate
     (m/s)."""
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
@@ -135,7 +137,7 @@ def actuator_force(
 def winch_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a winch on its cable. Its drive is the free length of the cable.
+    """Force of a winch on its cable. The winch's state `drive` is the free length (m).
 
     The cable goes slack as a passive one does; see laws.cable. The winch follows its command
     with a lag. It pays out with at most max_speed, and winds with at most max_speed
@@ -169,10 +171,10 @@ def winch_force(
 def motor_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a tension motor on its cable. Its drive is the tension.
+    """Force of a tension motor on its cable. The motor's state `drive` is the tension (N).
 
-    The motor keeps its cable taut at any length, so its software plays the spring and the damper of
-    Eq. 6, but it does not push. It follows its command with a lag. Its tension is at most
+    The motor keeps its cable taut at any length. Its software imitates the spring and the damper of
+    Eq. 6, but the motor does not push. It follows its command with a lag. Its tension is at most
     max_force (1 - winding speed / max_speed).
     """
     left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
@@ -214,19 +216,20 @@ class DrivenCables(NamedTuple):
 
 
 class ActuatorKind(Section):
-    """Base class of the kinds of actuators. Each driven cable has an actuator.
+    """Base class for the settings of actuators. Each driven cable has an actuator.
 
-    The methods here are for actuators without drives.
+    The methods here are for actuators without a state.
     """
 
     kind: ClassVar[int]
     """Number of the kind in kernels, such as WINCH."""
     lacking: ClassVar[tuple[str, ...]] = ()
-    """Properties that some metrics need and these actuators do not have."""
+    """Properties, such as LIMITS, that some metrics need and these actuators do not have."""
     commanded: ClassVar[str]
-    """Commanded quantity with its unit: the end of a column's name in command files."""
+    """Commanded quantity with its unit, such as force_N: the end of a column's name in command
+    files."""
     command_unit: ClassVar[float] = 1.0
-    """Size of the unit of `commanded` in SI."""
+    """Unit of the commanded quantity in SI, such as 1e-3 for mm."""
     keeps_spring: ClassVar[bool] = False
     """True if the cable's own spring and damper act beside the actuator."""
     plays_cable: ClassVar[bool] = False
@@ -234,18 +237,18 @@ class ActuatorKind(Section):
     effect."""
 
     def actuator(self) -> Actuator:
-        """The actuators in the form of the kernels. Settings are limits of the same names."""
+        """Kind and limits of the actuators for the kernels, from the settings of the same names."""
         return Actuator(self.kind, np.array(Limits(**dict(self))))
 
     def excess(self, signal: float, *, free_length: float) -> str:
-        """Words that say how signals up to `signal` (N) exceed the actuator's limits.
+        """Error text if signals up to `signal` (N) exceed the actuator's limits, otherwise empty.
 
-        Empty if they do not. `free_length` (m) is the least free length that they command.
+        `free_length` (m) is the least free length that the signals command.
         """
         return ""
 
     def drives(self, cables: DrivenCables) -> Any:
-        """States of the actuators (..., drives); see laws.actuator."""
+        """States of the actuators (..., drives) for cables in a given condition."""
         return cables.signal[..., :0]
 
     def commands(self, cables: DrivenCables) -> Any:
@@ -273,7 +276,7 @@ class LimitedActuator(ActuatorKind):
     max_force: ForceQuantity = Field(gt=0)
     """Tension at which the actuator stalls. A greater tension pulls a winch backward."""
     max_speed: Speed = Field(gt=0)
-    """Speed without tension."""
+    """Speed at which the actuator winds a cable without tension."""
     time_constant: Time = Field(gt=0)
     """Time constant of the lag with which the actuator follows its command."""
 
@@ -286,10 +289,10 @@ class Winch(LimitedActuator):
     command_unit = 1e-3
 
     time_constant: Time = Field(default=0.02, gt=0)
-    """Time constant of the lag with which the free length follows its command. The default is the
-    1 / (2 pi f) of a position loop with a bandwidth f of 8 Hz, typical of small geared motors."""
+    """Time constant of the lag with which the free length follows its command. The default is
+    1 / (2 pi f) for a position loop with a bandwidth f of 8 Hz, typical of small geared motors."""
     least_length: Length = Field(default=0.0, ge=0)
-    """Least free length of a cable."""
+    """Least free length to which the winch winds a cable."""
 
     def excess(self, signal: float, *, free_length: float) -> str:
         if free_length >= self.least_length:
@@ -329,4 +332,4 @@ class TensionMotor(LimitedActuator):
 
 
 Actuation = Annotated[Force | Winch | TensionMotor, Kinds()]
-"""Union of the kinds of actuators. A mapping without a tag is of the first kind."""
+"""Settings of the actuators, of any kind. Without a YAML tag such as !Winch they are a Force."""

@@ -30,10 +30,10 @@ class CableConstants(Section):
     """Settings of cables that all kinds of robots have in common."""
 
     damping: Damping = Field(ge=0)
-    """Tension per rate of the length."""
+    """Damping coefficient of a cable: tension divided by the rate of its length."""
 
     def constants(self, *, stiffness: float, free_length: float) -> dict[str, float]:
-        """Constants of a cable by the names of CableLaw: these settings and the given ones."""
+        """Constants of one cable as keyword arguments of CableLaw, in SI units."""
         own = {name: getattr(self, name) for name in CableConstants.model_fields}
         return own | {"stiffness": stiffness, "free_length": free_length}
 
@@ -58,11 +58,11 @@ CABLE = np.dtype(
         *((name, float) for name in CableLaw._fields),
     ]
 )
-"""Record of a cable: indices of its two nodes, index of its signal, and its constants in SI."""
+"""NumPy record type of a cable: indices of its two nodes and its signal, and constants in SI."""
 
 
 class Cables(NamedTuple):
-    """Cables of a robot for the kernels: a table (cables,) for each field of CABLE."""
+    """Cables of a robot for the kernels: nodes, signals and constants, as arrays (cables,)."""
 
     node_a: Table
     node_b: Table
@@ -138,7 +138,10 @@ def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]
 
 
 def tendon_faults(cables: Table, *, slack: bool) -> dict[str, Table]:
-    """Differences between MuJoCo's tendons and cables in an array of dtype CABLE: a sentence for
-    each, with True for the cables (cables,) that differ. `slack` is true if cables go slack."""
+    """Cables that MuJoCo's tendons cannot imitate: a mask (cables,) for each reason.
+
+    The keys are the reasons as sentences. `cables` is an array of dtype CABLE. `slack` is true if
+    cables go slack.
+    """
     is_damped = slack & (cables["damping"] != 0.0)
     return {"the dampers of MuJoCo's tendons also act where a cable is slack": is_damped}

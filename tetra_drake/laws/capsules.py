@@ -65,8 +65,8 @@ from tetra_drake.settings.section import Kinds, Section
 PARALLEL = 0.01
 """Angle (rad) of two struts below which they count as thicker in the middle."""
 BARREL = 0.2
-"""Weight of the distances of a contact from the middles of parallel struts, as a share of the sum
-of the radii. At the ends of both struts this sum is smaller by BARREL² / 4, that is 1 %."""
+"""Factor in the weight w that makes nearly parallel struts count as thicker in the middle. At the
+ends of both struts the sum of the radii is smaller by BARREL² / 4, that is 1 %."""
 LEAST_SQUARE = 1e-30
 """Lower limit (m²) of squared distances, for axes that meet. The force is zero there."""
 
@@ -90,13 +90,14 @@ class StrutContactLaw(NamedTuple):
     acts: bool
     """False if struts pass through each other."""
     normal: Table
-    """Table of the numbers of NormalForce."""
+    """The fields of NormalForce as an array."""
     search: Table
-    """Table of the numbers of StrutSearch."""
+    """The fields of StrutSearch as an array."""
 
 
 class NearStruts(NamedTuple):
-    """Memory for the pairs of struts that are near each other; empty without contact of struts."""
+    """List of the pairs of struts that are near each other; empty if struts pass through each
+    other."""
 
     p_WN: Annotated[Table, "strut_nodes", 3, math.inf]
     """Positions (nodes, 3) in m of the nodes at the latest search; infinite before the first."""
@@ -107,7 +108,7 @@ class NearStruts(NamedTuple):
 
     @classmethod
     def of(cls, struts: Struts) -> Self:
-        """Memory for the near pairs among struts."""
+        """New list of the near pairs among struts, before the first search."""
         return allocate(cls, near_sizes(struts))
 
 
@@ -183,8 +184,8 @@ def time_to_pass(
     Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
     pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
     least half of the difference of `near` and the largest distance that touches. This bound does
-    not depend on the time of the latest search. So a robot moves alike beside any other robots in
-    the lanes.
+    not depend on the time of the latest search. So the motion of a robot does not depend on the
+    robots in other lanes.
     """
     if not law.acts:
         return horizon
@@ -301,27 +302,27 @@ def depth_rate(struts: Struts, nodes: Table, i: int, j: int, touch: Touch) -> Re
 
 
 class NoStrutContact(Section):
-    """Struts pass through each other, as in the thesis."""
+    """No contact of struts: they pass through each other, as in the thesis."""
 
     tag: ClassVar[str] = "Nothing"
 
     def law(self, search: StrutSearch) -> StrutContactLaw:
-        """The law in the form of the kernels. `search` has the distances of the search."""
+        """Constants of the law for the kernels. `search` has the distances of the search."""
         return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
 
 
 class HuntCrossley(Section):
-    """Struts touch as capsules of their radii, without friction. The force at a depth d of their
-    overlap is F = k d (1 + c d'); see laws.capsules."""
+    """Contact of struts as capsules with the struts' radii, without friction. The force at a depth
+    d of the overlap is F = k d (1 + c d'); see laws.capsules."""
 
     stiffness: Stiffness = Field(gt=0)
-    """Force per depth, k."""
+    """Stiffness k of a contact: force divided by depth of the overlap."""
     dissipation: InverseSpeed = Field(ge=0)
-    """Hunt-Crossley dissipation c, as Drake's. It lowers the restitution of an impact at a low
-    speed v: e = 1 - 2/3 c v."""
+    """Hunt-Crossley dissipation c, defined as in Drake. It lowers the restitution e of an impact at
+    a low speed v: e = 1 - 2/3 c v."""
 
     def law(self, search: StrutSearch) -> StrutContactLaw:
-        """The law in the form of the kernels. `search` has the distances of the search."""
+        """Constants of the law for the kernels. `search` has the distances of the search."""
         normal = NormalForce(self.stiffness, damping=self.stiffness * self.dissipation)
         return StrutContactLaw(acts=True, normal=np.array(normal), search=np.array(search))
 

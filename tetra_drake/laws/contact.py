@@ -58,10 +58,10 @@ class GroundSection(Section):
     """Stiffness and damping of the ground, which give the normal force (Table 1)."""
 
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    """Normal force per penetration of a node."""
+    """Stiffness of the ground: normal force divided by the depth of a node in the ground."""
     damping: Annotated[DampingPerLength, Varied()] = Field(ge=0)
-    """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
-    speed v: e = 1 - alpha v (Eq. 2)."""
+    """Damping of the ground: lambda = 3/2 alpha stiffness. The constant alpha (s/m) lowers the
+    restitution e of an impact at the speed v: e = 1 - alpha v (Eq. 2)."""
 
 
 class NormalForce(NamedTuple):
@@ -76,29 +76,29 @@ class Ground(NamedTuple):
     nodes)."""
 
     contacts: Table
-    """Rows (contacts,) of the table `nodes` that touch the ground. The row of a foot without radius
-    is the contact node; rows of round feet, their lowest points, come after all nodes."""
+    """Rows (contacts,) of the table `nodes` on which the ground acts. The row of a foot without
+    radius is its contact node. The rows of round feet are their lowest points, after all nodes."""
     centres: Table
-    """Indices of the contact nodes (contacts,)."""
+    """Indices of the contact nodes (contacts,), which are the centres of the feet."""
     radius: Table
     """Radii of the feet (contacts,)."""
     carriers: Table
     """Index of the body of each contact node (contacts,), ascending."""
     is_round: bool
-    """True if a foot has a radius."""
+    """True if at least one foot has a radius."""
     normal: Table
-    """Table of the numbers of NormalForce."""
+    """The fields of NormalForce as an array."""
     friction: friction.FrictionLaw
     flat: bool
     grid: Table
-    """Table of the numbers of SurfaceGrid."""
+    """The fields of terrain.SurfaceGrid as an array."""
     heights: Any
     """Heights (points,) of the surface's control points in m, row by row. None in lanes, which
     share one table of heights."""
 
     @classmethod
     def nowhere(cls) -> Self:
-        """Ground that no node may touch."""
+        """Ground without contact nodes, for a robot that touches nothing."""
         no_index, none = np.zeros(0, dtype=np.int64), np.zeros(0)
         return cls(
             contacts=no_index,
@@ -114,7 +114,7 @@ class Ground(NamedTuple):
         )
 
     def under(self, centres: Table, *, carriers: Table, radius: Table, nodes: int) -> Self:
-        """Copy of this ground with contact nodes.
+        """Copy of this ground that acts on the given contact nodes.
 
         Args:
             centres: indices of the contact nodes (contacts,).
@@ -189,7 +189,8 @@ def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
 def sliding(
     state: Table, nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
 ) -> tuple[friction.Slide, Real]:
-    """Motion of foot i along the ground with its normal force, and the rate (m/s) of its gap."""
+    """Motion of foot i along the ground, with its normal force, and the rate (m/s) of its distance
+    from the ground."""
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     v_WN = vector_at(nodes, ground.contacts[i], kinematics.V_WN)
     deflection = difference(p_WN, vector_at(modes, i, STICK_POINT))

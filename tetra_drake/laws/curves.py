@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 _SWAY = 2e-3
-"""Size (m) of a path that may be swaying on the spot. Such a path counts as straight."""
+"""Size (m) of the path of a robot that only sways on the spot. Such a path counts as straight."""
 
 
 def curvature(points: np.ndarray, *, scale: float = 1.0) -> float:

@@ -7,8 +7,8 @@ opposite signs and loads with equal signs.
 Feedback must be smooth within a step of an integrator. Forces are smooth there, and modes are
 constant. The sign of a gap jumps, so feedback must not depend on it.
 
-To add a pathway: a field of Gains, and its part of sense(). All engines have the state, the modes
-and Forces. A constant of the robot is a field of Senses, which robot.robot fills in.
+To add a pathway, write a field of Gains and its lines in sense(). All engines have the state, the
+modes and Forces. A constant of the robot is a field of Senses, which robot.robot fills in.
 """
 
 from __future__ import annotations
@@ -32,17 +32,18 @@ class Gains(Section):
     """
 
     length: float = 0.0
-    """Relative elongation of the oscillator's cables from their lengths in equilibrium, mean over
-    the cables: + on the extensor, - on the flexor."""
+    """Gain of the mean relative elongation of the oscillator's cables, measured from their lengths
+    in equilibrium: + on the extensor, - on the flexor."""
     load: float = 0.0
-    """Share of the robot's weight on the feet of the body in front: + on both."""
+    """Gain of the share of the robot's weight on the feet of the body in front: + on both
+    neurons."""
     pitch: float = 0.0
-    """Sine of the angle by which the x axis of the body in front points up: + on the extensor, - on
-    the flexor."""
+    """Gain of the sine of the angle by which the x axis of the body in front points up: + on the
+    extensor, - on the flexor."""
 
 
 PATHWAYS = tuple(Gains.model_fields)
-"""Names of the pathways, in the order of tables of gains."""
+"""Names of the feedback pathways. Arrays of gains have this order."""
 
 if TYPE_CHECKING:
     Pathway = str
@@ -53,7 +54,7 @@ else:
 
 
 class Senses(NamedTuple):
-    """Constants of the feedback to m oscillators.
+    """Constants of a robot from which the feedback to its m oscillators is computed.
 
     All tables have one axis. The types of tables contain all lengths but the first (see
     kernels.lanes). With two axes, kernels would be compiled again for robots of another size.
@@ -112,7 +113,7 @@ def compute_feedback(
 ) -> None:
     """Computes the forces of a robot, and then its feedback; see sense().
 
-    The robot has signals (m,) in N, and drives (drives,).
+    The robot has signals (m,) in N, and actuator states `drives` (drives,).
     """
     robot, forces, senses = unpacked(parts)
     compute_forces_at(robot, state, modes, signals, drives, forces)

@@ -25,28 +25,28 @@ from tetra_drake.laws.vectors import (
 
 
 class Forces(NamedTuple):
-    """Memory for the forces on a robot in a state, which kernels write."""
+    """Arrays for the forces on a robot in one state. Kernels write to them."""
 
     nodes: Annotated[Table, "nodes", kinematics.NODE_COLUMNS]
     frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]
-    """Frames of the surface at the contact nodes; see laws.terrain."""
+    """Tangent frames of the ground at the contact nodes; see laws.terrain."""
     cable_forces: Annotated[Table, "cables", cable.CABLE_FORCE_COLUMNS]
     ground_forces: Annotated[Table, "contacts", contact.GROUND_FORCE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Inertia of the bodies along the world's axes; unused if they are isotropic."""
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
-    """Drives of the actuators, in the order of the driven cables. Column DRIVE is input, the other
-    columns are output."""
+    """States of the actuators and their rates, in the order of the driven cables. Column DRIVE is
+    input, the other columns are output; see laws.actuator."""
     near_struts: capsules.NearStruts
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """Memory for the forces on a robot."""
+        """New arrays for the forces on a robot."""
         return allocate(cls, sizes_of(robot))
 
 
 def sizes_of(robot: Model) -> dict[str, int]:
-    """Sizes of the tables of a robot, by the names that annotations use; see allocate()."""
+    """Lengths of a robot's tables, such as "bodies" and "cables", for allocate()."""
     drivers, has_drive = robot.cables.signal, actuator.has_drive(robot.actuator)
     near = capsules.near_sizes(robot.struts)
     if not robot.strut_contact.acts:
@@ -63,7 +63,7 @@ def sizes_of(robot: Model) -> dict[str, int]:
 
 
 Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
-"""A robot and the memory for its forces, packed for kernels that Python calls often."""
+"""A Model and its Forces, as one argument for kernels that Python calls often."""
 
 
 @inlined
@@ -87,12 +87,12 @@ def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
 def pull_of_cable(
     robot: Model, i: int, drive: int, length: Real, rate: Real, signals: Table, drives: Table
 ) -> tuple[Real, Real, int]:
-    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the index of
-    the next drive.
+    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the next row of
+    `drives`.
 
-    `drive` is the index of the cable's drive, if it has one; then the other columns of
-    `drives` are written. The length is in m, its rate in m/s, `signals` (signals,) in N. An
-    actuation force acts beside the spring and the damper of a cable that goes slack.
+    If the cable's actuator has a state, `drive` is the actuator's row in the table `drives`, and
+    the other columns of this row are written. The length is in m, its rate in m/s, `signals`
+    (signals,) in N. An actuation force also acts on a cable that is slack.
     """
     driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:
@@ -118,8 +118,8 @@ def pull_of_cable(
 def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
     """Adds the forces of all cables to the forces on the nodes.
 
-    `signals` (signals,) are in N. Also writes the rates of the drives, and with `write_parts` the
-    table `cable_forces`.
+    `signals` (signals,) are in N. Also writes the rates of the actuators' states, and with
+    `write_parts` the table `cable_forces`.
     """
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
     drive = 0
@@ -222,7 +222,7 @@ def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
 
 @inlined
 def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
-    """Adds the forces between struts, of anchors and of loads to the forces on the nodes."""
+    """Adds the forces of touching struts, anchors and loads to the forces on the nodes."""
     nodes, anchors, loads = forces.nodes, robot.anchors, robot.loads
     radius, law, near = robot.bodies.radius, robot.strut_contact, forces.near_struts
     capsules.add_strut_forces(robot.struts, law, radius, state, nodes, near)
@@ -245,8 +245,8 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
 def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> float:
     """Writes the generalized force of all cables (6 bodies,): [t_W; f_W] at each body's origin.
 
-    Also writes nodes, `cable_forces` and the rates of the drives. Returns a number that is finite
-    if all forces are.
+    Also writes nodes, `cable_forces` and the rates of the actuators' states. Returns a number that
+    is finite if all forces are.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
@@ -301,9 +301,12 @@ def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized
 def forces_of_motion(
     robot: Model, states: np.ndarray, modes: np.ndarray, signals: np.ndarray, drives: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Tables `nodes` (k, nodes, NODE_COLUMNS), without the rows of feet, `cable_forces`
-    (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS) of a
-    motion with k samples; see forces_along()."""
+    """Node motions, cable forces and ground forces at each of the k times of a recorded motion.
+
+    Returns the tables `nodes` (k, nodes, NODE_COLUMNS), without the rows of feet, `cable_forces`
+    (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS). For
+    the shapes of the arguments see forces_along().
+    """
     forces, samples = Forces.of(robot), len(states)
     nodes = np.empty((samples, len(robot.p_BN), kinematics.NODE_COLUMNS))
     cable_forces = np.empty((samples, *forces.cable_forces.shape))
@@ -324,11 +327,11 @@ def forces_along(
     cable_forces: Table,
     ground_forces: Table,
 ) -> None:
-    """Writes the tables `nodes`, `cable_forces` and `ground_forces` of a motion with k samples; see
-    forces_of_motion().
+    """Writes `nodes`, `cable_forces` and `ground_forces` at each of the k times of a recorded
+    motion; see forces_of_motion().
 
     The motion has states (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m) in N,
-    and drives (k, drives).
+    and actuator states `drives` (k, drives).
     """
     robot, forces = unpacked(parts)
     for k in range(states.shape[0]):
@@ -342,7 +345,8 @@ def forces_along(
 def compute_forces_at(
     robot: Model, state: Table, modes: Table, signals: Table, drives: Table, forces: Forces
 ) -> None:
-    """Computes all tables of Forces for a state (13 bodies,) and drives (drives,)."""
+    """Computes all tables of Forces for a state (13 bodies,) and actuator states `drives`
+    (drives,)."""
     generalized = np.empty(6 * robot.bodies.mass.size)
     move_robot(robot, state, forces)
     for i in range(drives.size):

@@ -69,7 +69,7 @@ from tetra_drake.settings.section import Kinds, Section, Varied, settings_text
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
 RESET_INTEGRATOR, COULOMB = range(2)
-"""Kinds of laws."""
+"""Numbers of the friction laws in kernels."""
 
 STICK = 0.0
 """Friction mode of a node that sticks."""
@@ -96,7 +96,8 @@ class FrictionKind(Section):
     modes: ClassVar[str]
     """Meaning of the signs of friction modes in recorded trajectories."""
     cone_text: ClassVar[str] = ""
-    """Description of MuJoCo's friction for pages, if it is another law; otherwise empty."""
+    """Description of the law that MuJoCo uses in place of this one, for pages; empty if it is the
+    same."""
 
     def law(self) -> FrictionLaw:
         """The law of friction for the kernels."""
@@ -119,12 +120,12 @@ class FrictionKind(Section):
 
 
 class FrictionLaw(NamedTuple):
-    """Law of friction for the kernels."""
+    """Kind and constants of a friction law for the kernels."""
 
     kind: int
     """RESET_INTEGRATOR or COULOMB."""
     constants: Table
-    """Table of the numbers of ResetConstants or CoulombConstants."""
+    """The fields of ResetConstants or CoulombConstants as an array."""
 
 
 class TangentSlide(NamedTuple):
@@ -155,7 +156,7 @@ class NextMode(NamedTuple):
     begins: tuple[Truth, Truth]
     """For each tangent, True if the node begins to stick along it."""
     bend: Vector2
-    """Deflection (m) along each tangent with which it begins to stick."""
+    """Deflection (m) of the bristle along each tangent when the node begins to stick."""
 
 
 @inlined
@@ -204,8 +205,8 @@ class ResetIntegrator(FrictionKind):
     """Tangents along which a node breaks free: `each` by itself, or `both` as soon as the
     deflection along one reaches the stiction range."""
     load: ForceQuantity | None = Field(default=None, gt=0)
-    """Normal force at which friction is as given; friction is proportional to the normal force. If
-    not given, friction is independent of it."""
+    """Normal force for which the other settings are given: friction is proportional to the normal
+    force. Without `load`, friction does not depend on it."""
 
     def law(self) -> FrictionLaw:
         same = {name: value for name, value in self if name in ResetConstants._fields}
@@ -268,8 +269,11 @@ def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
 
 @inlined
 def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, Real, Real]:
-    """Stiff part of -(time d/dv + time² d/dx) of the friction: components 11, 12 and 22. For the
-    reset integrator these are damping and stiffness in stick."""
+    """Damping matrix of the friction for an implicit step of length `time` (s).
+
+    Returns the components 11, 12 and 22 of the stiff part of -(time d/dv + time² d/dx). For the
+    reset integrator this part is the damping and stiffness in stick.
+    """
     stiffness = time * law.stiffness * (1.0 + law.stiction_switch)
     by_load = select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
     damping = time * (law.stiction_damping + stiffness) * by_load
@@ -308,9 +312,13 @@ def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
 
 @inlined
 def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
-    """Next mode along one tangent. A node that `breaks` free slips in the direction of its
-    velocity. The other tangent may free it with a `share` of the stiction range as deflection. A
-    node sticks again when its velocity changes sign."""
+    """Next mode of the reset integrator along one tangent.
+
+    If the node `breaks` free along this tangent, it slips in the direction of its velocity. If it
+    breaks free along the other tangent, it may slip along this one, too. The mode is then `share`,
+    the deflection divided by the stiction range. The node sticks again when its velocity changes
+    sign.
+    """
     from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
     mode = select(slide.mode == STICK, from_stick, slide.mode)
     return select(mode * slide.velocity > 0.0, mode, STICK)
@@ -318,8 +326,11 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
 
 @inlined
 def reset_margin(slide: Slide, law: ResetConstants) -> float:
-    """Mode margin of the reset integrator: the smaller margin of the two tangents. A node that
-    sticks may be at the stiction range as long as it moves inward."""
+    """Mode margin of the reset integrator: positive until the mode changes along a tangent.
+
+    It is the smaller margin of the two tangents. A node that sticks may be at the stiction range as
+    long as it moves inward.
+    """
     margin = math.inf
     for tangent in (slide.t1, slide.t2):
         if tangent.mode == STICK:
@@ -484,10 +495,10 @@ def coulomb_force(slide: Slide, law: CoulombConstants) -> Vector2:
 
 @inlined
 def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Real, Real, Real]:
-    """Stiff part of -(time d/dv + time² d/dx) of the friction: components 11, 12 and 22.
+    """Damping matrix of the friction for an implicit step of length `time` (s).
 
-    Beyond the limit only the direction of the force changes. This is exact without directional
-    factors.
+    Returns the components 11, 12 and 22 of the stiff part of -(time d/dv + time² d/dx). Beyond the
+    limit only the direction of the force changes. This is exact without directional factors.
     """
     bristle = bristle_force(slide, law)
     stiffness = select(bristle.stuck, time * law.stiffness, 0.0)
@@ -518,7 +529,10 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
 
 @inlined
 def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
-    """Mode margin (N) of Coulomb friction: in stick limit - size, in slip size - limit."""
+    """Mode margin (N) of Coulomb friction: positive until the mode changes.
+
+    It is limit - size of the bristle's force in stick, and size - limit in slip.
+    """
     bristle = bristle_force(slide, law)
     if not bristle.stuck:
         return bristle.size - bristle.limit
@@ -548,8 +562,8 @@ def time_to_coulomb_change(
 
 
 def by_law(reset: F, coulomb: F) -> F:
-    """Makes a function of a FrictionLaw and other arguments. It calls the function of that law with
-    the other arguments and the law's constants."""
+    """Combines a function of each friction law into one whose first argument is a FrictionLaw. It
+    calls the function of this law with the other arguments and the law's constants."""
 
     @inlined
     def call(friction: FrictionLaw, *more: Any) -> Any:
@@ -566,11 +580,12 @@ friction_force = by_law(reset_force, coulomb_force)
 """Friction (N) along both tangents on a node that touches the ground; arguments: slide."""
 
 friction_damping = by_law(reset_damping, coulomb_damping)
-"""Stiff part of -(time d/dv + time² d/dx) of the friction: components 11, 12 and 22; arguments:
-slide, time (s)."""
+"""Damping matrix of the friction for an implicit step: components 11, 12 and 22 of the stiff part
+of -(time d/dv + time² d/dx); arguments: slide, time (s)."""
 
 next_mode = by_law(next_reset_mode, next_coulomb_mode)
-"""NextMode of a node that stays on the ground; arguments: slide."""
+"""Friction mode (NextMode) at the end of a step, for a node that stays on the ground; arguments:
+slide."""
 
 friction_margin = by_law(reset_margin, coulomb_margin)
 """Mode margin of a node on the ground: positive until its friction mode changes, zero at the
@@ -582,4 +597,5 @@ acceleration along the tangents, rate of the normal force (N/s), horizon (s)."""
 
 
 Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]
-"""Union of the kinds of friction. A mapping without a tag is of the first kind."""
+"""Settings of friction, of either kind. Without a YAML tag such as !Coulomb they are a
+ResetIntegrator."""

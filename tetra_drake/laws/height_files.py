@@ -26,10 +26,10 @@ RECORDED = re.compile(r"heights-[0-9a-f]{16}\.npy")
 
 
 class HeightFile(str):
-    """Heights of a terrain from a file. As a text, the name of the file in a record.
+    """Heights of a terrain from a file. As a string it is the file's name in a record.
 
-    The name contains a digest of the heights, so equal names mean equal heights. In the tree of a
-    scenario, a path is given instead.
+    The name contains a digest of the heights, so equal names mean equal heights. A scenario file
+    gives the path of a height file instead.
     """
 
     heights: np.ndarray
@@ -61,7 +61,7 @@ class HeightFile(str):
         return file
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Writes the heights to a folder, as a file with this name."""
+        """Writes the heights to a folder. The file has this string as its name."""
         content = io.BytesIO()
         np.lib.format.write_array(content, self.heights, version=(1, 0))
         write_whole(os.path.join(folder, self), content.getvalue())
@@ -72,7 +72,7 @@ HeightPath = Annotated[
     PlainValidator(HeightFile.read, json_schema_input_type=str),
     Field(json_schema_extra={"format": "file name"}),
 ]
-"""Setting of a section: in files a path."""
+"""Type of a setting that is a height file. A scenario file gives its path."""
 
 
 def _read_heights(path: str) -> np.ndarray:

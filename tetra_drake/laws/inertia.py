@@ -1,4 +1,4 @@
-"""Inertia of bodies that are not isotropic: moments differ between axes.
+"""Inertia of bodies whose moments of inertia differ between axes (bodies that are not isotropic).
 
 An *inertia* is a row of a table (bodies, 6): moments and products xx, yy, zz, xy, xz, yz of a body
 about its centre of mass. Angular momentum is inertia times angular velocity.

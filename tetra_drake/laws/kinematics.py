@@ -61,8 +61,8 @@ def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> No
 
 
 _LEAST_INERTIA = 1e-9
-"""Moment of inertia, as a share of the sum of all three, that is added about each axis. So nodes on
-a line have no angular velocity about it."""
+"""Moment of inertia that is added about each axis, divided by the sum of all three moments. So
+nodes on a line have no angular velocity about the line."""
 
 
 @inlined
@@ -154,8 +154,8 @@ def put_orientation(state: Table, body: int, row: int, column: int, table: Table
 
 @inlined
 def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> Vector3:
-    """Rotation vector (rad) in the world frame that turns a body from an orientation of
-    put_orientation() to its present one, to third order in the angle."""
+    """Rotation vector (rad) in the world frame from an earlier orientation of a body to its present
+    one, to third order in the angle. put_orientation() has stored the earlier orientation."""
     w, x, y, z = state[7 * body], state[7 * body + 1], state[7 * body + 2], state[7 * body + 3]
     i_w, i = table[row, column], vector_at(table, row, column + 1)
     turned = sum_of(sum_of(scaled(w, i), scaled(i_w, (x, y, z))), cross((x, y, z), i))
@@ -205,10 +205,11 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
 
 @compiled
 def interpolate_state(before: Table, after: Table, step: float, part: float) -> Table:
-    """State (13 bodies,) within a step of length `step` (s), at the share `part` (0 to 1) of it.
+    """State (13 bodies,) between the states at the beginning and end of a step of `step` seconds.
 
-    Positions are cubic polynomials that fit positions and velocities at both ends. Velocities are
-    linear. At part 1 the state equals `after`.
+    `part` (0 to 1) is the time since the beginning, divided by `step`. Positions are cubic
+    polynomials that fit positions and velocities at both ends. Velocities are linear. If `part` is
+    1, the state equals `after`.
     """
     bodies = before.size // 13
     between = after.copy()

@@ -1,4 +1,4 @@
-"""Constants of a robot for the kernels."""
+"""Constants of a robot, as arrays that compiled functions (kernels) read."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from tetra_drake.laws.contact import Ground
 from tetra_drake.laws.struts import Struts
 
 WORLD = -1
-"""Index of the world among the bodies: of fixed nodes, which belong to no body."""
+"""Body index that stands for the world. Fixed nodes have it, because they belong to no body."""
 
 
 class Bodies(NamedTuple):
-    """Constants of the bodies; SI units."""
+    """Masses, inertias and sizes of a robot's rigid bodies; SI units."""
 
     mass: Table
     """Masses (bodies,)."""
     inertia: Table
     """Inertia (bodies, 6) about the centre of mass in the body's frame; see laws.inertia."""
     radius: Table
-    """Largest distance of a node from the centre of mass (bodies,)."""
+    """Largest distance of a node of the body from its centre of mass (bodies,)."""
     weight: Table
     """Weights (bodies,)."""
 
@@ -42,7 +42,7 @@ class Couplings(NamedTuple):
     """Index of the first cable of each pair (pairs + 1,); the last number is the number of
     cables."""
     held: Table
-    """Index of the body of each cable from a fixed node (fixed cables,)."""
+    """Index of the body at the end of each cable from a fixed node (fixed cables,)."""
 
 
 class AnchorSprings(NamedTuple):
@@ -103,7 +103,10 @@ class Model(NamedTuple):
         ground: Ground | None = None,
         slack: bool = True,
     ) -> Self:
-        """Model that has only cables, or only a ground, at nodes of bodies."""
+        """Model with cables only, or with ground contact only.
+
+        It gives forces on nodes; the masses of its bodies are 0.
+        """
         bodies, none = first_node.size - 1, np.zeros(0)
         no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         first = np.zeros(bodies + 1, dtype=np.int64)

@@ -42,12 +42,13 @@ class CpgSection(Section):
     partner_weight: float = Field(ge=0)
     """Weight of the inhibition between extensor and flexor of an oscillator."""
     gain: ForceQuantity
-    """Force per unit of y_extensor - y_flexor."""
+    """Signal (a force) of an oscillator per unit of its output y_extensor - y_flexor."""
     start_up: Time = Field(ge=0)
     """Time until which the cables are not actuated."""
     signals: Literal["listing", "live"]
-    """`listing`: forward Euler beforehand, as in the thesis's listing. `live`: the network is
-    integrated with the robot. Feedback needs `live`."""
+    """How the signals are computed. `listing`: before the simulation, by forward Euler, as in the
+    thesis's listing. `live`: the network is integrated together with the robot. Feedback needs
+    `live`."""
     listing_step: Time = Field(ge=1e-6)
     """Time step of signals that are computed beforehand."""
     reach: int | None = Field(default=None, ge=0)
@@ -113,7 +114,7 @@ class Network(NamedTuple):
 
 
 def make_neurons(state: np.ndarray) -> np.ndarray:
-    """Table `neurons` of a network in a state (4n,): u of all neurons, then v."""
+    """New table `neurons` of a network whose state (4n,) is u of all neurons, then v."""
     neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
     neurons[:, U], neurons[:, V] = state.reshape(2, -1)
     return neurons
@@ -187,7 +188,7 @@ def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table
 def network_output(
     network: Network, inputs: Table, step: float, listing: bool, neurons: Table, output: Table
 ) -> None:
-    """Writes the outputs (samples, n) of a network without lanes, one sample per step (s).
+    """Writes the outputs (samples, n) of a single network over time, one sample per step (s).
 
     `inputs` has a row (2n,) for each of the first steps. Later steps use its last row. With
     `listing`, the method is forward Euler, and sample i is the state after i + 1 steps, as in
@@ -205,8 +206,8 @@ def network_output(
 
 @inlined
 def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """First half of a step (s) of Heun's method (order 2): an Euler step. `inputs` are at the
-    beginning of the step."""
+    """First half of a step (s) of Heun's method (order 2): an Euler step. `inputs` are the inputs
+    at the beginning of the step."""
     neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
@@ -219,8 +220,8 @@ def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table)
 def correct_neurons(
     network: Network, inputs: Table, step: Real, accepted: Truth, neurons: Table
 ) -> None:
-    """Second half of a step of Heun's method. `inputs` are at the end of the step. Without
-    `accepted`, the neurons return to the beginning of the step."""
+    """Second half of a step of Heun's method. `inputs` are the inputs at the end of the step. Where
+    `accepted` is false, the neurons return to their values at the beginning of the step."""
     neuron_rates(network, inputs, neurons)
     half = 0.5 * step
     for i in range(neurons.shape[0]):

@@ -24,7 +24,7 @@ class Springs(NamedTuple):
     """Indices of the first bodies (springs,)."""
     body_b: np.ndarray
     motion_a: np.ndarray
-    """Displacements (springs, k, 6) by the six motions of the first bodies; see
+    """Displacements (springs, k, 6) of the springs for unit motions of the first bodies; see
     kinematics.rigid_motions()."""
     motion_b: np.ndarray
     stiffness: np.ndarray

@@ -35,8 +35,8 @@ class Struts(NamedTuple):
 
 
 class Axes(NamedTuple):
-    """Axes of two struts: vectors u and v along them, and r from the start of the second to the
-    start of the first, with their scalar products."""
+    """Geometry of two struts: vectors u and v along their axes, vector r from the start of the
+    second to the start of the first, and the scalar products of these vectors."""
 
     u: Vector3
     v: Vector3
@@ -50,7 +50,7 @@ class Axes(NamedTuple):
 
 @inlined
 def axes_of(struts: Struts, nodes: Table, i: int, j: int) -> Axes:
-    """Axes of struts i and j. `nodes` is the table of laws.kinematics."""
+    """Geometry of struts i and j; see Axes. `nodes` is the table of laws.kinematics."""
     start_i = vector_at(nodes, struts.node_a[i], P_WN)
     start_j = vector_at(nodes, struts.node_a[j], P_WN)
     u = difference(vector_at(nodes, struts.node_b[i], P_WN), start_i)
@@ -117,9 +117,10 @@ def midpoint(struts: Struts, nodes: Table, i: int) -> Vector3:
 
 @inlined
 def may_be_nearer(offset: Vector3, reach: Real, least: Real) -> bool:
-    """False if two parts are certainly farther from each other than `least` (m), in all lanes.
+    """Quick test of two bodies or struts: False if they are surely farther apart than `least` (m).
 
-    `offset` is the vector between the centres of the parts, `reach` (m) the sum of their radii.
+    `offset` is the vector between their centres, `reach` (m) the sum of the radii of spheres around
+    them. The result is True if they may be nearer in at least one lane.
     """
     bound = reach + least
     return any_lane(dot(offset, offset) <= MARGIN * bound * bound)

@@ -1,8 +1,8 @@
 """Tally of a simulation: sums and extremes over all steps, which metrics are computed from.
 
-All engines call observe() at every step. On MuJoCo, which has its own contact, the forces of the
-ground here are the law's at MuJoCo's states. TalliedMetrics declares the metrics that are computed
-from the tables; scenario.metrics has all metrics.
+All engines call observe() at every step. MuJoCo has its own model of contact. Its tally uses the
+ground forces that laws.contact gives at MuJoCo's states. TalliedMetrics declares the metrics that
+are computed from the tally; scenario.metrics has all metrics.
 """
 
 from __future__ import annotations
@@ -30,23 +30,24 @@ class Effort(NamedTuple):
     peaks are over all steps."""
 
     left: Annotated[Table, "cables"]
-    """Exertion.left of each driven cable at the latest step, in m."""
+    """Length of each driven cable that is not wound, at the latest step, in m."""
     peak_force: Annotated[Table, 1]
-    """Largest load of an actuator, in N; see actuator.Exertion."""
+    """Largest force that an actuator bore, in N; see actuator.Exertion.load."""
     peak_speed: Annotated[Table, 1]
     """Largest speed of an actuator in either direction, in m/s."""
     peak_power: Annotated[Table, 1]
     """Largest power of an actuator, in W."""
     impulse: Annotated[Table, 1]
-    """Integral of the load, in N s."""
+    """Integral of the actuators' load, in N s; see actuator.Exertion.load."""
     wound: Annotated[Table, 1]
     """Length of cable wound and paid out, in m."""
     pulled: Annotated[Table, 1]
-    """Integral of the positive power of the load, in J."""
+    """Integral of the load times the winding speed, while it is positive, in J."""
     work: Annotated[Table, 1]
-    """Integral of the positive power of Exertion.pull, in J."""
+    """Work of actuators that cannot recover energy, in J: the integral of the positive power of
+    actuator.Exertion.pull."""
     limited: Annotated[Table, 1]
-    """Time at a limit of an actuator, in s."""
+    """Time during which a limit of an actuator binds, in s."""
 
 
 class Tally(NamedTuple):
@@ -64,18 +65,20 @@ class Tally(NamedTuple):
     roughness: Annotated[Table, 1]
     """Integral of (dS/dt)² of all signals S over the steady stretch, in N²/s."""
     lifted: Annotated[Table, "bodies"]
-    """Time (s) in the steady stretch while no contact node of a body bears a normal force."""
+    """Time (s) of each body off the ground in the steady stretch: none of its contact nodes bears a
+    normal force."""
     least_tension: Annotated[Table, 1, math.inf]
     """Least tension of all cables at any time, in N."""
     pitch_rate: Annotated[Table, 1]
-    """Angular velocity (rad/s) at the latest step; see kinematics.pitch_rate()."""
+    """Angular velocity (rad/s) of the structure about the y axis at the latest step; see
+    kinematics.pitch_rate()."""
     rolled: Annotated[Table, 1]
-    """Integral of the angular velocity over all steps, in rad."""
+    """Angle (rad) by which the structure has rolled: the integral of `pitch_rate`."""
 
     @classmethod
     def of(cls, robot: Model, *, signals: int, begins: float) -> Self:
-        """The tally at the start of a simulation. `begins` (s) is the start of the steady
-        stretch."""
+        """The tally at the start of a simulation. `begins` (s) is the time at which the steady
+        stretch begins."""
         tally = allocate(cls, sizes_of(robot) | {"signals": signals})
         tally.begins[0] = begins
         return tally
@@ -83,7 +86,7 @@ class Tally(NamedTuple):
 
 @inlined
 def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
-    """Adds the step that ends at `time` (s) with these signals and forces.
+    """Adds a simulation step to the tally. It ends at `time` (s) with these signals and forces.
 
     The first step, and a repeated step, take no time. A step counts if it takes time and is in the
     steady stretch.
@@ -144,7 +147,7 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
 
 @inlined
 def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
-    """Updates the least distance between struts for a state (13 bodies,).
+    """Updates the tally's least distance between struts for a state (13 bodies,).
 
     It is too slow to be called at every step. `nodes` is the table of laws.kinematics.
     """
@@ -160,9 +163,9 @@ class Metric:
     unit: str
     """SI unit; "" for none."""
     note: str
-    """Short explanation for tables."""
+    """Short explanation of the metric, for printed tables."""
     compute: Callable[[Any], float]
-    """Function of a scenario.metrics.Walk, or of Poses."""
+    """Function that computes the metric from a scenario.metrics.Walk, or from Poses."""
     least: bool = False
     """True if the least value of several simulations is recorded, not their mean."""
     most: bool = False
@@ -172,35 +175,36 @@ class Metric:
     is_share: bool = False
     """True for a share of time. It is shown in percent."""
     of_pose: bool = False
-    """True if Poses are enough for it."""
+    """True if the metric can be computed from Poses alone."""
     needs: str = ""
     """Property, such as LIMITS, that a robot must have for this metric; "" for no condition."""
 
 
 def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
-    """Field of a class of metrics, with the arguments of Metric."""
+    """Declares a metric as a field of a dataclass. The arguments are the fields of Metric."""
     return field(metadata={"metric": Metric(unit, note, compute, **more)})
 
 
 def total(name: str) -> Callable[[Any], float]:
-    """Function that reads a number of a Walk's tally, such as "effort.work"."""
+    """Makes a function that reads a number of a Walk's tally, such as "effort.work"."""
     number = operator.attrgetter(name)
     return lambda walk: number(walk.tally)[0]
 
 
 def mean(name: str) -> Callable[[Any], float]:
-    """Function that divides a total of Effort by a Walk's steady time and number of actuators."""
+    """Makes a function that divides a total of Effort by a Walk's steady time and number of
+    actuators."""
     return lambda walk: walk.per_actuator_time * getattr(walk.tally.effort, name)[0]
 
 
 def greatest(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
-    """Declaration of a cost whose greatest value of several simulations counts."""
+    """Declares a metric that is a cost. Of several simulations its greatest value is recorded."""
     return metric(unit, note, compute, most=True, is_cost=True, **more)
 
 
 @dataclass(frozen=True)
 class TalliedMetrics:
-    """Metrics of every step of a simulation: functions of the tally."""
+    """Metrics that are computed from the tally of all steps of a simulation."""
 
     rolled: float = metric("rad", "forward positive", total("rolled"))
     """Angle by which the robot has rolled forward, about the world's y axis, at the end. Whole
@@ -244,7 +248,7 @@ class TalliedMetrics:
     """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
     for a winch, otherwise of the cable's length."""
     mean_actuator_speed: float = metric("m/s", "winding or paying out", mean("wound"), is_cost=True)
-    """Mean speed in the steady stretch, winding or paying out."""
+    """Mean speed of the actuators in the steady stretch, winding or paying out."""
     peak_actuator_power: float = greatest("W", "at any time", total("effort.peak_power"))
     """Greatest product of an actuator's load and winding speed, at any time."""
     mean_actuator_power: float = greatest("W", "effort of an actuator", mean("pulled"))

@@ -43,12 +43,12 @@ from tetra_drake.settings.section import Kinds, Section, settings_text
 from tetra_drake.settings.units import INCH
 
 GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)
-"""Columns of the table `frames` (contacts, 9), and their number: distance (m), n, t1, and t2
-without its x, which is 0."""
+"""Columns of the table `frames` (contacts, 9), and their number: distance of the node from the
+surface (m), axes n and t1, and axis t2 without its x, which is 0."""
 
 
 class SurfaceGrid(NamedTuple):
-    """Position and size of the grid of a surface's control points; SI units."""
+    """Position and size of the grid of control points of the ground's surface; SI units."""
 
     corner_x: Real
     """Coordinate x of the first control point."""
@@ -114,9 +114,10 @@ def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Re
 def find_frames(
     nodes: Table, contacts: Table, grid: SurfaceGrid, heights: Table, frames: Table
 ) -> None:
-    """Writes the `frames` at the nodes with the indices `contacts` (contacts,).
+    """Writes the tangent frames of the ground at contact nodes to the table `frames`.
 
-    A node out of reach of the highest control point gets the frame of level ground at that height.
+    `contacts` (contacts,) are the indices of the nodes. A node that is too high to touch the
+    highest control point gets the frame of level ground at that height.
     """
     for i in range(contacts.size):
         node = contacts[i]
@@ -196,7 +197,7 @@ class Relief(Section):
     is_ground: ClassVar[bool] = True
     """False if there is nothing that nodes could touch."""
     place: ClassVar[str] = "on uneven ground"
-    """Words for where a robot walks if the terrain is no slope; empty on level ground."""
+    """Words that say where a robot walks, unless the terrain is a slope; empty on level ground."""
 
     @property
     def plane_slope(self) -> float | None:
@@ -219,11 +220,11 @@ class Relief(Section):
 
     @property
     def paths(self) -> dict[str, str]:
-        """Paths of the files that settings name, by key."""
+        """Paths of the height files that these settings name, by key."""
         return {key: file.path for key, file in self if isinstance(file, HeightFile)}
 
     def save(self, folder: Path) -> None:
-        """Writes the files of the terrain to the folder of a record, under new names."""
+        """Copies the terrain's height files to the folder of a record, under HeightFile's names."""
         for _, file in self:
             if isinstance(file, HeightFile):
                 file.save(folder)
@@ -280,9 +281,9 @@ class Incline(Relief):
 class Steps(Relief):
     """Stairs across the robot's path, from x = `start` on.
 
-    Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1). It
-    rises over a cell before and after its edge: the height of a step, or a quarter of its depth if
-    that is less.
+    Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1). An
+    edge is not vertical: it rises over one cell before it and one behind it. A cell is about as
+    long as a step is high, but at most a quarter of the depth.
     """
 
     place = "over steps"

@@ -162,7 +162,7 @@ def make_result(
     wall_time: float,
     record: bool,
 ) -> SimulationResult:
-    """The result of a simulation. With `record`, it has a trajectory.
+    """Result of a simulation, from its motion and tally. With `record`, it has a trajectory.
 
     `motion` has the times of motion_times(). `totals` is the tally of the whole simulation.
     `wall_time` is in s.
@@ -225,8 +225,11 @@ def compute_metrics(
 
 
 def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) -> Poses:
-    """The poses of a structure, from positions p_WN (3, nodes, 3) in m at three times. The last two
-    are `since_steady_from` (s) apart."""
+    """Positions of a structure's followed nodes, tip and centre at three times, for metrics.
+
+    They are computed from node positions p_WN (3, nodes, 3) in m. The last two times are
+    `since_steady_from` (s) apart.
+    """
     return Poses(
         markers=followed_nodes(nodes, structure),
         tip=nodes[:, structure.p_WN[:, 0].argmax()],

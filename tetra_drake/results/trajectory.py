@@ -43,7 +43,7 @@ _FLAGS = {
     "in_contact": {0: "off_ground", 1: "on_ground"},
     "friction_mode": {-1: "slips_negative", 0: "no_slip", 1: "slips_positive"},
 }
-"""Meaning of each value of the modes."""
+"""Meaning of each value of the variables `in_contact` and `friction_mode`."""
 
 
 def sample_times(duration: float, period: float) -> np.ndarray:
@@ -140,7 +140,7 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
 
 @functools.lru_cache(maxsize=32)
 def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
-    """Coordinates with their indexes, from name, dimension and values of each. They are kept,
+    """Coordinates with their indexes, from name, dimension and values of each. They are cached,
     because making them takes half of the time of make_dataset()."""
     import xarray
 
@@ -149,8 +149,8 @@ def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
 
 
 def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
-    """The dataset with an index for each coordinate, by which labels are selected. Files do not
-    keep indexes."""
+    """A dataset with indexes, so that each coordinate can select by its labels. Files do not keep
+    indexes."""
     from tetra_drake.results.label_index import LabelIndex
 
     for name in dataset.coords.keys() - dataset.xindexes.keys():
@@ -159,7 +159,7 @@ def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
-    """Dimension and values of each coordinate except time."""
+    """Coordinates of a trajectory, except time: dimension and values of each, by name."""
     oscillators, cables = structure.oscillators, structure.cables
     driving = ["" if i == cable.PASSIVE else oscillators[i] for i in cables["signal"]]
     body_of_node = list(structure.body_of_node)

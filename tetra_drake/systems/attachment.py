@@ -47,7 +47,7 @@ def DeclareOutput(
     read: Callable[[SystemT, Context], np.ndarray],
     sources: set[DependencyTicket],
 ) -> None:
-    """Declares an output port of a system. `read` gives its numbers in a context."""
+    """Declares a vector output port of a system. `read` computes its values in a context."""
     # A reference to the system in its port would keep it alive for ever.
     this: Any = weakref.proxy(system)
     system.DeclareVectorOutputPort(
@@ -59,7 +59,7 @@ def DeclareOutput(
 
 
 class Nodes(NamedTuple):
-    """Nodes at the origins of a plant's frames, in tables that kernels read."""
+    """Points (nodes) at the origins of frames of a plant, as arrays that kernels read."""
 
     p_BN: np.ndarray
     """Positions (nodes, 3) in the frames of the bodies, in the order of the bodies; then positions
@@ -152,8 +152,8 @@ class BodyForces(LeafSystem):
 def checked_numbers(
     source: str, key: str, given: npt.ArrayLike, *, count: int, least: float = -math.inf
 ) -> np.ndarray:
-    """Numbers (count,) from a number for all, or a number for each. Raises InputError, which names
-    `source` and `key`, unless they are finite and at least `least`."""
+    """Array (count,) of a given number for all, or of given numbers for each. Raises InputError,
+    which names `source` and `key`, unless they are finite and at least `least`."""
     found = np.full(count, np.nan)
     with contextlib.suppress(TypeError, ValueError):
         found[:] = given
@@ -197,8 +197,8 @@ def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, n
 def check_part(
     source: str, key: str, builder: DiagramBuilder, system: System, kind: type[System]
 ) -> None:
-    """Raises InputError, which names `source` and `key`, unless a system is of a class and in the
-    builder."""
+    """Raises InputError, which names `source` and `key`, unless a system has the class `kind` and
+    was added to the builder."""
     check_type(source, key, system, kind)
     if not any(part is system for part in builder.GetSystems()):
         raise InputError(source, key, "is no system of the builder; add it first")
@@ -216,8 +216,8 @@ def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> N
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:
     """Connects a system that exerts forces to a plant: its ports `state` and `generalized_force`.
 
-    Its force is added to all forces that are connected to the plant before. The plant must be
-    finalized.
+    Its force is added to the forces of all systems that were connected to the plant before. The
+    plant must be finalized.
     """
     name, source = system.get_name(), system.GetOutputPort("generalized_force")
     has_free_bodies = all(

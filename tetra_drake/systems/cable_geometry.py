@@ -21,32 +21,32 @@ from pydrake.systems.framework import Context, LeafSystem
 from tetra_drake.robot.structure import PASSIVE_COLOUR
 
 PIECES, SHARE = 4, 0.4
-"""Number of the pieces of a shown cable, and their length as a share of the cable's at the start:
-the pieces cover any length from SHARE to PIECES * SHARE times this."""
+"""Number of cylinders that show a cable, and their length divided by the cable's length at the
+start. They cover any length from SHARE to PIECES * SHARE times the length at the start."""
 SLENDERNESS = 100.0
-"""Length of the shortest cable divided by the shown radius of all."""
+"""Length of the shortest cable divided by the radius with which all cables are shown."""
 
 
 class CableGeometry(LeafSystem):
-    """Poses of the pieces of cables in a SceneGraph. The system has no state.
+    """Poses of the cylinders that show cables in a SceneGraph. The system has no state.
 
     | port          | shape       | unit | meaning                                      |
     |---------------|-------------|------|----------------------------------------------|
     | ends          | (6 cables,) | m    | positions of the two ends, by cable          |
-    | geometry_pose |             | SI   | FramePoseVector of all pieces, for the scene |
+    | geometry_pose |             | SI   | FramePoseVector of all cylinders             |
 
-    A shape in a SceneGraph keeps its length. So a cable consists of pieces that slide along each
-    other as a telescope's do.
+    A shape in a SceneGraph keeps its length. So each cable is shown by PIECES cylinders, which
+    slide along each other like the tubes of a telescope.
     """
 
     def __init__(self, scene_graph: SceneGraph, name: str, *, lengths: Mapping[str, float]) -> None:
-        """Registers the pieces with a source of that name. `lengths` has the length (m) of each
-        cable by its name at the start."""
+        """Registers the cylinders in a scene, with a source called `name`. `lengths` has the length
+        (m) of each cable at the start, by its name."""
         super().__init__()
         self.source = scene_graph.RegisterSource(name)
-        """The source of the pieces in the scene."""
+        """Identifier of the source of the cylinders in the scene."""
         self._pieces: list[tuple[float, list[FrameId]]] = []
-        """Length (m) and frames of the pieces of each cable."""
+        """Length (m) and frames of the cylinders of each cable."""
         properties = MakePhongIllustrationProperties(PASSIVE_COLOUR)
         radius = min(lengths.values()) / SLENDERNESS
         for cable, length in lengths.items():

@@ -63,7 +63,7 @@ class CableNetwork(LeafSystem):
     """
 
     def __init__(self, model: Model, *, names: Sequence[str], signals: int) -> None:
-        """`names` are of the cables; `signals` is the number of signals."""
+        """Cables with `names`, driven by as many signals as `signals` says."""
         super().__init__()
         self._names = names
         bodies, count = model.bodies.mass.size, model.cables.signal.size
@@ -161,8 +161,8 @@ def AddCables(
         actuated: names of the cables that each signal drives, in the order of the signals.
         actuation: kind of the actuators, Force() by default. Kinds with states are added as the
             system NAME_actuators, which is Drake's Integrator of `drive_rates`.
-        drives: states of the actuators at t = 0; by default without signals, at the plant's
-            default positions.
+        drives: states of the actuators at t = 0; by default their states without signals at the
+            plant's default positions.
         slack: False if cables also push.
         scene_graph: where to show the cables.
         name: name of the system.

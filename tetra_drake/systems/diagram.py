@@ -41,7 +41,7 @@ def MakeTensegrityDiagram(
     controller: System | None = None,
     meshcat: Meshcat | None = None,
 ) -> Diagram:
-    """Diagram of a robot that walks with a gait. Its default context is the scenario's start.
+    """Diagram of a robot that walks with a gait. Its default context is at the start of the walk.
 
         steering ──→ cpg ──→ start_up ─┬─→ cables ──┬──→ forces ──→ plant ──┬──→ state
                       ↑                │      ↑     │                       │
@@ -151,7 +151,7 @@ def _AddPlant(
 
 
 def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
-    """The cables of a structure between the frames of its nodes."""
+    """The cables of a structure for AddCables(). `nodes` are the frames of its nodes."""
     return [
         Cable(name, nodes[a], nodes[b], CableLaw(**law))
         for name, (a, b), law in zip(
@@ -167,7 +167,7 @@ def _AddFeedback(
     signals: OutputPort,
     ground: System,
 ) -> None:
-    """Adds `feedback`, from the robot to its network."""
+    """Adds `feedback` to the diagram and connects it to the robot and to `cpg`."""
     builder.AddNamedSystem("feedback", feedback)
     builder.Connect(state, feedback.GetInputPort("state"))
     builder.Connect(signals, feedback.GetInputPort("signals"))
@@ -187,8 +187,9 @@ def _AddController(
     *,
     size: int,
 ) -> OutputPort:
-    """Adds `controller`, with `state` and the ports of `sources` at its input ports of the same
-    names. Returns its port `signals`. Raises InputError for a port of another name or size."""
+    """Adds `controller` to the diagram. Its input ports are connected to `state` and to the ports
+    of `sources` with the same names. Returns its port `signals`. Raises InputError for a port of
+    another name or size."""
     if not controller.HasOutputPort("signals"):
         ports = map(controller.get_output_port, range(controller.num_output_ports()))
         found = ", ".join(port.get_name() for port in ports) or "no output ports"

@@ -31,7 +31,10 @@ class Feedback(LeafSystem):
     """
 
     def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
-        """`gains` are in the order of Gains. Raises InputError if the robot has no equilibrium."""
+        """Feedback with a gain per pathway, in the order of laws.feedback.PATHWAYS.
+
+        Raises InputError if the robot has no equilibrium.
+        """
         super().__init__()
         forces, signals = Forces.of(robot.model), robot.structure.signals
         self._parts = Packed((robot.model, forces, robot.senses))

@@ -157,11 +157,11 @@ def AddGroundContact(
 ) -> GroundContact:
     """Adds a ground under spheres at the origins of frames of a plant's bodies.
 
-    The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is the
-    radius of all spheres, or of each; the ground touches the origins themselves if it is 0.
-    `ground` is by robot.ground.make_surface(), or a robot's, whose own feet do not count. For
-    `witness` see GroundContact. The ports have the contact nodes in the order of `frames`. The
-    ground of a scenario under the tip of a link:
+    The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is one
+    radius for all spheres, or a radius for each. If it is 0, the ground touches the origins
+    themselves. Make `ground` with robot.ground.make_surface(), or use a robot's ground; the robot's
+    own feet are ignored. For `witness` see GroundContact. The ports have the contact nodes in the
+    order of `frames`. This example puts a scenario's ground under the tip of a link:
 
     >>> given = load_scenario("coulomb")
     >>> surface = make_surface(given.ground, given.friction, given.terrain)

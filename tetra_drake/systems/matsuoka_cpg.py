@@ -1,4 +1,4 @@
-"""Central pattern generator, as a LeafSystem."""
+"""Central pattern generator (network of oscillators), as a LeafSystem."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ Law = Callable[[float, Readings], npt.ArrayLike]
 
 
 class HeldSignals(LeafSystem):
-    """Signals of a robot that are held until they are set.
+    """Source of a robot's signals, which holds them until new ones are set.
 
     | port          | shape         | unit | meaning                                               |
     |---------------|---------------|------|-------------------------------------------------------|
@@ -71,7 +71,7 @@ class SampledController(HeldSignals):
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
-        """`period` is in s."""
+        """Controller that calls `law` once in each `period` (s)."""
         super().__init__(robot)
         self._law, self._structure = law, robot.structure
         cables, contacts = len(robot.structure.cables), len(robot.structure.contacts)
