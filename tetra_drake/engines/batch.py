@@ -31,16 +31,19 @@ class Viewer(Protocol):
 
 
 class Batch:
-    """Robots that are simulated side by side. Each has a number, its place; a place may be idle."""
+    """Robots that an engine simulates side by side.
+
+    Each robot has a place: its index in the batch. A place without a robot is idle.
+    """
 
     def __init__(self, structure: Structure, places: int) -> None:
-        """Makes idle places for robots of a structure."""
+        """Makes a batch with a number of idle places, for robots of one structure."""
         self.readings = Readings.empty(structure, places)
         """Readings of all robots at their last pause. At the start only the times are set."""
         self.failures: list[SimulationFailure | None] = [None] * places
         """Failure of the robot in each place; None if it has not failed."""
         self.signals = structure.signals
-        """Number m of signals of each robot."""
+        """Number m of actuator signals of each robot."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
         """Puts robots in the first places. Raises InputError if one does not fit."""
@@ -50,8 +53,10 @@ class Batch:
                 raise InputError(robot.name, f"robot {place}", problem)
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
-        """Puts a robot at its start in a place. Returns False if the robot is too different from
-        the first one: it has another structure, kind of law, or size.
+        """Puts a robot at its start into a place of the batch.
+
+        Returns False if the robot is too different from the first one: it has another structure,
+        kind of law, or size.
 
         Raises InputError if the engine cannot simulate it, and SimulationFailure if it fails before
         its first step.
@@ -65,7 +70,7 @@ class Batch:
         *,
         briefly: bool = False,
     ) -> None:
-        """Simulates until each robot has reached a time, its end, or a failure.
+        """Simulates each robot until its time in `until`, the end of its simulation, or a failure.
 
         Calls time_limit.check_time() often, which raises TimeBudgetExceeded.
 
@@ -95,8 +100,8 @@ class Batch:
         raise NotImplementedError
 
     def result(self, place: int) -> SimulationResult:
-        """The result of a robot that has ended. Raises its failure if it failed, and InputError if
-        it has not ended."""
+        """Result of the robot in a place, after its simulation has ended. Raises its failure if it
+        failed, and InputError if it has not ended."""
         if failure := self.failures[place]:
             raise failure
         if not self.ended(place):
@@ -111,19 +116,20 @@ class Batch:
         raise NotImplementedError
 
     def stop(self, place: int) -> float:
-        """Removes the robot of a place, and its failure. Returns its wall time (s)."""
+        """Removes the robot and its failure from a place, which becomes idle. Returns the wall time
+        (s) that the robot has taken."""
         raise NotImplementedError
 
 
 class LoneRobot(Protocol):
-    """Robot that is simulated alone."""
+    """Simulation of a single robot, as a part of a SerialBatch."""
 
     driven: DrivenRobot
     wall_time: float
-    """Time (s) that the simulation has taken."""
+    """Wall time (s) that the simulation has taken."""
 
     def hold(self, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N from now on."""
+        """Sets the actuator signals (m,) in N that hold from now on."""
 
     def advance_to(self, time: float) -> None:
         """Simulates to a time (s). Raises Diverged or StepBudgetExceeded."""
@@ -135,7 +141,7 @@ class LoneRobot(Protocol):
         """The result at the end of the simulation."""
 
     def copied(self) -> Self:
-        """A copy that goes on independently."""
+        """Copy of the simulation, which continues independently."""
 
 
 class SerialBatch(Batch):
@@ -204,8 +210,8 @@ class SerialBatch(Batch):
 def checked_numbers(
     given: npt.ArrayLike, *shapes: tuple[int, ...], source: str, key: str
 ) -> np.ndarray:
-    """Real numbers of one of these shapes, as floats. Raises InputError, which names `source` and
-    `key`, for anything else."""
+    """Converts an argument to real numbers (floats) of one of the given shapes. Raises InputError,
+    which names `source` and `key`, for anything else."""
     found = ""
     with contextlib.suppress(TypeError, ValueError):
         numbers = np.asarray(given)

@@ -37,20 +37,22 @@ _WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies 
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; Drake's isolation window is this times the accuracy
 
 _NEAR = 1e-3
-"""Largest time (s) to a mode change for which a step ends at the change."""
+"""Largest predicted time (s) to a change of contact mode for which a step ends at the change."""
 _AIM_FACTOR = 1.02
 _AIM_BEYOND = 5e-5
-"""Length of a step that ends at a mode change: the time to it, times a factor, plus a time (s)."""
+"""Largest time (s) from a mode change to the end of a step that is aimed at it. The step is the
+predicted time to the change, times _AIM_FACTOR, plus at most this time."""
 _APPROACH = 0.8
-"""Share of the time to a farther mode change that a step takes."""
+"""Length of a step before a mode change later than _NEAR, as a share of the time to the change."""
 _FIRST_STEP = 3e-4
 """Longest step (s) after a mode change."""
 _GROWTH = 3.0
 """Factor by which the longest step grows with each step until the next mode change."""
 _RENEW_FROM = 8e-4
-"""Step (s) that needs a new Jacobian after a mode change; shorter ones mostly converge without."""
+"""Length (s) of a step after a mode change from which it needs a new Jacobian. Shorter steps mostly
+converge without one."""
 _FINEST, _COARSEST = 2e-5, 5e-3
-"""Limits of the default target accuracy."""
+"""Smallest and largest default of the target accuracy; see MakeSimulator()."""
 
 
 class DrakeEngine(Engine):
@@ -63,7 +65,8 @@ class DrakeEngine(Engine):
 
 
 class _DiagramRobot(LoneRobot):
-    """Robot in a diagram of its own. Without a gait, a system holds given signals."""
+    """Simulation of one robot in its own Drake diagram. If the robot has no gait, a system of the
+    diagram holds the given signals."""
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self.driven, self._record, self._viewer = driven, record, viewer
@@ -187,7 +190,7 @@ class _DiagramRobot(LoneRobot):
 
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
-    """Drake's Simulator of a robot's diagram, with the integrator settings of a scenario.
+    """Drake's Simulator for a robot's diagram, with the integrator settings of the scenario.
 
     The default target accuracy is half the least damping ratio of a cable, within limits. The
     damping ratio c / (2 sqrt(k m)) is for the reduced mass m of the two bodies that the cable
@@ -212,8 +215,11 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
 
 
 class _Work:
-    """Steps and evaluations of an integrator. An integrator that is initialised again counts from
-    zero; this counter goes on, if its work so far is put into `before`."""
+    """Counter of the steps and derivative evaluations of an integrator.
+
+    An integrator that is initialised again counts from zero. This counter continues if the work so
+    far is put into `before`.
+    """
 
     def __init__(self, integrator: IntegratorBase) -> None:
         self._integrator = integrator
@@ -237,7 +243,7 @@ class _Work:
 
 
 class _StepAimer:
-    """Largest allowed length of the next step, by the time to the next mode change.
+    """Limits the next integrator step by the predicted time to the next change of contact mode.
 
     | mode change             | longest step                                                    |
     |-------------------------|-----------------------------------------------------------------|

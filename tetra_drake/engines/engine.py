@@ -28,13 +28,13 @@ class Engine:
     lanes: ClassVar[int] = 1
     """Number of robots that one thread simulates side by side."""
     has_threads: ClassVar[bool] = True
-    """True if batches in several threads are faster than one."""
+    """True if the engine is faster with several threads, each with its own batch."""
 
     def check(self, scenario: Scenario) -> None:
         """Raises InputError if the engine cannot simulate the scenario."""
 
     def prepare(self, scenario: Scenario) -> None:
-        """Compiles the kernels that a simulation needs, by a very short one."""
+        """Compiles the kernels that the scenario's simulations need, by a very short simulation."""
         brief = max(_BRIEF, scenario.cpg.listing_step)
         if brief < scenario.simulation.duration:
             times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
@@ -52,14 +52,14 @@ class Engine:
         viewer: Viewer | None = None,
         threads: int = 1,
     ) -> Batch:
-        """Puts robots at their start, side by side.
+        """Starts a batch: puts robots at their start, side by side.
 
         Args:
             robots: at least one robot; all have the same structure and kinds of laws.
-            places: number of places, one for each robot by default.
+            places: number of robots that the batch can hold; by default the number of `robots`.
             record: records the trajectories, for the results.
             viewer: observer that shows the robots, if the engine can be watched.
-            threads: number of threads among which the places are divided, if the engine can.
+            threads: number of threads that share the robots, if the engine supports threads.
 
         Raises:
             InputError: if the engine cannot simulate a robot.

@@ -31,9 +31,9 @@ from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 
 _IMPRATIO = 1000.0
-"""MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo a
-slipping node gets a part, 1 / impratio, of the force that would hold it as normal force. With the
-default 1, nodes are thrown up and chatter."""
+"""MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo the
+normal force on a slipping node grows by 1 / impratio of the force that would hold the node. With
+the default 1, nodes are thrown up and chatter."""
 _IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
 """Impedance of contacts. It adds inertia to a contact: the body's mass along the ground, which
 keeps friction stable in long steps, and 1 / _IMPRATIO of the mass along the normal."""
@@ -42,7 +42,7 @@ _POINT = 1e-8
 """Radius (m) of the spheres that touch the floor in place of points. Radii of feet are larger by
 it, and the floor is lower."""
 LEAST_MOMENT = 1e-14
-"""Least principal moment of inertia (kg m²) of a body that MuJoCo takes: mjEPS of its compiler."""
+"""Least principal moment of inertia (kg m²) of a body in MuJoCo: mjEPS of its compiler."""
 _LEAST_FRICTION = 1e-5
 """Least coefficient of friction in MuJoCo. MJX has no contacts without friction (condim 1) beside
 elliptic cones."""
@@ -61,7 +61,7 @@ def check_mjcf(scenario: Scenario) -> None:
 
 
 def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = False) -> str:
-    """MuJoCo's model of a robot, with a tendon for each cable and a motor for each driven one.
+    """MJCF text of a robot's MuJoCo model: a tendon for each cable and a motor for each driven one.
 
     If actuators bear the whole tension, tendons have no law: a motor for each cable exerts its
     tension. Motors are in the order of their cables. A motor has the name of its oscillator; if
@@ -121,7 +121,7 @@ def is_pulled(robot: Robot) -> bool:
 
 
 def loose_remark(robot: Robot) -> str:
-    """Differences between MuJoCo's tendons and the robot's cables; see tendon_faults()."""
+    """Remark on differences of MuJoCo's tendons and the robot's cables; see tendon_faults()."""
     structure, remarks = robot.structure, []
     if not robot.scenario.actuation.keeps_spring:
         return ""
@@ -207,9 +207,11 @@ def _contact(robot: Robot, mass: float) -> dict:
 
 
 def _add_strut_contacts(model: Element, robot: Robot) -> None:
-    """Adds the contact of all struts of different bodies, with least friction. Its constant damping
-    takes as much energy from a weakly damped impact at _IMPACT_SPEED, between the middles of
-    struts, as the damping that grows with depth."""
+    """Adds contacts between all struts of different bodies, with the least friction.
+
+    The damping of a contact is constant; the other engines' damping grows with depth. Both take the
+    same energy from a weakly damped impact at _IMPACT_SPEED between the middles of struts.
+    """
     normal = NormalForce(*robot.model.strut_contact.normal)
     model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
     bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
@@ -267,7 +269,7 @@ def _add_push(
     """Adds actuators that push a node along the axes of the world.
 
     `name` is a word, a blank, and the name of the node. The three numbers of each law are a
-    constant force, and the force per displacement from `place` and per velocity.
+    constant force, and the force per displacement from the point `place` and per velocity.
     """
     add_element(world, "site", name=name, pos=place)
     ends = {"site": name.partition(" ")[2], "refsite": name}

@@ -111,7 +111,7 @@ def installed() -> bool:
 
 
 class _MujocoRobot(LoneRobot):
-    """Robot in MuJoCo, simulated in stretches of steps."""
+    """Simulation of one robot in MuJoCo, with many steps in each call of MuJoCo."""
 
     def __init__(self, driven: DrivenRobot, *, record: bool) -> None:
         """Raises StepBudgetExceeded if the duration has too many steps, Diverged if a step is too
@@ -334,7 +334,8 @@ def pull_cables(
     drives: Array,
     tensions: Array,
 ) -> None:
-    """Writes the tensions (cables,) in N. Advances the drives (drives,) by a step (s).
+    """Writes the cables' tensions (cables,) in N, by the law of the other engines. Advances the
+    states `drives` (drives,) of the actuators by a step (s).
 
     `lengths` (cables,) are in m, their `rates` in m/s, `signals` (n,) in N.
     """

@@ -20,10 +20,10 @@ from tetra_drake.laws.tally import Tally, observe, update_clearance
 from tetra_drake.robot.signals import DrivenRobot
 
 CLEARED = 16
-"""Number of states from one computation of the clearance to the next, of states added at once."""
+"""Number of states in one call of add() from one computation of the clearance to the next."""
 
 TallyParts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
-"""Robot, tally, and memory for the forces."""
+"""Robot, tally, and memory for the forces, packed for kernels."""
 
 
 class Observer:
@@ -37,7 +37,7 @@ class Observer:
         robot = driven.robot
         model, signals = robot.model, robot.structure.signals
         self.tally = Tally.of(model, signals=signals, begins=driven.steady_start)
-        """The tally of all added states."""
+        """Sums over all added states; see laws.tally."""
         self._parts = Packed((model, self.tally, Forces.of(model)))
         state, drives = robot.structure.initial_state, robot.starting_drives()
         one = np.zeros(1), state[np.newaxis], np.zeros((1, signals)), drives[np.newaxis]
@@ -47,7 +47,7 @@ class Observer:
         self, times: np.ndarray, states: np.ndarray, signals: np.ndarray, drives: np.ndarray
     ) -> None:
         """Adds states (k, 13 bodies), signals (k, m) in N, and drives (k, drives) at times (k,) in
-        s."""
+        s to the tally."""
         self._observe(self._parts, times, states, signals, drives)
 
 
@@ -58,8 +58,8 @@ def observe_states(
     """Adds states (k, 13 bodies), signals (k, m) and drives (k, drives) at times (k,) in s to the
     tally.
 
-    The tally does not depend on friction modes. The clearance is of each CLEARED-th state, and of
-    the last.
+    The tally does not depend on friction modes. The clearance is computed for each CLEARED-th
+    state, and for the last.
     """
     robot, tally, forces = unpacked(parts)
     modes = np.zeros((robot.ground.contacts.size, MODE_COLUMNS))

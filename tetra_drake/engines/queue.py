@@ -23,7 +23,7 @@ from tetra_drake.scenario.scenario import Scenario
 _GATHERING = 1e-3
 """Time (s) that an idle thread waits for a second simulation before it starts with one."""
 _ROBOTS = 32
-"""Number of robots that are kept for further gaits on their scenarios."""
+"""Largest number of robots in the cache. Gaits on the same scenario share its robot."""
 
 
 @dataclass(eq=False)
@@ -125,20 +125,21 @@ class SimulationQueue:
 
 @dataclass
 class _Crew:
-    """Simulations of one thread: a batch, and the jobs in its places."""
+    """Simulations of one thread of the queue: a batch, and the jobs that it simulates."""
 
     driven: Callable[[_Job], DrivenRobot]
     """Function that makes the robot of a job."""
     record: bool
     jobs: dict[int, _Job] = field(default_factory=dict)
-    """Jobs by place."""
+    """Jobs by their place, the index in the batch."""
     idle: list[int] = field(default_factory=list)
-    """Places without a job."""
+    """Places (indices in the batch) without a job."""
     engine: Engine | None = None
     batch: Batch | None = None
 
     def begin(self, job: _Job) -> bool:
-        """Puts a job in an idle place. Returns False if it must wait until all places are idle."""
+        """Puts a job into an idle place of the batch. Returns False if it must wait until all
+        places are idle."""
         try:
             robot, engine = self.driven(job), engine_of(job.scenario)
             if self.batch and engine is self.engine and self.batch.begin(self.idle[0], robot):

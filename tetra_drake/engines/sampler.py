@@ -80,7 +80,7 @@ def motion_at(diagram: Diagram, context: Context) -> Motion:
 
 
 def frame_of(robot: Robot, diagram: Diagram, context: Context) -> xarray.Dataset:
-    """Trajectory of a single sample: a robot's diagram in a context."""
+    """Trajectory with a single sample: the present state of a robot's diagram in a context."""
     return make_dataset(robot, motion_at(diagram, context))
 
 

@@ -106,7 +106,7 @@ class Simulation:
         self._law: Any = CableLaw._make(np.empty((len(CableLaw._fields), *shape)))
         self._steps = np.zeros(count, dtype=int)
         self.rest: np.ndarray = np.empty(shape)
-        """Actions (N, actions) with which the robots start; they rest."""
+        """Actions (N, actions) at the start, where the robots rest."""
         self.reset()
 
     @property
@@ -223,8 +223,8 @@ class Simulation:
             return self.state
 
     def result(self, place: int = 0) -> SimulationResult:
-        """Result of a robot that has reached the end. Raises its failure if it failed, and
-        InputError if it has not ended."""
+        """Result of robot number `place`, after it has reached the end. Raises its failure if it
+        failed, and InputError if it has not ended."""
         (place,) = self._places([place])
         if not self.ended[place]:
             time = float(self._batch.readings.time[place])
@@ -288,8 +288,8 @@ def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: s
 
 
 def _listing_steps(period: float | None, scenario: Scenario) -> int:
-    """Number of steps of the listing in a control period (s), by default the scenario's. Raises
-    InputError unless it is a whole number."""
+    """Length of a control period (s), by default the scenario's, in steps of `cpg.listing_step`.
+    Raises InputError unless it is a whole number."""
     source, key, step = "Simulation", "control_period", scenario.cpg.listing_step
     if period is None:
         period = scenario.simulation.control_period

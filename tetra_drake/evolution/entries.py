@@ -57,14 +57,14 @@ _CHECKSUM = re.compile(rb'(.*), "crc": "([0-9a-f]{8})"\}')
 
 
 def _checked(metrics: dict[str, Any]) -> dict[str, Any]:
-    """The metrics. Raises ValueError if one is of a wrong type."""
+    """Checks metrics and returns them. Raises ValueError if one has a wrong type."""
     if name := wrong_metric(metrics):
         raise ValueError(f"{name} is of a wrong type")
     return metrics
 
 
 WholeNumber = Annotated[int, Field(ge=0, lt=2**31)]
-"""Type of numbers that count or number something."""
+"""Type of counts and indices in a record: whole numbers below 2³¹."""
 
 
 class Line(BaseModel):
@@ -74,22 +74,22 @@ class Line(BaseModel):
     __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
 
     identity: ClassVar[tuple[str, ...]] = ()
-    """Keys whose values together differ from line to line."""
+    """Keys that identify a line: no two lines of a file have the same values of them."""
 
     def content(self) -> dict[str, Any]:
-        """The keys that the line has, with their values."""
+        """Content of the line as a dictionary, without the keys that the line lacks."""
         return self.model_dump(exclude_unset=True)
 
 
 class Draws(Line):
-    """Numbers of each draw of disturbances."""
+    """Fitness and distance (m) of one gait in each draw of the scenario's disturbances."""
 
     fitness: Annotated[list[float], Field(min_length=1)]
     distance: Annotated[list[float], Field(min_length=1)]
 
 
 class EvaluationLine(Line):
-    """Line of an evaluation."""
+    """Line of a record for one evaluation of a gait."""
 
     identity = ("index",)
 
@@ -99,7 +99,7 @@ class EvaluationLine(Line):
     """Parameters of the gait; None in a thinned run."""
     metrics: Annotated[dict[str, Any], AfterValidator(_checked)]
     fitness: float | None
-    """None for a failure."""
+    """Fitness of the gait; None if the evaluation failed."""
     failure: str | None
     wall_time_s: float
     engine: str
@@ -138,7 +138,8 @@ class EvaluationLine(Line):
 
 
 class IterationLine(Line):
-    """Line of an iteration. The keys after `stop` are the optimiser's report."""
+    """Line of a record for one iteration of an optimiser. The keys after `stop` are the optimiser's
+    report."""
 
     identity = ("iteration",)
 

@@ -41,7 +41,7 @@ Objective = Callable[[SimulationResult], float]
 the trajectory must have the attribute `needs_trajectory = True`."""
 
 _SEEDS_KEPT = 32
-"""Size of the cache of draws, in seeds; larger than the number of concurrent evaluations."""
+"""Number of seeds whose disturbed scenarios are cached; more than the concurrent evaluations."""
 
 
 @dataclass(eq=False)

@@ -126,7 +126,7 @@ class LentExecutor:
 
     executor: Executor
     workers: int | str = "its executor's"
-    """Number of its workers, or a text about it."""
+    """Number of the executor's workers, or a text that is shown instead."""
 
     def __call__(self, workers: int) -> Executor:
         return self.executor
@@ -221,7 +221,10 @@ def evaluate_all(submit: Submit, tasks: Iterable[Task]) -> Iterator[tuple[Task, 
 
 
 def check_guard() -> None:
-    """Raises InputError in a worker process whose import of the main program runs the program."""
+    """Raises InputError in a worker process if importing the main program runs the program.
+
+    This happens if the program has no `if __name__ == "__main__"` guard.
+    """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise InputError(_SOURCE, "", _UNGUARDED)
 

@@ -71,8 +71,8 @@ class TrialStatus:
 
 
 class RepeatedFile:
-    """File of a trial when a run is repeated from its start. Lines that are recorded already are
-    checked, not written again."""
+    """File of a trial while a run is repeated from its start to resume it. Lines that are recorded
+    already are checked, not written again."""
 
     def __init__(self, run: RunRecord, trial: int, name: str) -> None:
         self._run = run
@@ -115,7 +115,7 @@ class Trial:
         self.unevaluated: dict[int, Task] = {}
         """Tasks that the current iteration waits for, by index; empty at the end of the trial."""
         self.recalled: _Evaluated | None = None
-        """The first recorded task with a fitness."""
+        """The first recorded task with a fitness, and its evaluation; None if there is none."""
         self._optimizer = optimizer
         self._evaluations = RepeatedFile(run, number, EVALUATIONS)
         self._iterations = RepeatedFile(run, number, ITERATIONS)

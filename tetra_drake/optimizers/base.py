@@ -33,7 +33,7 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A vector to evaluate, with its numbers in the record."""
+    """A parameter vector to evaluate, with its trial, index and iteration in the record."""
 
     vector: Vector
     trial: int = 0
@@ -48,7 +48,8 @@ class Task:
 
 
 Evaluate = Callable[[Task], Evaluation]
-"""A pure function of a task; it must pickle to run in worker processes."""
+"""Function that evaluates a task. The result depends only on the task. The function must be
+picklable to run in worker processes."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,8 @@ GROWTH = 2.0
 
 
 _one_thread: Any = threadpool_limits.wrap(limits=1, user_api="blas")
-"""Decorator. With many parameters, digits depend on the number of threads of linear algebra."""
+"""Decorator that limits linear algebra to one thread. With many parameters, last digits depend on
+the number of threads."""
 
 
 class CmaEsOptimizer(Generational[kinds.CmaEs]):
@@ -53,7 +54,7 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
     A search starts at the mean of the best quarter of a random sample of its own. Without a sample,
     the first starts in the middle of the ranges, the others at random points.
 
-    A failure counts as worse than every success. A batch of failures teaches nothing.
+    A failure counts as worse than every success. A search learns nothing from a batch of failures.
 
     The report also has the number of the search (`start`), its restarts (`restart`), and `sigma`:
     the root mean square of the standard deviations, in units of the ranges.
@@ -71,7 +72,7 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
 
     @_one_thread
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the evaluations of a batch. A batch that was cut teaches nothing."""
+        """Takes the evaluations of a batch. The search learns nothing from a batch that was cut."""
         iteration = super().tell(evaluations)
         fitnesses = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
         has_walked = np.isfinite(fitnesses)
@@ -116,8 +117,11 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
 
 @dataclass(frozen=True)
 class Box:
-    """Search space of parameters between 0 and 1. A root is an angle in half turns, so that every
-    root is a valid point."""
+    """Search space of parameters between 0 and 1.
+
+    A root, which pycma searches in place of a parameter, is an angle in half turns. So every root
+    is a valid point.
+    """
 
     size: int
 

@@ -1,4 +1,4 @@
-"""Random search, and what it shares with optimisers that learn from whole batches."""
+"""Random search, and the base class of optimisers that learn from whole batches."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ SettingsT = TypeVar("SettingsT")
 
 @dataclass(eq=False)
 class Generational(Generic[SettingsT]):
-    """Random search: each batch is a sample of random gaits. Optimisers that learn from whole
-    batches extend it; they draw in another way.
+    """Random search: each batch is a sample of random gaits. Base class of the optimisers that
+    learn from whole batches; they propose gaits in another way.
 
     The report has mean_fitness over the gaits that did not fail.
     """
@@ -76,14 +76,14 @@ class Generational(Generic[SettingsT]):
     evolution: EvolutionSection
     generator: np.random.Generator
     settings: SettingsT
-    """The kind of optimiser in the scenario."""
+    """Settings of the optimiser in the scenario."""
 
     def __post_init__(self) -> None:
         self._ranges = Ranges(self.space)
         self._points: Matrix = np.empty((0, self._ranges.size))
         """Points of the last batch."""
         self._report: dict[str, Any] = {}
-        """Numbers about the search, for the report."""
+        """Further numbers about the search, for the report of the iteration."""
 
     def ask(self) -> list[Vector]:
         """The vectors of the next batch. Values below a floor are raised to it."""

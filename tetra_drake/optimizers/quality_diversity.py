@@ -32,13 +32,13 @@ SIGMA = 0.5
 class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
     """Optimiser that fills a map of gaits, by CMA-MAE.
 
-    The map is a grid over two metrics, the measures; pyribs calls it archive. Several emitters draw
-    a part of each batch. The archive rates a vector by the difference between its fitness and the
-    threshold of its cell.
+    The map is a grid over two metrics, the measures; pyribs calls it archive. Several emitters,
+    each a CMA-ES, propose a part of each batch. The archive rates a vector by the difference
+    between its fitness and the threshold of its cell.
 
-    A vector that failed or lacks a measure never enters the map; it is rated below all others. A
-    batch of such vectors teaches nothing. If a measure is infinite or NaN for all gaits of a batch,
-    and the map is empty, tell() raises InputError.
+    A vector that failed or lacks a measure never enters the map; it is rated below all others. The
+    emitters learn nothing from a batch of such vectors. If a measure is infinite or NaN for all
+    gaits of a batch, and the map is empty, tell() raises InputError.
 
     The report also has `elites`: the number of cells with a gait.
     """

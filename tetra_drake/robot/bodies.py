@@ -18,8 +18,8 @@ a robot, and explicit integrators would amplify them."""
 
 
 POINT_RADIUS = 0.01
-"""Radius (m) of the ball whose inertia a point mass without strut has. Nothing turns it, and its
-turning moves nothing."""
+"""Radius (m) of a ball whose rotational inertia is used for a point mass without struts. Nothing
+turns such a body, and its rotation moves nothing."""
 
 
 def strut_pose(p_BA: np.ndarray, p_BC: np.ndarray) -> RigidTransform:
@@ -28,8 +28,11 @@ def strut_pose(p_BA: np.ndarray, p_BC: np.ndarray) -> RigidTransform:
 
 
 def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Masses (bodies,), centres of mass in the frames F of the blueprint (bodies, 3), and unit
-    inertias (bodies, 6) as in Structure."""
+    """Inertia of the bodies of a blueprint.
+
+    Returns masses (bodies,), centres of mass in the frames F of the blueprint (bodies, 3), and unit
+    inertias (bodies, 6) as in Structure.
+    """
     made: dict[tuple[bytes, ...], Inertia] = {}  # equal bodies share one
     inertias = []
     node_a = blueprint.struts[:, 0]

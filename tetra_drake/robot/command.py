@@ -28,11 +28,12 @@ class Command:
     period: float
     """Time (s) between samples."""
     samples: np.ndarray
-    """Setpoints (samples, driven cables). The kind of actuators defines the quantity; SI units."""
+    """Setpoints (samples, driven cables) in SI units: forces, free lengths or tensions. The kind of
+    `actuation` in the scenario defines which."""
 
 
 Driver = Gait | Command
-"""What drives the actuators of a simulation without a controller."""
+"""A gait or a command: what drives the actuators if there is no controller."""
 
 
 def driven_robot(

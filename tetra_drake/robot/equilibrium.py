@@ -25,40 +25,44 @@ from tetra_drake.laws.stiffness import stiffness_matrix
 from tetra_drake.robot.statics import null_space
 
 ROUNDING = 64 * np.finfo(float).eps
-"""Largest force left in equilibrium, as a share of the robot's greatest stiffness times its
-farthest coordinate: positions are rounded, and springs turn that into force."""
+"""Tolerance for the force left in equilibrium, as a share of the robot's greatest stiffness times
+its farthest coordinate. Positions are rounded, and springs turn the rounding errors into force."""
 
 MOST_STEPS, LEAST_STEPS = 1000, 10
-"""Upper limit of the steps of a search, for few bodies and for as many as a structure can have."""
+"""Upper limits of the steps of a search: for few bodies, and for the largest structures."""
 
 MOST_WORK = 2e11
-"""Upper limit of steps times the cube of their unknowns, between these: two minutes or so."""
+"""Upper limit of the work of a search, about two minutes: its steps times the cube of the number of
+unknowns. It sets the limit of steps between MOST_STEPS and LEAST_STEPS."""
 
 FIRST_REACH, LONGEST_REACH, SHORTEST_REACH = 0.05, 0.2, 1e-12
-"""Upper limit of a step at first, later, and where the search ends, as shares of the largest body's
-radius."""
+"""Reach (upper limit of a step) as a share of the largest body's radius: at first, at most, and
+where the search ends."""
 LEAST_GAIN, GOOD_GAIN = 0.1, 0.5
-"""Energy that a step sets free, as a share of the energy by the forces and the stiffness at its
-beginning. Below the first limit a step is too long; above the second, the next may be longer."""
+"""Limits for the gain of a step: the energy that it releases, as a share of the energy predicted
+from forces and stiffness at its beginning. Below the first limit a step is too long; above the
+second, the next may be longer."""
 
 CORRECTIONS = 8
-"""Most corrections of a step."""
+"""Largest number of corrections of one step; see _Descent."""
 HOLD = 30.0
-"""Shift of a correction, as a multiple of the greatest force over the largest body's radius: the
-stiffness that this force can have along motions that the springs do not resist."""
+"""Stiffness that is added for a correction (a shift, see _Descent), as a multiple of the greatest
+force over the largest body's radius. This force can have such a stiffness along motions that the
+springs do not resist."""
 
 POWER_STEPS = 10
-"""Iterations for the least stable motion of a balanced robot."""
+"""Number of inverse power iterations for the least stable motion of a balanced robot."""
 
 RESISTED = 1e-6
-"""An anchor resists a motion that moves its node by more than this share of the greatest
-displacement."""
+"""Threshold for anchors: an anchor resists a motion that moves its node by more than this share of
+the greatest displacement."""
 
 LEAST_STIFFNESS = 1e-12
-"""Stiffness of a motion that nothing resists, as a share of the robot's greatest stiffness."""
+"""Stiffness that is assumed for a motion that nothing resists, as a share of the robot's greatest
+stiffness."""
 
 LONG = 5.0
-"""Time (s) after which a long search is announced."""
+"""Time (s) after which a warning says that the search takes a while."""
 LENGTH_DIGITS = 9
 """Decimals of a cable length (m) in equilibrium. Further digits depend on the processor, and a
 simulation with feedback would amplify their differences."""
@@ -142,12 +146,12 @@ def find_equilibrium(
 class _Descent:
     """Descent to a minimum of the potential energy, by Newton's method.
 
-    Stiffness is added to all displacements: a shift. It makes the energy convex and the step as
-    short as the reach, which grows and shrinks with success.
+    The same stiffness is added to all displacements: a shift. It makes the energy convex and the
+    step no longer than the reach. The reach grows after good steps and shrinks after bad ones.
 
     The energy of a mechanism has long curved valleys, whose sides are up to 10^12 times as steep as
-    their floor. A step along the floor ends on a side. Corrections lead it back to the floor, and
-    only then its energy is judged.
+    their floor. A step along the floor ends on a side. Corrections lead it back to the floor. Only
+    then the energy decides if the step is good.
     """
 
     def __init__(self, robot: Unactuated, start: np.ndarray) -> None:
@@ -184,8 +188,8 @@ class _Descent:
         return bool(np.abs(self.force).max() <= self._rounding)
 
     def step(self) -> bool:
-        """Goes a step downhill in energy. Returns False if there is none, as in a stable
-        equilibrium."""
+        """Takes one step downhill in energy. Returns False if no step leads down, for example in a
+        stable equilibrium."""
         if self.is_balanced() and self._factor(self._stiffness, self._doubt) is not None:
             return False
         while self._reach > SHORTEST_REACH * self._robot.radius and np.isfinite(self.force).all():
@@ -202,9 +206,11 @@ class _Descent:
         return False
 
     def _longest_step(self) -> tuple[np.ndarray, float]:
-        """Displacements (6 n,) within reach, and twice the energy that they set free by the
-        stiffness: Newton's step with the least shift, or a step out of a balance that is not
-        stable."""
+        """Next step (6 n,) within reach, and twice the energy that it should release.
+
+        It is Newton's step with the least shift. In an equilibrium that is not stable, it is a step
+        along the least stable motion.
+        """
         if self.is_balanced():
             shift = self._least
             while (factor := self._factor(self._stiffness, shift)) is None:
@@ -230,8 +236,11 @@ class _Descent:
     def _corrected(
         self, step: np.ndarray, expected: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """State, force, displacements and gain (see LEAST_GAIN) of a step that is led back to the
-        floor of the valley. `expected` is in J, as by _longest_step()."""
+        """Step that is led back to the floor of the energy's valley; see the class.
+
+        Returns state, force, displacements and gain (see LEAST_GAIN). `expected` is the energy in J
+        from _longest_step().
+        """
         longest = 0.5 * np.abs(step).max()
         moved = displaced(self._robot, self.state, step)
         for count in range(CORRECTIONS + 1):
@@ -250,14 +259,14 @@ class _Descent:
         return moved, force, step, gain
 
     def _factor(self, stiffness: np.ndarray, shift: float) -> np.ndarray | None:
-        """Cholesky's factor of the stiffness with a shift; None if the energy is not convex with
-        it."""
+        """Cholesky's factor of the stiffness matrix plus a shift; None if the energy is not convex
+        even then."""
         factor = stiffness + shift * np.eye(len(stiffness))
         return factor if factorise(factor, 0.5 * self._least) else None
 
     def _solved(self, factor: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Displacements (6 n,) under a force. The robot as a whole does not move where it is
-        free."""
+        """Displacements (6 n,) under a force, without the motions of the whole robot that nothing
+        resists."""
         step = solve(factor, force)
         return step - self._held @ (self._held.T @ step)
 

@@ -131,7 +131,7 @@ class ParameterSpace:
     """Names such as "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
     low: Vector
     high: Vector
-    """Bounds of random gaits (Table 5)."""
+    """Upper bounds of the parameters of random gaits; `low` are the lower bounds (Table 5)."""
     floors: Vector
     """Lower limits of the search. Mutation keeps parameters above (listing A.3.3, A.3.4)."""
     couples_tau_b: bool

@@ -1,4 +1,4 @@
-"""Ground of a scenario in the form of the kernels: laws, terrain, contact nodes."""
+"""Ground of a scenario as an argument of the compiled kernels: laws, terrain, contact nodes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def lift(scenario: Scenario, placed: Structure) -> float:
 
 
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:
-    """Ground of a scenario below a structure, in the form of the kernels.
+    """Ground of a scenario below a structure, as an argument of the compiled kernels.
 
     Raises InputError if the terrain cannot be made, or if the structure starts outside the terrain
     or with a contact node in the ground.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray
 
 Span: TypeAlias = tuple[float, float]
-"""Start and end, such as of a time in s; or least and greatest coordinate."""
+"""Two limits: start and end (s), or least and greatest coordinate."""
 
 PERIOD = 0.25
 """Time (s) between points of a result's path. It is at most half of the fastest gait's period. The

@@ -19,7 +19,8 @@ NEURONS = "extensor", "flexor"
 """Kinds of neurons, by index modulo 2."""
 
 AMPLITUDE = 0.5
-"""Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""
+"""Typical amplitude of y_extensor - y_flexor, as a share of the tonic input u0; 0.44 to 0.53 in
+random gaits."""
 
 SteeringSignal = Callable[[float], float]
 """Function from time (s) to the turn, -1 to 1."""
@@ -27,15 +28,16 @@ SteeringSignal = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of the connections between the oscillators of a robot."""
+    """Connections between the oscillators of a robot. A gait has a weight for each connection."""
 
     blueprint: Blueprint
     reach: int | None
-    """Largest distance between oscillators that inhibit each other; None for no limit."""
+    """Largest distance between oscillators that inhibit each other, counted in steps between
+    oscillators that share a body; None for no limit."""
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
-        """Connections of the oscillators in a scenario."""
+        """The connections of a scenario's oscillators."""
         return cls(scenario.robot.blueprint(), scenario.cpg.reach)
 
     @functools.cached_property

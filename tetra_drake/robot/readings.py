@@ -87,7 +87,7 @@ class Readings(NamedTuple):
         return type(self)(*(values.copy() for values in self))
 
     def put(self, place: int, readings: Readings) -> None:
-        """Writes the readings of a single robot to a row."""
+        """Writes the readings of a single robot to row `place`."""
         for values, given in zip(self, readings, strict=True):
             values[place] = given
 

@@ -19,8 +19,8 @@ LEAST_MOTION = 0.01
 STILL = 0.1
 """Distance that a robot should walk, as a share of its length."""
 SINKS, BEARS = 0.03, 0.01
-"""Depths of a robot in its ground, as shares of its height: from the first on it is too deep; the
-second is usual in a ground that is stiff enough."""
+"""Depths of a robot at rest in its ground, as shares of its height: from SINKS on it is too deep;
+BEARS is usual in a ground that is stiff enough."""
 
 
 def gain_remark(robot: Robot) -> str:
@@ -40,8 +40,8 @@ def gain_remark(robot: Robot) -> str:
 
 
 def stillness_remark(robot: Robot, distance: float) -> str:
-    """Remark on a robot that was to walk, and has walked a `distance` (m) of less than a tenth of
-    its length."""
+    """Remark on a robot that should walk, but moved a `distance` (m) of less than a tenth of its
+    length."""
     scenario, units = robot.scenario, robot.scenario.units
     length = np.ptp(robot.structure.p_WN, axis=0).max()
     if not looks_for_distance(scenario.objective) or not abs(distance) < STILL * length:

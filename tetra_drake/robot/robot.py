@@ -35,9 +35,9 @@ from tetra_drake.robot.struts import (
 from tetra_drake.scenario.scenario import Scenario
 
 MOST_CORRECTIONS = 100
-"""Upper limit of the corrections of the lengths of elastic struts."""
+"""Largest number of corrections of the lengths of elastic struts, in the search for equilibrium."""
 SAME_LENGTH = 1e-10
-"""Change (m) of a strut's length below which its correction ends."""
+"""Change (m) of an elastic strut's length below which no further correction is made."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Robot:
     scenario: Scenario
     structure: Structure
     model: Model
-    """Constants of bodies, cables and ground, in the form of the kernels."""
+    """Constants of bodies, cables and ground, as arguments of the compiled kernels."""
     first_signals: np.ndarray
-    """Signals (m,) in N at t = 0, which the actuators follow already."""
+    """Signals (m,) in N at t = 0. The actuators start in the state that fits these signals."""
     has_network: bool = True
     """False if the signals are given, by a command or a controller."""
 

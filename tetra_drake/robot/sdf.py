@@ -22,7 +22,7 @@ FIXED = "fixed nodes"
 
 
 def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
-    """Model of the bodies of a structure, at the poses of a state (13 bodies,)."""
+    """SDFormat text for the bodies of a structure, at the poses of a state (13 bodies,)."""
     root = Element("sdf", version="1.9")
     model = add_element(root, "model", name=name)
     shapes = [*shapes_of(structure)]
@@ -66,7 +66,7 @@ def _add_pose(parent: Element, X: RigidTransform) -> None:
 
 
 def _add_shape(link: Element, purpose: str, shape: Shape, kind: str) -> Element:
-    """Adds a solid of the given kind, or a sphere for a shape without length."""
+    """Adds a solid with the SDFormat tag `kind`, or a sphere for a shape without length."""
     element = add_element(link, purpose, name=shape.name)
     _add_pose(element, shape.X_BS)
     solid = add_element(add_element(element, "geometry"), kind if shape.length else "sphere")

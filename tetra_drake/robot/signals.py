@@ -40,7 +40,7 @@ class DrivenRobot:
     gait: Gait | None = None
     """The gait whose network makes the signals; None if they are given."""
     steering: SteeringSignal | None = None
-    """The turn, in place of the gait's."""
+    """Function from time to the turn, -1 to 1, in place of the gait's turn; None for the gait's."""
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
@@ -55,7 +55,8 @@ class DrivenRobot:
 
     @property
     def steady_start(self) -> float:
-        """Start (s) of the steady stretch. Mean values are over this stretch."""
+        """Time (s) at which the steady stretch of the motion starts. Mean values are over this
+        stretch."""
         return max(self.robot.scenario.simulation.settling_time, self.start_up)
 
     @property

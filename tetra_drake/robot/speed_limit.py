@@ -20,10 +20,10 @@ def speed_limit(driven: DrivenRobot) -> float:
     """Speed limit of a robot's bodies in m/s: `simulation.max_speed`, by default a speed that the
     robot cannot reach.
 
-    The default is the speed of the lightest body if it had all energy that there can be: of a fall
-    from the robot's top to the lowest ground, of the cables at the start, and of a pull by each
-    actuator over the length of its cable. Added is the speed that weight and loads can give the
-    whole robot where no ground stops it.
+    The default is the speed of the lightest body if it had all possible energy. This is the energy
+    of a fall from the robot's top to the lowest ground, of the cables at the start, and of a pull
+    by each actuator over the length of its cable. Where no ground stops the robot, the speed that
+    weight and loads can give the whole robot is added.
     """
     robot = driven.robot
     scenario, structure = robot.scenario, robot.structure

@@ -2,7 +2,7 @@
 
 The method is from S. Pellegrino, "Structural computations with the singular value decomposition of
 the equilibrium matrix", International Journal of Solids and Structures 30 (1993). Here the joined
-parts are rigid bodies. Anchors leave the motions that move no node along an axis that is held.
+parts are rigid bodies. Anchors allow only motions that move no node along an axis that is held.
 """
 
 from __future__ import annotations

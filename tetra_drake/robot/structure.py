@@ -259,6 +259,6 @@ def AddNodes(
 
 
 def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:
-    """Adds a frame at a place p (3,) in m in another frame to a plant that is not finalized."""
+    """Adds a frame at a position p (3,) in m in another frame to a plant that is not finalized."""
     offset = RigidTransform(np.asarray(p, dtype=float))
     return plant.AddFrame(FixedOffsetFrame(name, parent, offset))

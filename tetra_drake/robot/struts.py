@@ -31,7 +31,7 @@ PASSAGE = 0.5
 """Distance that a step may carry a strut into another, as a share of the least radius. Struts pass
 through each other at four times this distance."""
 MEETING = 1e-12
-"""Distance (m) of the axes of two struts up to which they meet, except for rounding."""
+"""Largest distance (m) between the axes of two struts that meet; it allows for rounding errors."""
 ELONGATION = 1e-6
 """Elongation of a strut for finite differences, as a share of its length."""
 

@@ -1,7 +1,8 @@
 """Engine `compiled`: several robots side by side in the registers of each core, without Drake.
 
-A core of the processor simulates 4 or 8 robots at once, each in a lane. A batch may have more
-robots than there are lanes: each robot has a place in tables, and they take turns in the lanes.
+A core of the processor simulates 4 or 8 robots at once, each in a lane: one number of each vector
+register. A batch may have more robots than there are lanes: each robot has a place in tables, and
+they take turns in the lanes.
 """
 
 from __future__ import annotations
@@ -40,19 +41,20 @@ from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.scenario import Scenario
 
 FIRST = SurfaceGrid._fields.index("first")
-"""Column of Ground.grid with the index of the first height. It differs between robots, because one
-table has the heights of all robots."""
+"""Column of Ground.grid with the index of a robot's first terrain height. It differs between
+robots, because one table has the heights of all robots."""
 
 _SPARE_MARKS = 4
-"""Number of marks that a robot may have more than the first one in the same lanes."""
+"""Number of marks (times at which a step must end) that a robot may have more than the first robot
+of the batch."""
 
 _BODY_STEPS = 25_000
-"""Iterations times bodies per call of the kernel, about 30 ms. Between calls Python handles signals
-of the operating system, and limits of time."""
+"""Bodies times iterations of the simulation loop in one call of the kernel, about 30 ms. Between
+calls Python handles signals of the operating system and checks time limits."""
 
 
 class LaneBatch(Batch):
-    """Batch of the compiled engine. Threads simulate its robots in their lanes."""
+    """Batch of the compiled engine. Each thread simulates 4 or 8 robots at once, in lanes."""
 
     def __init__(
         self,
@@ -201,7 +203,7 @@ class LaneBatch(Batch):
         )
 
     def motion(self, place: int) -> Motion:
-        """Samples of the robot in a place, up to now."""
+        """Recorded motion of the robot in a place, up to now."""
         log, kept = self._log, slice(self._log.kept[place])
         tables = log.times, log.states, log.signals, log.modes, log.drives
         return Motion(*(table[place, kept].copy() for table in tables))
@@ -224,7 +226,7 @@ class LaneBatch(Batch):
 
 
 class LaneThread:
-    """Lanes of one thread, and the queue of the robots that wait for one of them."""
+    """Lanes of one thread, each for one robot, and the thread's queue of waiting robots."""
 
     def __init__(
         self,
@@ -265,7 +267,7 @@ class LaneThread:
 
     @property
     def waiting(self) -> list[int]:
-        """The places of the robots that wait for a lane, in their order."""
+        """Places (indices in the batch) of the robots that wait for a lane, in their order."""
         waiting: list[int] = self._waiting[self._queue[NEXT] : self._queue[LAST]].tolist()
         return waiting
 
@@ -280,8 +282,11 @@ class LaneThread:
         self._status[self._lane_places == place] = loop.IDLE
 
     def simulate(self, wall_times: np.ndarray, *, briefly: bool) -> None:
-        """Simulates until all robots have ended; or `briefly`, see Batch.advance(). Adds the time
-        (s) that it takes to the wall times of the robots."""
+        """Simulates until all robots have ended or paused. With `briefly` it returns earlier; see
+        Batch.advance().
+
+        The wall time (s) is divided equally among the robots and added to `wall_times`.
+        """
         while robots := [*self._lane_places[self._status == loop.RUNNING], *self.waiting]:
             started = time.perf_counter()
             self._advance(self._parts, self._rounds)

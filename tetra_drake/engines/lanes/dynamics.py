@@ -26,18 +26,18 @@ CABLES_AT_ONCE = 6
 """Number of cables of a pair of bodies whose damping is summed at once."""
 
 U, W, D, WEIGHT, LINE_COLUMNS = 0, 3, 6, 9, 10
-"""Columns of the table `lines`, and their number: u, w and d of a cable (see add_cables()), damping
-times time."""
+"""Columns of the table `lines` for a cable: first columns of the vectors u, w and d (see
+add_cables()), the damping times the time, and the number of columns."""
 
 
 class Solver(NamedTuple):
-    """Positions of the blocks of the implicit matrix, and the order of its elimination."""
+    """Block layout and elimination order of the implicit matrix; see implicit_matrix()."""
 
     schedule: Schedule
     coupled: Table
     """Index of the block of each pair of coupled bodies (pairs,)."""
     fill: Table
-    """Indices of the blocks of fill-in."""
+    """Indices of the blocks of fill-in, which only the elimination fills."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
@@ -164,8 +164,9 @@ def add_cables(
     lines: Table,
     blocks: Table,
 ) -> None:
-    """Adds time * damping * l lᵀ for cables of a pair of bodies, from cable `first` on, at most
-    CABLES_AT_ONCE.
+    """Adds the damping of a pair's cables to the implicit matrix, as time * damping * l lᵀ.
+
+    The cables are at most CABLES_AT_ONCE, from cable `first` on.
 
     The 12 numbers of l, times the velocities of both bodies, are the rate of the cable's length.
     With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and
@@ -238,13 +239,13 @@ def column(lines: Table, c: int) -> Column:
 
 @inlined
 def weighted(w: Column, x: Column) -> Column:
-    """The numbers of a column, times weights."""
+    """Column x with each number multiplied by its weight in w."""
     return w[0] * x[0], w[1] * x[1], w[2] * x[2], w[3] * x[3], w[4] * x[4], w[5] * x[5]
 
 
 @inlined
 def product(x: Column, y: Column) -> Real:
-    """The scalar product."""
+    """Scalar product of two columns."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2] + x[3] * y[3] + x[4] * y[4] + x[5] * y[5]
 
 
@@ -258,7 +259,10 @@ def add_contact(
     time: Real,
     blocks: Table,
 ) -> None:
-    """Adds time * damping + time² * stiffness of a foot, in lanes where it touches."""
+    """Adds the contact of a foot to the implicit matrix, in lanes where the foot touches.
+
+    The contact is time * damping + time² * stiffness.
+    """
     nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
     touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
     depth = -contact.gap(nodes, ground, frames, i)
@@ -285,8 +289,11 @@ def add_contact(
 def add_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], blocks: Table
 ) -> None:
-    """Adds Jᵀ diag(k_x, k_y, k_z) J for a node at p from its body's origin. J = [-[p]x 1] gives the
-    node's velocity from the body's."""
+    """Adds Jᵀ diag(k_x, k_y, k_z) J of a node to the diagonal block of its body.
+
+    The node is at p from the body's origin. J = [-[p]x 1] gives the node's velocity from the
+    body's.
+    """
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     k_x, k_y, k_z = k
     blocks[body, 0, 0] += p_y * p_y * k_z + p_z * p_z * k_y
@@ -310,7 +317,10 @@ def add_diagonal(
 def add_off_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], blocks: Table
 ) -> None:
-    """Adds Jᵀ K J as add_diagonal() does, for the symmetric matrix K of k_xy, k_xz and k_yz."""
+    """Adds Jᵀ K J of a node to its body's block, for the symmetric matrix K of k_xy, k_xz and k_yz.
+
+    For J see add_diagonal().
+    """
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     xy, xz, yz = k
     # The rows of [p]x K.

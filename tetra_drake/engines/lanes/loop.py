@@ -41,12 +41,12 @@ from tetra_drake.laws.model import Model
 from tetra_drake.laws.tally import Tally, observe
 
 IDLE, RUNNING, DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(6)
-"""Status of a lane. DONE: it has reached its pause."""
+"""Values of a lane's status. DONE: the robot has reached its pause. The last three are failures."""
 
 LEAST_STEP = 1e-9  # s
 SAFETY, SHRINK, GROW = 0.85, 0.2, 3.0
-"""Step control: the next step is the one with an error equal to the tolerance, times SAFETY. It
-differs from the last step at most by the factors SHRINK and GROW."""
+"""Constants of the step control. The next step is the length with an error equal to the tolerance,
+times SAFETY. It is SHRINK to GROW times as long as the last step."""
 AIM_FACTOR = 1.02
 """Factor on the predicted time to a mode change. A step ends just after the change: the factor
 covers the error of the prediction, and the setting `look_ahead` is added."""
@@ -56,22 +56,23 @@ STATUS, TIME, PLANNED, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN = ran
 """Rows of `clock`. Times and lengths of steps are in s.
 
 STATUS, TIME: status of the lane and its time. PLANNED: length of the next step. STEP, END: length
-and end of the step that is tried. MARK: time of the next mark. DUE: time of the next sample.
-ACTIVE: 1 if signals act, 0 before the start-up time. SAMPLES: number of computed samples of the
-signals. TRIED, TAKEN: numbers of steps.
+and end of the step that is tried. MARK: next time at which a step must end. DUE: time of the next
+sample. ACTIVE: 1 if signals act, 0 before the start-up time. SAMPLES: number of computed samples of
+the signals. TRIED, TAKEN: numbers of steps.
 """
 
 CLOCK_ROWS = 11
 
 ACCEPTED, NETWORK_STEPS, TURN_INDEX = range(3)
-"""Rows of `scratch`: 1 if the step is accepted, 1 if the network takes a step, position among the
-turns (an index with a fraction)."""
+"""Rows of `scratch`: 1 if the step is accepted, 1 if the network takes a step, and the position in
+the steering table `turns` (an index with a fraction)."""
 
 SCRATCH_ROWS = 3
 
 
 class Constants(NamedTuple):
-    """Constants of the simulations in SI units. Tables without a shape have one number."""
+    """Constants of the simulations in the lanes, in SI units. Tables without a shape have one
+    number."""
 
     robot: Model
     solver: Solver
@@ -85,10 +86,10 @@ class Constants(NamedTuple):
     gain: Table
     """Force (N) per unit of an oscillator's output."""
     period: Table
-    """Time (s) between samples of the listing's signals, or of the turns."""
+    """Time (s) between samples of the signals of the thesis's listing, or of the steering."""
     samples: Table
     """Number of samples of the listing's signals, or of a command. The last sample holds for ever.
-    A controller gives further ones."""
+    A controller adds samples during the simulation."""
     start_up: Table
     """Start-up time: signals act from then on."""
     tolerance: Table
@@ -100,7 +101,7 @@ class Constants(NamedTuple):
 
 
 class LaneState(NamedTuple):
-    """State of the simulations, with scratch memory.
+    """State of the simulations in the lanes, with scratch memory.
 
     The numbers before `step.end` are the state of a simulation; see places.Places.
     """
@@ -108,12 +109,12 @@ class LaneState(NamedTuple):
     clock: Annotated[Table, CLOCK_ROWS]
     modes: Annotated[Table, "contacts", contact.MODE_COLUMNS]
     signals: Annotated[Table, "signals"]
-    """Signals at the lane's time."""
+    """Actuator signals (N) at the present time of each lane."""
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
-    """Drives at the lane's time."""
+    """States of the actuators at the present time of each lane."""
     neurons: Annotated[Table, "2 * signals", oscillator.NEURON_COLUMNS]
     tonic: Annotated[Table, "2 * signals"]
-    """Inputs of the neurons without feedback."""
+    """Tonic inputs of the neurons: their inputs without the feedback."""
     tally: Tally
     step: StepMemory
     scratch: Annotated[Table, SCRATCH_ROWS]
@@ -123,11 +124,11 @@ class LaneState(NamedTuple):
     end_signals: Annotated[Table, "signals"]
     """Signals at the end of the lane's step."""
     end_drives: Annotated[Table, "drives"]
-    """Drives at the end of the lane's step."""
+    """States of the actuators at the end of the lane's step."""
     output: Annotated[Table, "signals"]
     """Latest outputs of the oscillators."""
     inputs: Annotated[Table, "2 * signals"]
-    """Inputs of the neurons with feedback."""
+    """Total inputs of the neurons: tonic inputs and feedback."""
 
 
 class Log(NamedTuple):
@@ -136,28 +137,28 @@ class Log(NamedTuple):
     place: Annotated[Table, "lanes", int]
     """Row of these tables for the robot in each lane; see `places`."""
     marks: Annotated[Table, "places", "marks"]
-    """Times (s) at which a step must end, ascending; infinite after the last."""
+    """Marks: times (s) at which a step must end, ascending; infinite after the last."""
     passed: Annotated[Table, "places", int]
-    """Number of marks that have passed."""
+    """Number of entries of `marks` that have passed."""
     until: Annotated[Table, "places"]
     """Times (s) at which simulations pause, at the latest their ends."""
     change_ends: Annotated[Table, "places"]
-    """Times (s) at which changes of held signals end."""
+    """Times (s) at which the latest changes of a controller's signals end."""
     times: Annotated[Table, "places", "times"]
     """Times (s) of the samples, ascending; infinite after the last."""
     kept: Annotated[Table, "places", int]
     """Number of recorded samples."""
     states: Annotated[Table, "places", "samples", "13 * bodies"]
     modes: Annotated[Table, "places", "samples", "contacts", contact.MODE_COLUMNS]
-    """Modes during the step that contains the sample."""
+    """Contact modes during the step that contains the sample."""
     signals: Annotated[Table, "places", "samples", "signals"]
     """Signals in N."""
     drives: Annotated[Table, "places", "samples", "drives"]
     recent: Annotated[Table, "places", "recent", "signals"]
     """Ring buffer of the listing's signals; see row_of()."""
     turns: Annotated[Table, "places", "turns"]
-    """Turns at multiples of `period`, linear in between. The last turn holds for ever. A single
-    turn is in `tonic` from the start."""
+    """Steering, -1 to 1, at multiples of `period`, linear in between. The last value holds for
+    ever. A single value is in `tonic` from the start."""
 
 
 @merged
@@ -318,8 +319,10 @@ def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Ta
 
 @inlined
 def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> None:
-    """Writes the tonic input if the turns change. `sample` is a position among the turns: an index
-    with a fraction."""
+    """Writes the tonic input of the neurons for the present steering, if the steering varies.
+
+    `sample` is a position in the table of turns: an index with a fraction.
+    """
     turns = log.turns.shape[1]
     if turns == 1:
         return
@@ -372,8 +375,10 @@ def row_of(sample: int, log: Log) -> int:
 
 @merged
 def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
-    """Sets the next mark and the signals in lanes that have reached a mark. Returns True if a
-    simulation is finished."""
+    """Sets the next mark (time at which a step must end) and the signals, in lanes at a mark.
+
+    Returns True if a simulation is finished.
+    """
     clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
     oscillator.oscillator_output(lanes.neurons, lanes.output)
     for lane in range(log.place.size):

@@ -40,7 +40,7 @@ class Places(NamedTuple):
     """Places of the robots that wait for a lane, in their order."""
     queue: Annotated[Table, 2, int]
     signals: Annotated[Table, "places", "signals"]
-    """Signals in N that controllers hold."""
+    """Actuator signals (N) that controllers set and hold."""
     holds: Annotated[Table, "places", int]
     """1 for a robot that gets new signals when it takes a lane, otherwise 0."""
 
@@ -137,8 +137,8 @@ def exchange(parts: LaneParts) -> None:
 def read_paused(lanes: LaneState, log: Log, to: Readings) -> None:
     """Writes the readings of robots that have reached their pause to the rows of their places.
 
-    Call it before the clearance is computed: this moves the nodes of all lanes, and last digits
-    differ.
+    Call it before the clearance is computed: the computation moves the nodes of all lanes, and
+    their last digits change.
     """
     clock = by_lane(lanes.clock)
     state, nodes = by_lane(lanes.step.state), by_lane(lanes.forces.nodes)

@@ -32,19 +32,21 @@ class Prepared:
     times: np.ndarray
     """Times (s) of the samples; see motion_times()."""
     turns: np.ndarray
-    """Turns of the steering; see Robot.turns()."""
+    """Steering, -1 to 1, at multiples of `cpg.listing_step`; see Robot.turns()."""
     sizes: dict[str, int]
     """Sizes of the robot's tables, for allocate()."""
     constants: Constants
     """Constants of all laws, without the heights of the ground."""
     kind: object
-    """What all robots in the same lanes must share: indices, truths, shapes of tables."""
+    """Value that must be equal for all robots in the same lanes: indices, Booleans, shapes of
+    tables."""
     start: LaneState
     """State at t = 0, with scratch memory."""
 
     @classmethod
     def of(cls, driven: DrivenRobot, *, record: bool) -> Prepared:
-        """Prepares a robot. Raises InputError if gait or steering do not fit the scenario."""
+        """Prepares a robot for a lane. Raises InputError if gait or steering do not fit the
+        scenario."""
         robot, model, structure = driven.robot, driven.robot.model, driven.robot.structure
         scenario, turns, solver = robot.scenario, driven.turns, Solver.of(model)
         cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
@@ -101,8 +103,7 @@ class Prepared:
         return cls(driven, record, times, turns, sizes, constants, kind, start)
 
     def like(self, driven: DrivenRobot) -> Prepared:
-        """The same as Prepared.of(driven), in less time if it is the same robot with another gait
-        or other first signals."""
+        """Prepares a robot like Prepared.of(), but faster if only gait or first signals are new."""
         robot, own = driven.robot, self.driven.robot
         is_alike = (
             type(driven) is type(self.driven)

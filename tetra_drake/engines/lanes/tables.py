@@ -17,7 +17,7 @@ def numbers_of(values: Any) -> np.ndarray:
 
 
 def shared(values: Any) -> Any:
-    """Parts of NamedTuples of arrays that are the same in all lanes: indices, truths, and the
+    """Parts of NamedTuples of arrays that are the same in all lanes: indices, Booleans, and the
     shapes of the tables of real numbers."""
     if isinstance(values, tuple):
         return tuple(map(shared, values))
@@ -49,7 +49,7 @@ def views(values: Any, numbers: np.ndarray, *, lanes: bool = False) -> Any:
 
 
 def numbered(values: Any) -> Any:
-    """NamedTuples like `values` with the indices of the numbers in numbers_of()."""
+    """NamedTuples like `values` with each real number replaced by its index in numbers_of()."""
     return views(values, np.arange(numbers_of(values).size, dtype=float))
 
 

@@ -28,13 +28,13 @@ class Touching(NamedTuple):
     """Contacts of struts that are part of the implicit matrix; further ones are explicit."""
 
     along: Annotated[Table, "6 * touches * bodies"]
-    """The vectors g, one after the other."""
+    """Derivatives g of the struts' distances, one vector per contact, one after the other."""
     solved: Annotated[Table, "6 * touches * bodies"]
-    """The vectors z, one after the other."""
+    """Solutions z of B z = g, one vector per contact, one after the other."""
     factor: Annotated[Table, "touches"]
-    """The factors w / (1 + w gᵀ z); the weights w at first."""
+    """Factors w / (1 + w gᵀ z) of the contacts; at first their weights w."""
     spring: Annotated[Table, "touches"]
-    """Parts time² * stiffness of w."""
+    """Stiffness parts of the weights w: time² * stiffness."""
     vector: Annotated[Table, "6 * bodies"]
     """Scratch memory."""
     count: Annotated[Table, 1, int]  # type: ignore[assignment]  # tuples have a method count()
