@@ -19,18 +19,18 @@ from tetra_drake.laws.tally import Metric, TalliedMetrics, Tally, metric
 from tetra_drake.settings.units import INCH, INCHES, Units, current
 
 STRAIGHT = 0.01
-"""Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
-by a fifth of a millimetre."""
+"""Curvature (1/m) below which a path counts as straight. A path of fifteen inches, as in the
+thesis, then deviates from a line by less than a fifth of a millimetre."""
 
 LEAST_WAY = 1e-3
-"""Least way (m) of a robot in the computation of its cost of transport."""
+"""Least distance (m) for the cost of transport; a shorter one counts as this distance."""
 ROW = "row of tetrahedra"
-"""Property of robots that some metrics need."""
+"""Name of a property of robots that some metrics need."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Poses:
-    """Positions of a robot for the computation of metrics, in SI units.
+    """Positions of a robot at three times, for the computation of metrics, in SI units.
 
     Positions (3, 3) are in the world frame, with a row for each time: 0, `simulation.steady_from`
     and the end.
@@ -49,7 +49,7 @@ class Poses:
 
 @dataclass(frozen=True, kw_only=True)
 class Walk(Poses):
-    """Numbers of a simulation for the computation of metrics, in SI units."""
+    """Data of one simulation for the computation of metrics, in SI units."""
 
     path: np.ndarray
     """Path (k, 2) of the centre of mass in the plane from `simulation.steady_from` on."""
@@ -58,12 +58,12 @@ class Walk(Poses):
     signals: np.ndarray
     """Signals (k, m) at evenly spaced times from `simulation.steady_from` on."""
     scale: float
-    """See Blueprint.scale."""
+    """Factor for lengths that grow with the robot; see Blueprint.scale."""
     weight: float
     actuators: int
     """Number of driven cables."""
     tally: Tally
-    """Tally of the whole simulation, as plain arrays."""
+    """Sums and extremes over all steps of the simulation, as plain arrays."""
 
     @property
     def per_steady_time(self) -> float:
@@ -94,22 +94,22 @@ _of_poses = functools.partial(metric, of_pose=True)
 
 @dataclass(frozen=True)
 class WalkMetrics:
-    """Metrics from positions and signals at a few times."""
+    """Metrics of a walk: distances, turning, cost of transport and travelling index."""
 
     distance: float = _of_poses(
         "m", "along x", lambda walk: walk.markers[2, 0, 0] - walk.markers[0, 0, 0]
     )
-    """Displacement of x₁ from the start to the end."""
+    """Distance along x from the start to the end: displacement of x₁."""
     steady_distance: float = _of_poses(
         "m", "without the start", lambda walk: walk.markers[2, 0, 0] - walk.markers[1, 0, 0]
     )
-    """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
+    """Distance along x from `simulation.steady_from` to the end: Δx₁ of Eq. 10."""
     speed: float = _of_poses(
         "m/s",
         "of the centre",
         lambda walk: (walk.centre[2, 0] - walk.centre[1, 0]) / walk.since_steady_from,
     )
-    """Mean speed of the centre along x from `simulation.steady_from` on."""
+    """Mean speed of the centre of mass along x from `simulation.steady_from` on."""
     twist: float = _of_poses(
         "m",
         "one rear foot ahead of the other",
@@ -172,8 +172,8 @@ class Metrics(TalliedMetrics, WalkMetrics):
 
     @classmethod
     def of(cls, walk: Walk, *, lacking: Collection[str], units: Units) -> Self:
-        """Computes all metrics. A metric is NaN if it needs a property that the robot is
-        `lacking`. They are printed in `units`."""
+        """Computes all metrics of a simulation, for printing in `units`. A metric is NaN if it
+        needs a property that the robot is `lacking`."""
         numbers = {
             name: math.nan if metric.needs in lacking else float(metric.compute(walk))
             for name, metric in METRICS.items()
@@ -227,7 +227,7 @@ class Metrics(TalliedMetrics, WalkMetrics):
 METRICS: dict[str, Metric] = {
     field.name: field.metadata["metric"] for field in dataclasses.fields(Metrics) if field.metadata
 }
-"""Declaration of each metric that is a number, by name."""
+"""Unit, note and computation of each metric that is a single number, by name."""
 
 UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
