@@ -82,7 +82,7 @@ class _Episodes:
         render_mode: str | None,
         most_steps: int | None = None,
     ) -> None:
-        """Makes robots without episodes. An episode has at most `most_steps`."""
+        """Makes robots on which no episode has begun. An episode has at most `most_steps` steps."""
         check_type(_SOURCE, "grouped", grouped, bool)
         if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
@@ -300,8 +300,9 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
-        """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. A seed is
-        for the first robot, the next one is for the second; or there is a list of seeds."""
+        """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. `seed` is
+        the seed of the first robot, and the next integers are the seeds of the others; or it is a
+        list of seeds."""
         _check_options(options, _MASK)
         mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
         is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()

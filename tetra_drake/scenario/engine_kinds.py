@@ -41,7 +41,7 @@ class Drake(EngineSettings):
     max_step: Time = Field(default=0.008, gt=0)
     """Longest step."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
-    """Where a node may change its mode: at the end of steps, or where a witness function is zero.
+    """When a node may change its mode: at the end of steps, or where a witness function is zero.
     `witness` needs short steps, such as the steps of runge_kutta3."""
     look_ahead: Time = Field(default=2e-5, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""

@@ -67,18 +67,19 @@ class Walk(Poses):
 
     @property
     def per_steady_time(self) -> float:
-        """1 / duration of the steady stretch."""
+        """1 / duration (s) of the steady stretch; see Metrics."""
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
     @property
     def per_actuator_time(self) -> float:
-        """1 / duration of the steady stretch, divided by the number of actuators."""
+        """1 / duration (s) of the steady stretch (see Metrics), divided by the number of
+        actuators."""
         return self.per_steady_time / max(self.actuators, 1)
 
     @property
     def lifted_shares(self) -> tuple[float, ...]:
-        """Share of the steady stretch during which each body is off the ground."""
+        """Share of the steady stretch (see Metrics) during which each body is off the ground."""
         return tuple((self.per_steady_time * self.tally.lifted).tolist())
 
 
@@ -99,7 +100,7 @@ class WalkMetrics:
     distance: float = _of_poses(
         "m", "along x", lambda walk: walk.markers[2, 0, 0] - walk.markers[0, 0, 0]
     )
-    """Distance along x from the start to the end: displacement of x₁."""
+    """Distance along x from the start to the end: displacement of x₁ (see Metrics)."""
     steady_distance: float = _of_poses(
         "m", "without the start", lambda walk: walk.markers[2, 0, 0] - walk.markers[1, 0, 0]
     )
@@ -166,7 +167,8 @@ class Metrics(TalliedMetrics, WalkMetrics):
     """
 
     lifted_shares: tuple[float, ...] = ()
-    """Share of the steady stretch during which each body is off the ground, from T1 on."""
+    """Share of the steady stretch (see Metrics) during which each body is off the ground, from T1
+    on."""
     units: Units = field(default=INCHES, repr=False, compare=False)
     """Units of the printed metrics; see also units.shown_in()."""
 
@@ -214,7 +216,8 @@ class Metrics(TalliedMetrics, WalkMetrics):
 
     @property
     def path_radius(self) -> float:
-        """Radius in m of the path of the centre in the steady stretch; inf if it is straight."""
+        """Radius in m of the path of the centre in the steady stretch (see Metrics); inf if it is
+        straight."""
         bend = abs(self.path_curvature)
         return 1.0 / bend if bend > STRAIGHT else math.inf
 

@@ -24,7 +24,8 @@ _KIND = StructureFile.tag
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that occur only in files of NTRT."""
 SCENARIO_KEYS = {"base", "robot"}
-"""Every scenario's file has one of these keys, and no structure's file has any."""
+"""Keys that distinguish the files: each scenario file has one of them, and no structure file has
+any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:

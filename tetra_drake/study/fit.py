@@ -87,7 +87,7 @@ class Fit:
     uncertainty, start and fitted: what the scenario predicts with the start and the fitted values.
     """
     clock_offsets: dict[str, float]
-    """Time (s) by which the clock of each measurement is ahead."""
+    """Time (s) by which the clock of each measurement is ahead of the simulated time."""
     misfit: float
     """Sum of squares of the weighted residuals per degree of freedom; 1 if the model and the
     uncertainties are right."""

@@ -151,7 +151,8 @@ class FitProblem:
         return residuals
 
     def clock_offsets(self, x: np.ndarray) -> dict[str, float]:
-        """Time (s) by which the clock of each measurement is ahead, at an evaluated point."""
+        """Time (s) by which the clock of each measurement is ahead of the simulated time, at an
+        evaluated point."""
         offsets = self._known[self._name(x)][self._clocks].tolist()
         return dict(zip([each.name for each in self.measured], offsets, strict=True))
 

@@ -59,7 +59,7 @@ class Prediction(NamedTuple):
     values: np.ndarray
     """Numbers (numbers,) in SI; NaN if there is none."""
     clock_offset: float = 0.0
-    """Time (s) by which the clock of the measurement is ahead."""
+    """Time (s) by which the clock of the measurement is ahead of the simulated time."""
 
 
 @dataclass(frozen=True)
