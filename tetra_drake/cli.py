@@ -651,7 +651,8 @@ def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
 def _chosen_gait(
     scenario: str | None, gait: Path | None, seed: int | None, engine: str | None = None
 ) -> tuple[Scenario, Gait]:
-    """The scenario, with the engine, and the gait to simulate on it."""
+    """The scenario, on the engine, and the gait that a command simulates. Without a gait file, the
+    gait is random."""
     from tetra_drake.evolution.run import load_source
     from tetra_drake.robot.gait import WALKING_SEED, seeded_gait
     from tetra_drake.scenario.load import load_scenario

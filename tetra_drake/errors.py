@@ -11,8 +11,8 @@ from types import NoneType
 from typing import Any, Self
 
 _LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 270, 60, 200, 4096
-"""Largest number of characters of key and problem; if they have more, of a key or a quotation, and
-of a problem; of a source."""
+"""Largest numbers of characters in a message: of key and problem together; of a key or a quotation,
+and of a problem, if key and problem have more; of the source."""
 _IN_WORDS = {
     bool: "True or False",
     str: "a text",
@@ -26,7 +26,7 @@ _IN_WORDS = {
 
 
 class InputError(ValueError):
-    """Input that cannot be used. The message is one line.
+    """Error of input that cannot be used. The message is one line.
 
     `source` is the file, option or function, `key` the position in it. The message says what was
     found and what was expected.
@@ -71,7 +71,8 @@ def check_whole(
 
 
 def check_type(source: object, key: str, value: object, *kinds: Any) -> None:
-    """Raises InputError unless a value is of one of the kinds. True and False are no numbers."""
+    """Raises InputError unless a value has one of the types `kinds`. True and False are no
+    numbers."""
     is_truth = isinstance(value, bool) and bool not in kinds
     if is_truth or not isinstance(value, kinds):
         expected = " or ".join(_IN_WORDS.get(kind, kind.__name__) for kind in kinds)
@@ -82,7 +83,7 @@ class SimulationFailure(RuntimeError):
     """A simulation that failed at `time` (s) for a `reason`."""
 
     fitness = -math.inf
-    """Fitness of what failed, for optimisers."""
+    """Fitness of a gait that failed, for optimisers."""
     wall_time = 0.0
     """Wall time of the simulation in s; 0 if the engine does not measure it."""
     scenario: Any = None
@@ -106,7 +107,8 @@ class SimulationFailure(RuntimeError):
 
 
 class Diverged(SimulationFailure):
-    """A motion beyond physics: not finite, too fast, or too hard for the integrator."""
+    """Failure of a simulation whose motion is not finite, too fast, or too hard for the
+    integrator."""
 
     @classmethod
     def too_fast(cls, *, time: float, limit: float) -> Self:
@@ -116,12 +118,12 @@ class Diverged(SimulationFailure):
 
 
 class StepBudgetExceeded(SimulationFailure):
-    """A simulation that used up its budget of derivative evaluations."""
+    """Failure of a simulation that used up its budget of derivative evaluations."""
 
 
 class TimeBudgetExceeded(Exception):
-    """A simulation that used up its wall time. It is not a RuntimeError, because engines treat a
-    RuntimeError as divergence."""
+    """Failure of a simulation that used up its wall time. It is not a RuntimeError, because engines
+    treat a RuntimeError as divergence."""
 
     wall_time = 0.0
     """Wall time of the simulation in s; 0 if the engine does not measure it."""

@@ -1,4 +1,4 @@
-"""Experiments as a whole, from their records to their reports: `evolve`, and `fit`."""
+"""Complete experiments, from the search to the report: `evolve` and `fit`."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def fit(
             several minima may fit.
         out: a folder for the fitted scenario, tables, figure and page. It also keeps each
             evaluation, so that an interrupted fit goes on where it was.
-        say: is told of each iteration.
+        say: function that gets a line of text after each iteration.
         source: file with the parameters, for errors.
 
     Raises:
@@ -248,7 +248,8 @@ def _introduce(
     progress: Progress, record: RunRecord, workers: object, *, drawing: str, is_new: bool
 ) -> None:
     """Shows the method, the scenario and the files to come; `drawing` is the command that draws
-    them, empty for none. Warns of other versions, and of what in the robot hardly works."""
+    them, empty for none. Warns if versions differ, and of settings with which the robot hardly
+    works."""
     directory, manifest = record.directory, record.manifest
     text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
     text += str(manifest.scenario)

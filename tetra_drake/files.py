@@ -22,7 +22,7 @@ MOST_BYTES = 64 * 2**20
 """Default limit for the size of a file that is read into memory."""
 
 _LONGEST_NAME = 60
-"""Characters of a name of file_names(). File systems take 255 bytes."""
+"""Largest number of characters of a name from file_names(). File systems take 255 bytes."""
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Error numbers of a full or broken disk."""
@@ -84,8 +84,8 @@ def given_path(path: str | Path, source: str, what: str) -> Path:
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """Names of files or folders for any texts, by text. They are no paths, and different even where
-    upper and lower case are the same."""
+    """Valid file names for any texts, by text. They are different even where upper and lower case
+    are the same."""
     found: dict[str, str] = {}
     for name in names:
         taken = {other.casefold() for other in found.values()}
@@ -146,7 +146,7 @@ def check_folder(folder: str | Path) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """The reason of an error, without the path: messages name the path already."""
+    """Reason of an error, without the path: messages name the path already."""
     return getattr(error, "strerror", None) or str(error)
 
 

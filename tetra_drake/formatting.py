@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from importlib import resources
 
 Say = Callable[[str], None]
-"""Function that tells the user something."""
+"""Function that shows a text to the user, such as print()."""
 
 _ROUNDING = 1e-12
 """Size up to which a number in a table is a rounding error."""
 
 
 def silent(text: str) -> None:
-    """Tells the user nothing."""
+    """Shows nothing, in place of another Say."""
 
 
 def fixed(value: float, digits: int = 2) -> str:

@@ -72,7 +72,7 @@ _SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
 
 
 class _Episodes:
-    """Episodes of robots side by side: observations, actions and rewards of all environments."""
+    """Episodes of robots that are simulated together: observations, actions and rewards of all."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class _Episodes:
         render_mode: str | None,
         most_steps: int | None = None,
     ) -> None:
-        """Makes robots without episodes. An episode has at most `most_steps`."""
+        """Makes robots on which no episode has begun. An episode has at most `most_steps` steps."""
         check_type(_SOURCE, "grouped", grouped, bool)
         if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
@@ -110,8 +110,8 @@ class _Episodes:
         self._steps, self._going = np.zeros(count, dtype=int), np.zeros(count, dtype=bool)
 
     def reset(self, places: np.ndarray, generators: Sequence[np.random.Generator]) -> np.ndarray:
-        """Begins episodes, with draws from the generators of all robots. Returns the observations
-        of all robots."""
+        """Begins episodes of the robots with the indices `places`. The generators of all robots
+        give the seeds. Returns the observations of all robots."""
         seeds = [int(generators[place].integers(2**31)) for place in places]
         readings = self.simulation.reset(seed=seeds, indices=places)
         self._steps[places], self._going[places] = 0, True
@@ -125,8 +125,8 @@ class _Episodes:
     def step(
         self, actions: np.ndarray, places: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Simulates a control period of some robots. Returns observations, rewards, and whether
-        episodes are terminated and truncated, of all robots."""
+        """Simulates a control period of the robots with the indices `places`. Returns observations,
+        rewards, and whether episodes are terminated and truncated, of all robots."""
         simulation = self.simulation
         if (over := places[~self._going[places]]).size:
             raise InputError(_SOURCE, "step", f"robot {over[0]} has no episode; reset() begins one")
@@ -156,7 +156,7 @@ class _Episodes:
         return self._observe(readings), rewards, terminated, truncated
 
     def _fitness(self, readings: Readings, place: int) -> float:
-        """The fitness up to now, without the metrics that are known only at the end."""
+        """Fitness of one robot up to now, without the metrics that are known only at the end."""
         scenario, structure = self._scenario, self.simulation.robot.structure
         nodes = np.stack([self._start[place], self._steady[place], readings.p_WN[place]])
         steady_time = scenario.simulation.duration - scenario.simulation.settling_time
@@ -184,7 +184,7 @@ class _Episodes:
         return tuple(picture(simulation.robot, p_WN) for p_WN in simulation.state.p_WN)
 
     def _observe(self, readings: Readings) -> np.ndarray:
-        """Observations (N, size)."""
+        """Observations of all robots (N, size); see tetra_drake.gym."""
         per_length, per_weight = 1.0 / self._start_lengths, 1.0 / self._weight
         parts = (
             readings.lengths * per_length - 1.0,
@@ -251,7 +251,7 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
 
 
 class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickle):
-    """Environments of robots side by side, in the lanes and threads of the compiled engine; see
+    """Environments of many robots, which the compiled engine simulates in parallel; see
     tetra_drake.gym. They behave like environments of one robot in Gymnasium's SyncVectorEnv.
 
     By default a robot whose episode ends begins the next one in the next step, without a motion.
@@ -300,8 +300,9 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
-        """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. A seed is
-        for the first robot, the next one is for the second; or there is a list of seeds."""
+        """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. `seed` is
+        the seed of the first robot, and the next integers are the seeds of the others; or it is a
+        list of seeds."""
         _check_options(options, _MASK)
         mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
         is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()

@@ -127,7 +127,7 @@ def size(text: str) -> tuple[int, int]:
 
 
 _PIXELS = range(64, 4097, 2)
-"""Sizes of a picture."""
+"""Allowed widths and heights of a picture, in pixels."""
 
 
 def number(text: str, *, least: float, most: float) -> float:

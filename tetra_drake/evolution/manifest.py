@@ -82,7 +82,7 @@ class Method:
 
     @property
     def given_from_python(self) -> list[str]:
-        """Names, "objective" or "optimizer", of what came from Python and is not in the scenario."""
+        """Names of what came from Python: "objective", "optimizer" or both."""
         return [part for part, name in vars(self).items() if "." in name]
 
 

@@ -223,8 +223,8 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
 
 
 def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[np.ndarray, float]:
-    """True if all feet of a body are off the ground (samples, bodies), and the least height that
-    counts as off the ground, in the unit of length."""
+    """Flags (samples, bodies), True if all feet of a body are off the ground; and the least height
+    that counts as off the ground, in the unit of length."""
     structure, ground = result.robot.structure, result.robot.ground
     start, contacts = node_positions(structure, structure.initial_state), structure.contacts
     feet, least = trajectory.p_WN.values[:, contacts], _CLEARANCE * float(np.ptp(start[:, Z]))

@@ -75,7 +75,7 @@ class Look:
     title: bool = True
 
     def __post_init__(self) -> None:
-        """Raises InputError if the axes would have no room."""
+        """Raises InputError if a figure is too wide, or its letters are too large for its width."""
         most = _MOST_PER_INCH * self.width_in
         if not 0.0 < self.font_size <= most <= _MOST_PER_INCH * _WIDEST:
             expected = f"a width up to {_WIDEST:g} in, and per inch letters up to {_MOST_PER_INCH}"
@@ -84,7 +84,7 @@ class Look:
 
 
 _WIDEST, _MOST_PER_INCH = 40.0, 4.5
-"""Greatest width of figures in inches, and greatest size of letters in points per inch of it."""
+"""Greatest width of figures in inches, and greatest size of letters in points per inch of width."""
 
 USUAL = Look()
 
@@ -264,7 +264,8 @@ def panels_in_columns(
 
 
 def titled(page: Page, title: str, *, share: float = 1.0) -> Page:
-    """A figure with a title at its upper left, in lines of a share of the figure's width."""
+    """Writes a title at the upper left of a figure and returns the figure. A line of the title has
+    at most a share of the width."""
     text = folded(title, share * page_width(page), size=rcParams["figure.titlesize"])
     page.suptitle(text, x=0.01, ha="left")
     return page

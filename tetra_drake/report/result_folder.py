@@ -82,7 +82,7 @@ class ResultFile(Section):
     engine: str
     integrator: IntegratorWork
     gait: Any
-    """See GaitFile; None if a command was played."""
+    """Gait in the form of GaitFile; None if the robot followed a command."""
     path: PathColumns
 
 

@@ -87,8 +87,8 @@ class ShownGaits:
 
 
 Pictures = Mapping[str, Sequence[partial[Any]]]
-"""Figures of a report by its parts: gait, evolution, forces. A figure is its function, with the
-data to draw."""
+"""Figures of a report by section: gait, evolution, forces. Each is a function with the data to
+draw."""
 
 
 class GaitColumn(NamedTuple):

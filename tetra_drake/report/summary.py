@@ -28,7 +28,7 @@ _TITLES = {"worst_distance": "distance in the worst draw", "kept": "robust"}
 _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
     "kept": "draws that cost at most a tenth"
 }
-"""Notes on numbers, by name."""
+"""Notes beside the numbers of a table, by name."""
 
 _NOTHING = 5e-4
 """Threshold for a row of a table: it may be left out if all its numbers, as shown, are smaller."""

@@ -1,4 +1,4 @@
-"""Blueprint of a robot: plain data that every kind of robot provides."""
+"""Blueprint of a robot: bodies, nodes, struts and cables as plain data, for any kind of robot."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ TOLERANCE = 1e-6
 """Distance below which two points count as the same, as a share of the robot's size."""
 
 USUAL_SIZES = 0.1, 1.0
-"""Least and greatest size (m) of robots for which areas of terrain, margins of figures and other
-lengths are chosen. For larger and smaller robots these lengths are scaled. See Blueprint.scale."""
+"""Least and greatest size (m) of robots for which default lengths are chosen, such as the area of
+terrain and the margins of figures. For larger and smaller robots these lengths are scaled. See
+Blueprint.scale."""
 
 LONGEST, SHORTEST = 1e4, 1e-6
 """Limits for the length of a strut, in m. The first is also the largest coordinate of a node."""
@@ -38,7 +39,7 @@ LEAST_DISTANCE = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Blueprint:
-    """A robot at the positions of its settings; SI units.
+    """Geometry and constants of a robot, computed from its settings; SI units.
 
     Nodes and struts are in the order of the bodies. Then come fixed nodes, which belong to no body:
     the world holds them where they are. Left and right are the two sides of the plane
@@ -80,9 +81,9 @@ class Blueprint:
     """Stiffness (nodes, 3) of the springs that hold the nodes of bodies along x, y and z; 0 along a
     free axis."""
     anchor_damping: np.ndarray
-    """Damping (nodes, 3) beside `anchor_stiffness`."""
+    """Damping (nodes, 3) of the springs that hold the nodes of bodies along x, y and z."""
     payload: np.ndarray
-    """Point masses at the centres of mass (bodies,)."""
+    """Point masses at the centres of mass of the bodies (bodies,)."""
     offsets: np.ndarray
     """Displacements (bodies, 3) of the bodies at the start."""
     cable_names: tuple[str, ...]
@@ -93,9 +94,10 @@ class Blueprint:
     cable_keys: tuple[str, ...]
     """Keys of the cables in the settings, such as "cables.side.pairs[0]", for error messages."""
     cable_ends: np.ndarray
-    """Indices of the two nodes of each cable (cables, 2), from the lower body to the higher."""
+    """Indices of the two nodes of each cable (cables, 2). The node of the body with the lower index
+    comes first."""
     cable_laws: tuple[Mapping[str, float], ...]
-    """Constants of each cable, by the names of laws.cable.CableLaw."""
+    """Constants of each cable's force law, by the names of laws.cable.CableLaw."""
     slack: bool
     """True if cables go slack instead of pushing."""
     contacts: np.ndarray
@@ -108,7 +110,7 @@ class Blueprint:
     """Indices of the nodes whose motion is shown (markers,), in the order of the bodies. Empty if
     the motion of the centre of mass is shown."""
     followed: str = "centre"
-    """Name of the points whose motion is shown."""
+    """Name, in texts, of the points whose motion is shown, such as "centre"."""
     points_ahead: bool = False
     """True if the bodies' x axes point forward, so that the robot has a heading."""
     feet: int | None = None
@@ -179,7 +181,7 @@ class Blueprint:
         return tuple(groups.index(cables) if cables in groups else None for cables in images)
 
     def check(self) -> None:
-        """Raises InputError, naming the key, for a robot that the laws cannot compute."""
+        """Raises InputError, naming the key, if the robot cannot be simulated."""
         self.check_sizes()
         self._check_bodies()
         self._check_cables()
@@ -205,8 +207,8 @@ class Blueprint:
             refuse("contacts", "found none, expected one node at least")
 
     def check_sizes(self) -> None:
-        """Raises InputError for a list without an item for each body, or a strut whose size is too
-        extreme for the computation of forces."""
+        """Raises InputError if a list has not one item for each body, or if the size of a strut is
+        too extreme for the computation of forces."""
         bodies = len(self.bodies)
         for key, items in (("offsets", self.offsets), ("payload", self.payload)):
             if len(items) != bodies:
@@ -226,7 +228,7 @@ class Blueprint:
                 refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
     def _check_bodies(self) -> None:
-        """Refuses bodies of hardly any mass, and nodes at one place.
+        """Refuses bodies of hardly any mass, and two nodes at the same position.
 
         The point masses of a body with several nodes do not count, as they have no inertia about
         the line between two of them.
@@ -291,7 +293,7 @@ class Blueprint:
         return float(self._distances(pairs).min()) if len(pairs) else 0.0
 
     def _distances(self, pairs: np.ndarray) -> np.ndarray:
-        """Distances (pairs,) in m of two nodes each (pairs, 2)."""
+        """Distances (pairs,) in m between the two nodes of each pair (pairs, 2)."""
         ends = self.p_WN[pairs]
         return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 

@@ -11,25 +11,26 @@ from tetra_drake.settings.refusals import TAG
 from tetra_drake.settings.section import Tree, joined, mapped, parts_of, tree_value
 
 REPLACED = ("objective", "require", "robot.actuated")
-"""Mappings that a file replaces as a whole."""
+"""Keys of mappings that a file replaces as a whole, instead of merging them."""
 
 REMOVABLE = ("disturbances",)
 """Sections that an empty key removes, as in `disturbances:`."""
 
 
 class Part(Tree):
-    """Mapping made from dotted keys. It changes single keys of a mapping, or single items of a
-    list, by their indices."""
+    """Mapping made from dotted keys. Merging it changes single keys of a mapping, or single items
+    of a list, by their indices."""
 
 
 def merged(base: Any, changes: Any, key: str = "") -> Any:
-    """Merges changes into the tree of a scenario, or into its part at `key`. The rules are:
+    """Merges changes into the settings of a scenario, or into its section at `key`. The rules are:
 
     - A mapping changes the keys that it names; the others stay. An empty key, as in `friction:`,
       changes nothing; `disturbances:` removes the section.
-    - A kind with its tag replaces the base's kind and all its keys. Without a tag it changes keys.
+    - A mapping with a tag, such as `!Coulomb`, replaces the mapping of the base and all its keys.
+      Without a tag it changes keys.
     - `objective`, `require` and `robot.actuated` are replaced as a whole. Only dotted keys from
-      Python, such as "objective.speed", change a part of them.
+      Python, such as "objective.speed", change single keys of them.
     - Numbers, texts, lists, and sections from Python replace the base's value. Only keys from
       Python, such as "robot.loads.n3[2]", change an item of a list.
     """
@@ -53,8 +54,8 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
 
 
 def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, Any]:
-    """Checks an argument that gives changes by dotted keys. Raises InputError, naming `source`, for
-    anything else."""
+    """Checks an argument that must be a mapping with dotted keys, and returns it. Raises
+    InputError, naming `source`, for anything else."""
     if isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes):
         return changes
     problem = f"found {changes!r:.60}, expected values by dotted keys, such as {{'cpg.gain': ...}}"
@@ -62,8 +63,8 @@ def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, An
 
 
 def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
-    """Converts changes by dotted keys from Python to the tree of a file. The tree may also contain
-    sections. Raises InputError, naming `source`, if they are none."""
+    """Converts changes by dotted keys to nested mappings, as in a file. Values may be sections.
+    Raises InputError, naming `source`, if the changes are no mapping or a key is given twice."""
     tree: Tree = Part()
     changes = given_changes(changes, source)
     for key in sorted(changes, key=lambda key: len(parts_of(key))):  # "robot" before "robot.name"

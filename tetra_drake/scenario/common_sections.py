@@ -19,22 +19,24 @@ from tetra_drake.settings.section import Section
 
 
 class GaitBounds(Section):
-    """Bounds of random gaits (Table 5). Equal bounds fix a parameter."""
+    """Ranges of the parameters of random gaits (Table 5). Equal bounds fix a parameter."""
 
     weight_min: float = Field(ge=0)
     """Least weight of the inhibition between oscillators."""
     weight_max: float = Field(ge=0)
     """Greatest weight of the inhibition between oscillators."""
     tau_a_min: Time = Field(gt=0)
-    """Least time constant tau_A of u."""
+    """Least time constant tau_A of the inner state u of an oscillator."""
     tau_a_max: Time = Field(gt=0)
-    """Greatest time constant tau_A of u."""
+    """Greatest time constant tau_A of the inner state u of an oscillator."""
     turn: float = Field(default=0.0, ge=-1, le=1)
-    """The turn of all gaits that are drawn or evolved."""
+    """Steering of all random and evolved gaits, -1 to 1. Left oscillators get the input u0 (1 +
+    turn), right ones u0 (1 - turn)."""
     mirrored: bool = False
-    """True if drawn and evolved weights are the same on the left and on the right."""
+    """True if random and evolved gaits have the same weights on the left and on the right."""
     independent_tau_b: bool = False
-    """True if tau_B evolves by itself. Otherwise it stays at 2 tau_A."""
+    """True if tau_B, the time constant of self-inhibition, evolves by itself. Otherwise it stays at
+    2 tau_A."""
 
     @model_validator(mode="after")
     def _check(self) -> GaitBounds:
@@ -47,11 +49,11 @@ class GaitBounds(Section):
 
 
 LONGEST_SETTLING = 3.0
-"""Time (s) at which the steady walk begins in long simulations, by default."""
+"""Upper limit (s) of the default of SimulationSection.steady_from."""
 
 
 class SimulationSection(Section):
-    """Duration of a simulation, and when to give up."""
+    """Duration and sampling of a simulation, and limits beyond which it fails."""
 
     duration: Time = Field(gt=0, le=1e5)
     """Simulated time."""
@@ -91,17 +93,17 @@ class EvolutionSection(Section):
     """Number of gaits that a trial evaluates, unless it ends early. !SteadyState evaluates its
     population, then two gaits in each iteration."""
     time_budget: Time = Field(gt=0)
-    """Wall time of a simulation; a longer one counts as failed."""
+    """Longest wall time of a simulation; one that takes longer counts as failed."""
 
 
 def separate(joined: str) -> list[str]:
-    """Scenario keys in a key that joins them by commas, such as "cpg.gain, robot.density"."""
+    """Splits a key that joins scenario keys by commas: "cpg.gain, robot.density" gives two keys."""
     return [key.strip() for key in joined.split(",")]
 
 
 def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mapping[str, Value]:
-    """Validator of values by joined keys, such as "a.b, c.d": each key may be given once. Raises
-    InputError, naming `source`, for a key that is given twice."""
+    """Validator of a mapping with joined keys, such as "a.b, c.d": each key may be given once.
+    Raises InputError, naming `source`, for a key that is given twice."""
     counts = Counter(key for joined in by_joined for key in separate(joined))
     for key, count in counts.items():
         if count > 1:
@@ -113,7 +115,7 @@ Spread = Annotated[float, Field(gt=0, le=0.5)]
 
 
 class Disturbances(Section):
-    """Disturbances of robot and surroundings for evolution.
+    """Random changes of robot and surroundings during evolution. A draw is one set of such changes.
 
     Every gait is simulated once in each draw. All gaits of an iteration have the same draws. Each
     draw also has another terrain seed, if the terrain has a seed.
@@ -122,11 +124,11 @@ class Disturbances(Section):
     draws: int = Field(ge=1, le=10_000)
     """Number of draws. Each gait is simulated once in each draw."""
     spreads: Annotated[Keyed[str, Spread], AfterValidator(different_keys)] = Field(default={})
-    """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
-    1 + spread. Keys joined by commas get the same factor."""
+    """Relative spreads of numbers, by scenario key. Each draw multiplies the number by a factor
+    from 1 - spread to 1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
-    """Each draw displaces every body at t = 0 along x, y and up, by up to this share of the
-    spacing of tetrahedra, or of the shortest strut of a structure."""
+    """Largest displacement of a body at t = 0 along x, y and up, as a share of the spacing of
+    tetrahedra, or of the shortest strut of a structure. Each draw displaces every body."""
     tail: float = Field(default=1.0, gt=0, le=1)
-    """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
-    at risk). 1 is the mean over all draws. At least one draw counts."""
+    """Share of the draws, the worst ones, whose mean is a gait's fitness (the conditional value at
+    risk). 1 is the mean over all draws. At least one draw counts."""

@@ -1,4 +1,4 @@
-"""Draws of a scenario's disturbances: their seeds, their numbers, and the disturbed scenarios.
+"""Random draws of a scenario's disturbances, and the scenarios that they change.
 
 In evolution, draw k has the seed (run's seed, trial, iteration, k), so all gaits of an iteration
 have the same draws. Draws for judging gaits have other seeds, which no evolution uses.
@@ -21,18 +21,18 @@ IterationSeed = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Draw:
-    """Changes of robot and surroundings in one draw."""
+    """One set of random changes of robot and surroundings."""
 
     factors: Mapping[str, float]
-    """Factors by the keys of `disturbances.spreads`."""
+    """Factor of the number at each key of `disturbances.spreads`."""
     moves: np.ndarray | None = None
     """Displacement of each body at t = 0 (n, 3), in m."""
     terrain_seed: int | None = None
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
-    """Draw of the disturbances of a scenario from a seed. Its factors do not depend on the
-    scenario's values."""
+    """Random changes for the disturbances of a scenario, from a seed. The factors do not depend on
+    the scenario's values."""
     settings = scenario.disturbances
     if settings is None:
         return Draw({})
@@ -51,8 +51,7 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
 
 
 def _stream(seed: Sequence[int], *names: str) -> np.random.Generator:
-    """Random generator for the settings with these names. It does not depend on the other
-    disturbances."""
+    """Random generator for the disturbances with these names. It does not depend on the others."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
@@ -82,12 +81,12 @@ def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario
 
 
 def fresh_draws(scenario: Scenario, seed: int, count: int) -> list[Draw]:
-    """Draws that no evolution uses, whatever its seed."""
+    """Draws for tests of gaits. No evolution uses them, whatever its seed."""
     return [draw_disturbances(scenario, fresh_seed(seed, k)) for k in range(count)]
 
 
 def fresh_seed(seed: int, k: int) -> tuple[int, ...]:
-    """Seed of a fresh draw: six numbers, the last not 0.
+    """Seed of draw k in fresh_draws(): six numbers, the last not 0.
 
     Seeds of evolution have four numbers (five after numpy splits a large first one) and are padded
     with zeros, so they never end with 1.

@@ -1,4 +1,4 @@
-"""Kinds of engines: how finely they simulate."""
+"""Simulation engines that a scenario can choose, with their steps and tolerances."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -10,7 +10,7 @@ from tetra_drake.settings.section import Kinds, Section
 SHORTEST_STEP = 1e-9
 """Lower limit (s) of the steps of !Compiled."""
 LONGEST_LOOK_AHEAD = 2e-5
-"""Upper limit (s) of the look-ahead of !Compiled; a longer one costs evaluations."""
+"""Upper limit (s) of Compiled.look_ahead; a longer one costs evaluations."""
 
 
 class EngineSettings(Section):
@@ -21,14 +21,14 @@ class EngineSettings(Section):
     packages: ClassVar[tuple[str, ...]] = ()
     """Packages that only this engine needs."""
     has_cone: ClassVar[bool] = False
-    """True if the engine simulates MuJoCo's friction in place of some laws; see
+    """True if the engine replaces some friction laws by MuJoCo's friction; see
     FrictionKind.cone_text."""
 
 
 class Drake(EngineSettings):
     """The Drake diagram with an error-controlled integrator.
 
-    Modes are contact and stiction of the nodes.
+    The mode of a node is whether it touches the ground, and whether it sticks.
     """
 
     module: ClassVar[str] = "tetra_drake.engines.drake"
@@ -41,8 +41,8 @@ class Drake(EngineSettings):
     max_step: Time = Field(default=0.008, gt=0)
     """Longest step."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
-    """Where modes change: at the end of steps, or where a witness function is zero. `witness` needs
-    short steps, such as the steps of runge_kutta3."""
+    """When a node may change its mode: at the end of steps, or where a witness function is zero.
+    `witness` needs short steps, such as the steps of runge_kutta3."""
     look_ahead: Time = Field(default=2e-5, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""
 
@@ -74,4 +74,4 @@ class Mujoco(EngineSettings):
 
 
 EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds()]
-"""Union of the kinds of engines. A mapping without a tag is of the first kind."""
+"""Engine of a scenario, with its settings. A mapping without a tag is a Drake."""

@@ -49,7 +49,7 @@ def schema_text(*, structure: bool = False) -> str:
 
 
 def keys_page() -> str:
-    """All keys with unit, limits, default and meaning, in Markdown."""
+    """Page of all keys of scenario files in Markdown, with unit, limits, default and meaning."""
     parts, others = [_INTRODUCTION], []
     schema = Scenario.model_json_schema()
     for key, node in schema["properties"].items():
@@ -84,7 +84,7 @@ def _table_of_keys(rows: Iterable[tuple[str, Tree]]) -> str:
 
 
 def _value(node: Tree) -> str:
-    """Possible values of a type, with unit and limits."""
+    """Text about the values that a node of the JSON Schema allows, with unit and limits."""
     if "anyOf" in node:
         return " or ".join(_value(part) for part in node["anyOf"] if part != {"type": "null"})
     if "properties" in node:

@@ -1,4 +1,4 @@
-"""Scenario files: read with their bases, and written."""
+"""Reading of scenario files, together with the scenarios that they change, and writing."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tetra_drake.settings.refusals import no_such
 from tetra_drake.settings.section import keys_of, written
 
 SCENARIO = "scenario.yaml"
-"""The scenario's file in the folder of a command."""
+"""Name of the scenario's file in a folder that a command writes."""
 
 
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
-    """Loads a scenario.
+    """Loads a shipped scenario by its name, or a scenario file.
 
         >>> scenario = td.load_scenario("thesis").with_changes({"robot.spacing": "3 in"})
         >>> print(scenario)
@@ -49,12 +49,13 @@ class HasScenario(Protocol):
 
 
 GivenScenario = Scenario | HasScenario | str | Path
-"""A scenario; its name, file, or the folder of a command that holds it; a run or a result."""
+"""Argument that gives a scenario: a scenario; its name, file, or the folder of a command that holds
+it; a run or a result."""
 
 
 def given_scenario(scenario: GivenScenario) -> Scenario:
-    """The scenario that an argument gives: a scenario, its name or file, or a run. Raises
-    InputError for anything else."""
+    """Converts an argument to a scenario. It is a scenario, its name or file, a run or a result.
+    Raises InputError for anything else."""
     if isinstance(scenario, (str, Path)):
         in_folder = Path(scenario) / SCENARIO
         is_folder = str(scenario) not in shipped_scenarios() and os.path.isfile(in_folder)
@@ -67,7 +68,7 @@ def given_scenario(scenario: GivenScenario) -> Scenario:
 
 
 def dump_scenario(scenario: Scenario) -> str:
-    """The scenario as a file with all settings in SI. It loads back to the same scenario even if
+    """Text of a scenario file with all settings in SI. It loads as the same scenario even if
     defaults change. A height file must be beside it, see save_scenario()."""
     return dump_yaml(written(scenario.model_dump()))
 

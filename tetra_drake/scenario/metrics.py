@@ -19,18 +19,18 @@ from tetra_drake.laws.tally import Metric, TalliedMetrics, Tally, metric
 from tetra_drake.settings.units import INCH, INCHES, Units, current
 
 STRAIGHT = 0.01
-"""Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
-by a fifth of a millimetre."""
+"""Curvature (1/m) below which a path counts as straight. A path of fifteen inches, as in the
+thesis, then deviates from a line by less than a fifth of a millimetre."""
 
 LEAST_WAY = 1e-3
-"""Least way (m) of a robot in the computation of its cost of transport."""
+"""Least distance (m) for the cost of transport; a shorter one counts as this distance."""
 ROW = "row of tetrahedra"
-"""Property of robots that some metrics need."""
+"""Name of a property of robots that some metrics need."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Poses:
-    """Positions of a robot for the computation of metrics, in SI units.
+    """Positions of a robot at three times, for the computation of metrics, in SI units.
 
     Positions (3, 3) are in the world frame, with a row for each time: 0, `simulation.steady_from`
     and the end.
@@ -49,7 +49,7 @@ class Poses:
 
 @dataclass(frozen=True, kw_only=True)
 class Walk(Poses):
-    """Numbers of a simulation for the computation of metrics, in SI units."""
+    """Data of one simulation for the computation of metrics, in SI units."""
 
     path: np.ndarray
     """Path (k, 2) of the centre of mass in the plane from `simulation.steady_from` on."""
@@ -58,27 +58,28 @@ class Walk(Poses):
     signals: np.ndarray
     """Signals (k, m) at evenly spaced times from `simulation.steady_from` on."""
     scale: float
-    """See Blueprint.scale."""
+    """Factor for lengths that grow with the robot; see Blueprint.scale."""
     weight: float
     actuators: int
     """Number of driven cables."""
     tally: Tally
-    """Tally of the whole simulation, as plain arrays."""
+    """Sums and extremes over all steps of the simulation, as plain arrays."""
 
     @property
     def per_steady_time(self) -> float:
-        """1 / duration of the steady stretch."""
+        """1 / duration (s) of the steady stretch; see Metrics."""
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
     @property
     def per_actuator_time(self) -> float:
-        """1 / duration of the steady stretch, divided by the number of actuators."""
+        """1 / duration (s) of the steady stretch (see Metrics), divided by the number of
+        actuators."""
         return self.per_steady_time / max(self.actuators, 1)
 
     @property
     def lifted_shares(self) -> tuple[float, ...]:
-        """Share of the steady stretch during which each body is off the ground."""
+        """Share of the steady stretch (see Metrics) during which each body is off the ground."""
         return tuple((self.per_steady_time * self.tally.lifted).tolist())
 
 
@@ -94,22 +95,22 @@ _of_poses = functools.partial(metric, of_pose=True)
 
 @dataclass(frozen=True)
 class WalkMetrics:
-    """Metrics from positions and signals at a few times."""
+    """Metrics of a walk: distances, turning, cost of transport and travelling index."""
 
     distance: float = _of_poses(
         "m", "along x", lambda walk: walk.markers[2, 0, 0] - walk.markers[0, 0, 0]
     )
-    """Displacement of x₁ from the start to the end."""
+    """Distance along x from the start to the end: displacement of x₁ (see Metrics)."""
     steady_distance: float = _of_poses(
         "m", "without the start", lambda walk: walk.markers[2, 0, 0] - walk.markers[1, 0, 0]
     )
-    """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
+    """Distance along x from `simulation.steady_from` to the end: Δx₁ of Eq. 10."""
     speed: float = _of_poses(
         "m/s",
         "of the centre",
         lambda walk: (walk.centre[2, 0] - walk.centre[1, 0]) / walk.since_steady_from,
     )
-    """Mean speed of the centre along x from `simulation.steady_from` on."""
+    """Mean speed of the centre of mass along x from `simulation.steady_from` on."""
     twist: float = _of_poses(
         "m",
         "one rear foot ahead of the other",
@@ -166,14 +167,15 @@ class Metrics(TalliedMetrics, WalkMetrics):
     """
 
     lifted_shares: tuple[float, ...] = ()
-    """Share of the steady stretch during which each body is off the ground, from T1 on."""
+    """Share of the steady stretch (see Metrics) during which each body is off the ground, from T1
+    on."""
     units: Units = field(default=INCHES, repr=False, compare=False)
     """Units of the printed metrics; see also units.shown_in()."""
 
     @classmethod
     def of(cls, walk: Walk, *, lacking: Collection[str], units: Units) -> Self:
-        """Computes all metrics. A metric is NaN if it needs a property that the robot is
-        `lacking`. They are printed in `units`."""
+        """Computes all metrics of a simulation, for printing in `units`. A metric is NaN if it
+        needs a property that the robot is `lacking`."""
         numbers = {
             name: math.nan if metric.needs in lacking else float(metric.compute(walk))
             for name, metric in METRICS.items()
@@ -214,7 +216,8 @@ class Metrics(TalliedMetrics, WalkMetrics):
 
     @property
     def path_radius(self) -> float:
-        """Radius in m of the path of the centre in the steady stretch; inf if it is straight."""
+        """Radius in m of the path of the centre in the steady stretch (see Metrics); inf if it is
+        straight."""
         bend = abs(self.path_curvature)
         return 1.0 / bend if bend > STRAIGHT else math.inf
 
@@ -227,7 +230,7 @@ class Metrics(TalliedMetrics, WalkMetrics):
 METRICS: dict[str, Metric] = {
     field.name: field.metadata["metric"] for field in dataclasses.fields(Metrics) if field.metadata
 }
-"""Declaration of each metric that is a number, by name."""
+"""Unit, note and computation of each metric that is a single number, by name."""
 
 UNITS = {name: metric.unit for name, metric in METRICS.items()}
 

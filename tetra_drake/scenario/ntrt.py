@@ -1,11 +1,11 @@
 """Reader of the YAML structures of NTRT, the NASA Tensegrity Robotics Toolkit.
 
 Files mean here what they mean to NTRT's own reader, TensegrityModel. In NTRT y is up and masses are
-in kg. The unit of length is open; forces (kg length/s^2) and densities (kg/length^3) depend on it.
-Structures begin anywhere, also below the ground: here the lowest node is set on it. A body of
-density 0 is held in space: its nodes are fixed. Then the ground is at y = 0, or lower where the
-structure is. Boxes become rods with the same cross-section area. Settings of motors and contacts
-are not read, and cables end on the axes of rods.
+in kg. The unit of length is not fixed; forces (kg length/s^2) and densities (kg/length^3) depend on
+it. A file may place a structure at any height; the reader sets its lowest node on the ground. A
+body of density 0 is held in space: its nodes are fixed. With fixed nodes, the ground is at y = 0,
+or lower if the structure reaches lower. Boxes become rods with the same cross-section area.
+Settings of motors and contacts are not read, and cables end on the axes of rods.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from tetra_drake.settings.refusals import hint
 from tetra_drake.settings.section import Tree
 
 SAME_PLACE = 1e-6
-"""Distance in NTRT's unit below which nodes are one node."""
+"""Distance, in the file's unit of length, below which two nodes count as the same."""
 
 _PARAMETERS = {"diameter": "radius", "tension": "pretension"}
-"""NTRT's names of settings with other names here."""
+"""NTRT's names of settings, by the names in structure files."""
 
 _LOG = logging.getLogger("tetra_drake")
 
 
 def ntrt_tree(file: Path, *, unit: float) -> Tree:
-    """Content of a structure file that stands for a file of NTRT.
+    """Converts a file of NTRT to the content of a structure file.
 
-    `unit` is the length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z
-    (up). A substructure's nodes are named "SUBSTRUCTURE/NODE", groups by their tags joined by
-    slashes, as dots separate keys. What is left out is noted in the log. Raises InputError that
-    names file and key, for substructures too.
+    `unit` is the file's unit of length in m. The axes z, x, y of NTRT become x (forward), y (left),
+    z (up). A node of a substructure is named "SUBSTRUCTURE/NODE". A group is named by its tags,
+    joined by slashes, because dots separate keys. The log names what is left out. Raises InputError
+    that names file and key, for substructures too.
     """
     whole = Assembly()
     for name, (_, _, tag) in CLASSES.items():
@@ -66,22 +66,26 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
 
 
 _Part = tuple[TaggedPair, Builder, Place]
-"""Rod, box or cable, or the node of a sphere twice; its builder and the builder's place."""
+"""Rod, box, cable or sphere; its builder; file and key of the builder. A sphere is a pair of equal
+nodes."""
 
 
 @dataclass
 class _Translation:
-    """Tree of a structure file, with the places of its keys in NTRT's files."""
+    """Conversion of NTRT's files: content of the structure file, and the file and key that each of
+    its keys comes from."""
 
     whole: Assembly
     unit: float
     tree: Tree = field(default_factory=dict)
     places: dict[str, Place] = field(default_factory=dict)
     notes: dict[str, dict[str, None]] = field(default_factory=dict)
-    """What is left out or changed: names by texts."""
+    """Remarks for the log, such as "left out, as nothing uses them", with the names that they apply
+    to."""
 
     def add_all(self) -> None:
-        """Adds all parts that move, and the fixed nodes that cables join to them."""
+        """Adds all rods, spheres and cables that can move, and the fixed nodes that cables join to
+        them."""
         ignored = [name for rule in self.whole.rules for name in rule.builder.ignored]
         for name in ignored:
             self._note("not used, as the scenario has its own", name)
@@ -138,7 +142,7 @@ class _Translation:
         return {name: names[first] for name, first in zip(names, firsts, strict=True)}
 
     def _parts(self) -> Iterator[_Part]:
-        """Rods, boxes, cables and spheres, with the last builders that fit."""
+        """Rods, boxes, cables and spheres, each with the last builder whose tags fit."""
         whole = self.whole
         for pair in whole.pairs:
             rule = whole.rule(pair, "struts") or whole.rule(pair, "cables")
@@ -158,7 +162,8 @@ class _Translation:
                 yield pair._replace(group=" ".join(sorted(rule.tags))), rule.builder, rule.place
 
     def _add_group(self, parts: list[_Part]) -> None:
-        """Adds a group of parts with one builder."""
+        """Adds rods, spheres or cables with the same tags and builder, as one group of the
+        structure file."""
         (pair, builder, at), unit = parts[0], self.unit
         kind, given = builder.kind, builder.parameters
         name = _name(pair.group.replace(" ", "/"))

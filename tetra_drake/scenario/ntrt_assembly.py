@@ -23,7 +23,7 @@ MOST_PARTS = MOST_NODES // 2
 """Largest number of substructures, including nested ones."""
 
 LEAST_PAIRS = 3
-"""Least number of pairs in a bond of nodes and edges."""
+"""Least number of pairs in a bond of nodes and edges: three points define a plane."""
 
 Tags = frozenset[str]
 Ends = tuple[str, str]
@@ -31,14 +31,14 @@ Ends = tuple[str, str]
 
 
 class Place(NamedTuple):
-    """File and key, for error messages."""
+    """Position of something in the files, for error messages: file and key."""
 
     file: Path
     key: str
 
 
 class Rule(NamedTuple):
-    """Builder with the tags that a pair or a node must have."""
+    """Builder, and the tags that a pair or a node must have for it."""
 
     tags: Tags
     builder: Builder
@@ -46,16 +46,16 @@ class Rule(NamedTuple):
 
 
 class TaggedPair(NamedTuple):
-    """Pair of nodes with its tags."""
+    """Two nodes that a rod or cable may join, with the tags that choose its builder."""
 
     group: str
-    """Key of its list: tags, separated by single blanks."""
+    """Key of the list that has the pair: tags, separated by single blanks."""
     tags: Tags
     part: str
-    """Beginning of the names of nodes in the part that the pair belongs to."""
+    """Substructure that the pair belongs to, as the beginning of the names of its nodes."""
     place: Place
     nodes: Ends
-    """Paths of the nodes; as the file gives them until the nodes are found."""
+    """Paths of the two nodes; before they are looked up, the names that the file gives."""
 
 
 @dataclass
@@ -65,18 +65,19 @@ class Assembly:
     nodes: dict[str, np.ndarray] = field(default_factory=dict)
     """Nodes by path, such as "SUBSTRUCTURE.NODE"."""
     places: dict[str, Place] = field(default_factory=dict)
-    """Places of the nodes."""
+    """File and key of each node."""
     pairs: list[TaggedPair] = field(default_factory=list)
     rules: list[Rule] = field(default_factory=list)
-    """Builders in the order of reading. Later ones come first."""
+    """Builders in the order of reading. The last one that fits is used."""
     parts: list[str] = field(default_factory=list)
-    """Beginnings of the names of nodes in each part, such as "SUBSTRUCTURE."; "" for the whole."""
+    """Substructures, each as the beginning of the names of its nodes, such as "SUBSTRUCTURE."; ""
+    for the whole."""
     _read: dict[Path, NtrtFile] = field(default_factory=dict)
     """Content of the files that were read. Several substructures may share a file."""
 
     def add_file(self, file: Path, *, part: str = "", above: tuple[Path, ...] = ()) -> None:
-        """Adds a file. `above` are the files that contain it. The names of its nodes begin with
-        `part`."""
+        """Adds the content of a file to the structure. The names of its nodes begin with `part`.
+        `above` are the files that contain this file."""
         if file not in self._read:
             content = read_mapping(file, "structure file of NTRT", keys=keys_of(NtrtFile))
             self._read[file] = NtrtFile.from_tree(content, file)
@@ -102,7 +103,8 @@ class Assembly:
                 self._add_bond(bond, _listed(pairs, tags, part, place), part, place)
 
     def rule(self, pair: TaggedPair, kind: str) -> Rule | None:
-        """The last rule of a kind for a pair. The tags of its part count, too."""
+        """Last builder whose tags a pair has, for a kind: struts, cables or spheres. The tags of
+        its substructure count, too."""
         tags = pair.tags | _tags_of(pair.part)
         fitting = (one for one in reversed(self.rules) if one.tags <= tags)
         return next((one for one in fitting if one.builder.kind == kind), None)
@@ -110,7 +112,8 @@ class Assembly:
     def _add_parts(
         self, given: dict[str, Substructure], file: Path, part: str, above: tuple[Path, ...]
     ) -> None:
-        """Adds the substructures of a file, then turns all, then scales and moves them."""
+        """Adds the substructures of a file. Then it rotates all of them, and then scales and moves
+        them."""
         entries: list[tuple[str, int, Substructure, Place]] = []
         for names, entry in given.items():
             place = Place(file, f"substructures.{names}")
@@ -139,8 +142,8 @@ class Assembly:
     def _move(
         self, part: str, place: Place, matrix: np.ndarray, *, about: Any = None, shift: Any = 0.0
     ) -> None:
-        """Turns and scales the nodes of a part by a matrix about a point, by default their centre,
-        and shifts them."""
+        """Rotates and scales a substructure's nodes by a matrix about a point, by default their
+        centre, and shifts them."""
         if names := [name for name in self.nodes if name.startswith(part)]:
             p = np.array([self.nodes[name] for name in names])
             centre = p.mean(axis=0) if about is None else np.array(about)
@@ -151,26 +154,28 @@ class Assembly:
             self.nodes |= dict(zip(names, p, strict=True))
 
     def _part(self, part: str, tags: str, place: Place) -> str:
-        """The least nested part with all tags inside a part."""
+        """Substructure inside `part` that has all `tags`. If there are several, the least nested
+        one."""
         return _least_nested(self.parts, part, tags, place, f"no path of the part '{tags}'")
 
     def _node(self, part: str, path: str, place: Place) -> str:
-        """The least nested node with a path, such as PART.NODE, inside a part."""
+        """Node inside the substructure `part`, by a path such as PART.NODE. If there are several,
+        the least nested one."""
         *parts, tags = path.split(".")
         for one in parts:
             part = self._part(part, one, place)
         return _least_nested(self.nodes, part, tags, place, f"unknown node '{path}'")
 
     def _add_pairs(self, listed: list[TaggedPair], starts: Ends) -> None:
-        """Adds pairs from nodes of one part to nodes of another. `starts` are the parts."""
+        """Adds pairs of nodes. `starts` are the substructures of the first and of the second
+        nodes."""
         for pair in listed:
             _check_size(len(self.pairs) + 1, MOST_PAIRS, pair.place)
             first, second = map(self._node, starts, pair.nodes, (pair.place, pair.place))
             self.pairs.append(pair._replace(nodes=(first, second)))
 
     def _add_bond(self, bond: str, listed: list[TaggedPair], part: str, place: Place) -> None:
-        """Adds the pairs of a bond such as "a/b/c/node_node" between neighbours in a row of
-        parts."""
+        """Adds the pairs of a bond. For "a/b/c/node_node", they join a to b and b to c."""
         *names, kind = bond.split("/")
         _check_size(len(names), MOST_PARTS, place)
         if kind not in ("node_node", "node_edge") or len(names) < 2:
@@ -185,12 +190,12 @@ class Assembly:
                 self._add_pairs([one._replace(tags=one.tags | tags) for one in listed], starts)
 
     def _bond_edges(self, listed: list[TaggedPair], starts: Ends, place: Place) -> None:
-        """Bonds nodes of a part to the middles of edges NODE/NODE of another.
+        """Bonds nodes of one substructure to the middles of edges NODE/NODE of another.
 
-        The second part is moved onto the first: the centres of the bonded points meet, and the
-        planes of the first three; then the first points have the same direction from the centre.
-        Each cable at an edge becomes two cables, from its ends to the node. Cables between the
-        nodes are removed. Rods stay, but are refused as edges.
+        The second substructure is moved onto the first. Then the centres of their bonded points are
+        equal, the planes of their first three points are equal, and their first points are in the
+        same direction from the centre. Each cable at an edge becomes two cables, from its ends to
+        the node. Cables between the nodes are removed. Rods stay, but are refused as edges.
         """
         _check_size(len(self.pairs) + len(listed), MOST_PAIRS, place)
         bonds, middles = [], []
@@ -225,7 +230,7 @@ class Assembly:
 
 
 def _listed(pairs: list[Pair], tags: str, part: str, place: Place) -> list[TaggedPair]:
-    """Pairs of a list. `tags` is the key of the list, `place` its place in the file."""
+    """Pairs of a list in a file. `tags` is the list's key, `place` its file and key."""
     group, all_tags = " ".join(tags.split()), frozenset(tags.split())
     places = [place._replace(key=f"{place.key}[{number}]") for number in range(len(pairs))]
     return [
@@ -242,7 +247,8 @@ def _check_size(count: int, most: int, place: Place) -> None:
 
 
 def _least_nested(names: Iterable[str], part: str, tags: str, place: Place, what: str) -> str:
-    """The least nested name inside a part that has all tags. `what` is for the error message."""
+    """Name inside the substructure `part` that has all tags; of several, the least nested. `what`
+    is for the error message."""
     inside = [name for name in names if name.startswith(part) and name != part]
     fitting = [name for name in inside if _tags_of(name).issuperset(tags.split())]
     if not fitting or not tags:
@@ -253,13 +259,14 @@ def _least_nested(names: Iterable[str], part: str, tags: str, place: Place, what
 
 @functools.lru_cache(maxsize=4096)
 def _tags_of(path: str) -> Tags:
-    """Tags of a node or a part: the end of its path."""
+    """Tags of a node or a substructure: the words in the last part of its path."""
     return frozenset(path.rstrip(".").rpartition(".")[2].split())
 
 
 def _frame(p: np.ndarray, place: Place) -> Any:
-    """Axes (3, 3) of points (points, 3), in rows: across the plane of the first three, along it
-    towards the first one from the centre, and across both."""
+    """Orthogonal axes (3, 3), in rows, of points (points, 3). The first is normal to the plane of
+    the first three points. The second points along this plane, from the centre to the first
+    point."""
     axes = np.zeros((3, 3))
     if len(p) >= LEAST_PAIRS:
         axes[0] = np.cross(p[1] - p[0], p[2] - p[0])

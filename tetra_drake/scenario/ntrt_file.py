@@ -31,10 +31,11 @@ class Rotation(Section):
 
 
 class Substructure(Section):
-    """File that is one part of a structure, or several equal parts (a name such as a/b/c).
+    """Part of a structure that another file describes, or several equal parts with a name such as
+    a/b/c.
 
-    Without a path, the entry turns, scales and moves a part that another entry has, also a nested
-    one.
+    An entry without a path rotates, scales and moves a part that another entry has added. That part
+    may be nested.
     """
 
     path: str | None = None
@@ -46,8 +47,8 @@ class Substructure(Section):
 
 
 class RigidParameters(Section):
-    """Parameters of a rigid part. Like all parts, it has NTRT's defaults. Fields of type Any have
-    no effect: a scenario has its own friction, ground and actuators."""
+    """Parameters of a rod, box or sphere, with NTRT's defaults. Fields of type Any have no effect:
+    a scenario has its own friction, ground and actuators."""
 
     density: NotNegative = 1.0
     friction: Any = None
@@ -91,7 +92,7 @@ class CableParameters(Section):
 
 
 class BasicCableParameters(CableParameters):
-    """Parameters of a cable whose length is set."""
+    """Parameters of a cable whose rest length is set directly, without a motor."""
 
     moveCablePointAToEdge: Any = None
     moveCablePointBToEdge: Any = None
@@ -116,12 +117,13 @@ CLASSES: dict[str, tuple[str, type[Section], str]] = {
     "tgKinematicActuatorInfo": ("cables", KinematicCableParameters, ""),
     "tgKinematicContactCableInfo": ("cables", KinematicCableParameters, ""),
 }
-"""Groups of a structure file, parameters, and the tag of what is made without a builder in a file
-("" for none), by the class of a builder."""
+"""NTRT's builders by class: group in a structure file, parameters, and tag for which the builder is
+the default ("" for none)."""
 
 
 class Builder(Section):
-    """Class and parameters for the pairs with some tags; of spheres, for the nodes with them."""
+    """Class and parameters of the rods, cables or spheres that are made from pairs or nodes with
+    certain tags."""
 
     made_as: str = Field(alias="class")
     parameters: Any = Field(default=None, validate_default=True)

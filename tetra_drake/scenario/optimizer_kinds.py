@@ -1,4 +1,4 @@
-"""Kinds of optimisers and their settings."""
+"""Optimisers that a scenario can choose, and their settings."""
 
 from typing import Annotated, Literal
 
@@ -10,7 +10,7 @@ from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section
 
 MOST_GAITS = 100_000
-"""Upper limit of a population."""
+"""Largest number of gaits in a population or a sample."""
 
 
 class SteadyState(Section):
@@ -27,12 +27,13 @@ class SteadyState(Section):
     weight_mutation: float = Field(default=0.2, ge=0)
     """Largest change of a weight in one mutation."""
     tau_mutation: Literal["intended", "listing"] = "intended"
-    """`listing`: as in the thesis's listing A.3.4, mutation never changes tau_A."""
+    """Whether mutation changes tau_A: with `intended` it does; with `listing` it never does, like
+    the thesis's listing A.3.4."""
     tau_mutation_range: Time = Field(default=0.05, ge=0)
     """Largest change of tau_A in one mutation."""
     stop_rise: float = Field(default=0.03, ge=0)
-    """A trial ends early if the mean fitness rises by less than this in `stop_window`
-    iterations."""
+    """Least rise of the mean fitness in `stop_window` iterations. With a smaller rise, a trial ends
+    early."""
     stop_window: int = Field(default=100, ge=1)
     """Number of iterations for `stop_rise`."""
     stop_after: int = Field(default=200, ge=0)
@@ -51,7 +52,7 @@ class CmaEs(Section):
     """Number of vectors in an iteration. The default is 4 + 3 ln n, rounded down, for n
     parameters."""
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
-    """Number of random gaits that are evaluated before each search, the sample."""
+    """Size of the sample: the random gaits that are evaluated before each search."""
     starts: int = Field(default=5, ge=1, le=1000)
     """Number of searches that are tried out, for 1,000 evaluations each; the search with the best
     gait continues. A search starts at the mean of the best quarter of its sample. Without a sample,
@@ -67,10 +68,11 @@ CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(Section):
-    """A map of two metrics with the fittest gait in each cell (extra `qd`).
+    """Search for a map of two metrics with the fittest gait in each cell (extra `qd`).
 
-    CMA-MAE by pyribs (Fontaine and Nikolaidis, arXiv 2205.10752). Several runs of CMA-ES look for
-    gaits above the levels of cells. A level follows the fittest gait of its cell slowly.
+    CMA-MAE by pyribs (Fontaine and Nikolaidis, arXiv 2205.10752). Each cell has a level of fitness,
+    which slowly follows its fittest gait. Several runs of CMA-ES look for gaits above the level of
+    their cell.
     """
 
     measures: Annotated[
@@ -96,4 +98,4 @@ class QualityDiversity(Section):
 
 
 OptimizerKind = Annotated[SteadyState | CmaEs | RandomSearch | QualityDiversity, Kinds()]
-"""Union of the kinds of optimisers. A mapping without a tag is of the first kind."""
+"""Optimiser of a scenario, with its settings. A mapping without a tag is a SteadyState."""

@@ -1,4 +1,4 @@
-"""Kinds of robots: the row of tetrahedra, and structures: any tensegrity, as data.
+"""Structures: robots of any shape, as data about nodes, struts, cables and oscillators.
 
 Struts of a structure that share a node are one rigid body. Cables join bodies. Coordinates are in
 the world frame (x forward, y left, z up), near a static equilibrium.
@@ -82,20 +82,20 @@ class StrutGroup(Section):
     that anchors hold along z. A bar with round ends rolls about its axis, if no cable is off the
     axis."""
     axial_stiffness: Stiffness | None = Field(default=None, gt=0)
-    """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load a strut
-    is as long as its nodes are apart in the file. The axial force in equilibrium shortens it, and
-    natural frequencies know its stiffness; in motion it keeps its length. Frequencies leave out
-    the inertia of its elongation. Where it is 17, 3.3 or 1 times as stiff as its cable, the first
-    frequency is 0.25, 1.2 or 4 % higher than with finite-element rods, the second 0.75, 3.7 or
-    12 %."""
+    """Axial force per shortening of a strut, E A / l; none for rigid struts. Without load, a strut
+    is as long as the distance of its nodes in the file. In equilibrium, the axial force shortens
+    it, and natural frequencies include its stiffness; in motion it keeps its length. Frequencies
+    leave out the inertia of its elongation. If a strut is 17, 3.3 or 1 times as stiff as its cable,
+    the first frequency is 0.25, 1.2 or 4 % higher than with finite-element rods, and the second is
+    0.75, 3.7 or 12 % higher."""
 
 
 class SphereGroup(Section):
-    """Equal solid spheres at nodes, in place of the spheres of their struts. A sphere at a node of
-    no strut is a body of its own."""
+    """Equal solid spheres at nodes. They replace the spheres of struts at these nodes. A sphere at
+    a node without struts is a body of its own."""
 
     nodes: list[str] = Field(min_length=1)
-    """The nodes at their centres."""
+    """Nodes at the centres of the spheres."""
     diameter: Length = Field(gt=0)
     """Diameter of a sphere."""
     density: Density = Field(ge=0)
@@ -160,7 +160,8 @@ class StructureFile(Section):
     cables: Keyed[Name, CableGroup] = Field(default={})
     spheres: Keyed[Name, SphereGroup] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
-    """Names of the cables that each oscillator drives, their nodes in either order."""
+    """Names of the cables that each oscillator drives. The two nodes in a name may have either
+    order."""
     masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload that cables hold."""
@@ -174,8 +175,8 @@ class StructureFile(Section):
     anchor_stiffness: Stiffness = Field(default=1e5, gt=0)
     """Stiffness that holds a node of a strut along each axis of its anchor."""
     anchor_time_constant: Time = Field(default=1e-3, ge=0)
-    """Damping beside `anchor_stiffness`, divided by it. With less than 1 ms, a stiff anchor
-    vibrates, and steps are short."""
+    """Ratio of damping to stiffness of an anchor. With less than 1 ms, a stiff anchor vibrates, and
+    steps are short."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
     gravity: Acceleration = Field(default=9.80665, ge=0)
@@ -199,7 +200,7 @@ class StructureFile(Section):
         return self.blueprint().shortest
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """Further changes that follow from `changes` to a base: none."""
+        """Further changes that follow from `changes` to a base scenario: none for structures."""
         return {}
 
     def blueprint(self) -> Blueprint:
@@ -409,7 +410,7 @@ class StructureFile(Section):
 
 
 RobotKind = Annotated[Tetrahedra | StructureFile, Kinds()]
-"""Union of the kinds of robots. A mapping without a tag is of the first kind.
+"""Robot of a scenario: a row of tetrahedra or a structure. A mapping without a tag is a Tetrahedra.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `size`, `lacking` (see
 scenario.metrics), `unit`, `blueprint()` and `implied_changes()`.
@@ -432,7 +433,8 @@ def _cable_numbers(names: Iterable[str]) -> dict[str, int]:
 
 
 def components(pairs: Iterable[Sequence[str]]) -> list[list[str]]:
-    """Connected components of a graph of nodes, whose edges are the pairs; in their order."""
+    """Connected components of the graph with the pairs as edges, each a list of nodes; in the order
+    of the pairs."""
     first_node: dict[str, str] = {}
     for pair in pairs:
         start, joined = (first_node.setdefault(node, node) for node in pair)

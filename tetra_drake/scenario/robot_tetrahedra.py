@@ -80,7 +80,7 @@ class Tetrahedra(Section):
     """Row of nested tetrahedra with its initial positions (thesis section 2.1, appendix C.1)."""
 
     unit: ClassVar[None] = None
-    """Unit of coordinates; it has none."""
+    """Unit of bare coordinates in a file; this robot has no coordinates."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
     """Properties that some metrics need and this robot does not have."""
@@ -184,8 +184,8 @@ class Tetrahedra(Section):
         )
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """Further changes that follow from `changes` to a base: `spacing: balanced` if strut length
-        or cables changed and no spacing was given."""
+        """Further changes that follow from `changes` to a base scenario: `spacing: balanced` if
+        strut length or cables changed and no spacing was given."""
         if not isinstance(base, Tetrahedra) or "spacing" in changes:
             return {}
         deciding = []  # strut length, and all constants of cables at rest

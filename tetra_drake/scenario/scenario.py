@@ -58,7 +58,7 @@ _WIDTH, _ROWS = 100, 20
 """Largest number of characters in a line of a printed scenario, and of rows in a notebook."""
 
 _OF_WEIGHTS = {name: inverse(unit) for name, unit in UNITS.items()}
-"""Units of the weights in an objective."""
+"""Units of the weights in an objective, by metric."""
 
 MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
@@ -85,7 +85,8 @@ class Scenario(Section):
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
     require: Annotated[dict[str, float], *by_name(UNITS)] = Field(default={})
-    """Limits of metrics: a gait beyond one counts as failed. Replaced as a whole."""
+    """Limits of metrics: a gait that does not meet one counts as failed. A file replaces all limits
+    of its base."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()
@@ -191,7 +192,8 @@ class Scenario(Section):
 
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
-        """The scenario of a complete tree. Raises InputError that names `source` and key."""
+        """Makes a scenario from the content of a file that has all settings. Raises InputError that
+        names `source` and key."""
         return super().from_tree(with_structure(tree, source), source, key=key)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
@@ -206,7 +208,8 @@ class Scenario(Section):
         return self.with_file(tree_of_changes(changes, source), source)
 
     def with_file(self, changes: Tree, source: object) -> Self:
-        """The scenario of a file's tree with this scenario as its base; see changes.merged()."""
+        """Scenario of a file that has this scenario as its base. `changes` is the file's content;
+        see changes.merged()."""
         changes = with_structure(changes, source)
         tree = merged(self.model_dump(), changes)
         changed = self.from_tree(tree, source)
@@ -215,8 +218,8 @@ class Scenario(Section):
         return self.from_tree(merged(tree, {"robot": implied}), source) if implied else changed
 
     def on_engine(self, name: str | None) -> Self:
-        """The scenario on the engine of this name, such as "compiled": with its own settings if it
-        is on this engine or there is no name, otherwise with default settings."""
+        """This scenario on the engine of this name, such as "compiled". It keeps its own settings
+        if it is on this engine or there is no name; otherwise the engine has default settings."""
         if name in (None, self.engine_name):
             return self
         return self.with_changes({"engine": {TAG: str(name).capitalize()}})
@@ -307,7 +310,7 @@ def _thesis() -> Scenario:
 
 
 def _text(value: Any, *, exact: bool = False) -> str:
-    """A value of a tree as text. Numbers have six digits unless `exact`."""
+    """Value of a setting as text. Numbers have six digits unless `exact`."""
     if value is None:
         return "none"
     text = json.dumps(written(value) if exact else written(value, plainest)).replace('"', "")

@@ -24,7 +24,8 @@ _KIND = StructureFile.tag
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that occur only in files of NTRT."""
 SCENARIO_KEYS = {"base", "robot"}
-"""Every scenario's file has one of these keys, and no structure's file has any."""
+"""Keys that distinguish the files: each scenario file has one of them, and no structure file has
+any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
@@ -42,7 +43,8 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
 
 
 def names_scenario(name_or_file: str | Path) -> bool:
-    """True for a shipped scenario that is no shipped structure too, and for a scenario's file."""
+    """True if a name or a file means a scenario. A name that a scenario and a structure share means
+    the structure."""
     name = str(name_or_file)
     if name in shipped_structures() or not os.path.isfile(name):
         return name in shipped_scenarios() and name not in shipped_structures()
@@ -57,10 +59,11 @@ def structure_file(name: str, folder: Path) -> Path:
 
 
 def with_structure(tree: Tree, source: object) -> Tree:
-    """Replaces the key `robot.file` of a scenario's tree by the content of the structure file.
+    """Replaces the key `robot.file` in the content of a scenario file by the content of the
+    structure file.
 
     The file must be a valid structure. Keys beside `file` override its content; `actuated` is
-    replaced as a whole. A tree without `robot.file` stays as it is. Raises InputError that names
+    replaced as a whole. Content without `robot.file` stays as it is. Raises InputError that names
     file, or `source`, and key.
     """
     robot = tree.get("robot")
@@ -87,8 +90,8 @@ def _structure(content: Any, file: Path) -> StructureFile:
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
-    """Content of a structure file or of a file of NTRT. `source` and `key` tell, in errors, where
-    the `unit` of NTRT is missing."""
+    """Content of a structure file, or of a file of NTRT converted to one. If the `unit` of NTRT is
+    missing, the error names `source` and `key`."""
     keys = keys_of(StructureFile) | keys_of(NtrtFile)
     content = read_mapping(file, "structure file", keys=keys)
     if not KEYS_OF_NTRT & content.keys():

@@ -1,4 +1,4 @@
-"""YAML 1.2 with tagged kinds: reading and writing."""
+"""Reading and writing of YAML 1.2, with tags such as `!Coulomb`."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def read_mapping(file: Path, what: str, *, keys: Collection[str]) -> Tree:
 
 
 def dump_yaml(tree: Tree) -> str:
-    """A tree as YAML text."""
+    """YAML text of nested mappings, lists, numbers and texts."""
     return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
 
 
@@ -62,7 +62,7 @@ MOST_VALUES = 10**6
 
 
 class _Loader(yamlcore.CoreLoader):
-    """Loader of YAML 1.2 with tagged kinds. It refuses repeated keys."""
+    """Loader of YAML 1.2 that keeps the tags of mappings. It refuses repeated keys."""
 
     def get_single_node(self) -> yaml.Node:
         self.deep_construct = True  # refuses an alias of what holds it
@@ -105,8 +105,8 @@ class _Loader(yamlcore.CoreLoader):
 
 
 def _expanded(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Number of values in a node. An alias counts like what it stands for. `sizes` has the numbers
-    of the nodes that are counted already."""
+    """Number of values in a node, with the values of the nodes that its aliases name. `sizes` has
+    the numbers of the nodes that are counted already, by id."""
     if id(node) not in sizes:
         sizes[id(node)] = 1  # for an alias of what holds it
         inner = node.value if isinstance(node, yaml.CollectionNode) else []
@@ -116,13 +116,13 @@ def _expanded(node: yaml.Node, sizes: dict[int, int]) -> int:
 
 
 def _shown(name: str, what: str) -> str:
-    """A name in quotes; `what` in place of a text that does not look like a name."""
+    """Name in quotes, for a message; `what` in place of a text that does not look like a name."""
     return f"'{name}'" if re.fullmatch(r"!?[\w.]{1,40}", name) else what
 
 
 class _Dumper(yaml.SafeDumper, CommonResolver):
-    """Writer of YAML with tagged kinds, for readers of YAML 1.1 and 1.2: texts that either would
-    take for something else are quoted. Each key of a mapping has its own line."""
+    """Writer of YAML with tags, for readers of YAML 1.1 and 1.2: texts that either would take for
+    something else are quoted. Each key of a mapping has its own line."""
 
     def represent_dict(self, data: Any) -> yaml.MappingNode:
         entries = {name: value for name, value in data.items() if name != TAG}

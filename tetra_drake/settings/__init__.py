@@ -1,1 +1,2 @@
-"""Settings as pydantic models: numbers with units, tagged kinds, errors of one line."""
+"""Settings as pydantic models: numbers with units, YAML tags that choose a type, one-line
+errors."""

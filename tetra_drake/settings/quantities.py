@@ -18,7 +18,7 @@ from tetra_drake.settings.units import PATTERN, plainest, quantity_to_si
 
 
 class Quantity(float):
-    """SI number with its unit, as the tree of a scenario holds it."""
+    """SI number that carries its unit. Dumped settings contain quantities in this form."""
 
     unit: str
 
@@ -32,10 +32,10 @@ class Quantity(float):
 
 
 def quantity(unit: str, **words: float) -> tuple[Any, ...]:
-    """Annotations that make `float` the type of a quantity in an SI unit.
+    """Annotations that make `float` the type of a quantity in an SI unit, for pydantic.
 
-    In a file, each of `words` stands for a number. In a validation with a context (of a file),
-    numbers without a unit are refused, except 0.
+    Texts such as "25 lbf/in" are converted. `words` are further texts that stand for numbers, such
+    as balanced=0. In a file, numbers without a unit are refused, except 0.
     """
     expected = f"expected a quantity that converts to {unit}"
 
@@ -94,10 +94,10 @@ Keyed = Annotated[
 def by_name(
     units: Mapping[str, str], value: Callable[[Any], Any] = lambda number: number
 ) -> tuple[Any, ...]:
-    """Annotations of a mapping from given names, such as metrics, to numbers with units.
+    """Annotations for a mapping from known names, such as metrics, to numbers with units.
 
-    `units` has the SI units by name; "" for a number without a unit. `value` makes the type of a
-    value from the type of its numbers.
+    `units` has the SI unit of each name, or "" for a number without a unit. By default a value is
+    a number; `value` makes another type from it, such as a list of numbers.
     """
     numbers = {
         name: Annotated[float, *quantity(unit)] if unit else float for name, unit in units.items()

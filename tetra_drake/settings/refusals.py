@@ -19,17 +19,18 @@ if TYPE_CHECKING:
 Tree = dict[str, Any]
 
 TAG = "_tag"
-"""Key under which a tree keeps the tag of a kind, such as "Coulomb" of `!Coulomb`."""
+"""Key in a parsed mapping that holds its YAML tag, such as "Coulomb" for `!Coulomb`."""
 
 _LONGEST_LIST = 200
-"""Characters of a list of names."""
+"""Largest number of characters of a list of names in a message."""
 
 _MOST_NAMES, _LONGEST_NAME = 2000, 100
-"""Limits for the comparison with a misspelt name, because it is slow: names, and characters."""
+"""Limits of the search for similar names, because it is slow: number of names, and characters."""
 
 
 def refuse(key: str, problem: str) -> NoReturn:
-    """Raises the InputError of a validator. `key` is relative to the section."""
+    """Raises an InputError from a pydantic validator. `key` is relative to the validated
+    section."""
     raise InputError("", key, problem)
 
 
@@ -38,7 +39,7 @@ def input_error(
 ) -> InputError:
     """Converts pydantic's error to an InputError that names `source` and key.
 
-    `tree` is the content of the section, which stands at `key`.
+    `tree` is the content of the section, and `key` is the dotted key of the section in `source`.
     """
     # An unknown key tells why another is missing. A value that fits no member of a union has an
     # error per member: the innermost tells most, then one that is not about the type.
@@ -80,14 +81,15 @@ _UNKNOWN = "extra_forbidden", "invalid_key"
 
 
 def members_of(node: Tree, schema: Tree) -> list[Tree]:
-    """Types in a union of a JSON Schema, or the only type. References to sections are resolved."""
+    """Alternative types in a node of a JSON Schema: members of its union, or the only type.
+    References to sections are resolved."""
     sections = {"": {}} | schema.get("$defs", {})
     members = node.get("anyOf", [node])
     return [sections[one.get("$ref", "").rpartition("/")[2]] | one for one in members]
 
 
 def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, Tree]]:
-    """Dotted keys in a section of a JSON Schema, with their types."""
+    """Dotted keys of a section in a JSON Schema, each with the schema of its value."""
     for name, node in section.get("properties", {}).items():
         item = node.get("additionalProperties")
         inner = joined(key, f"{name}.NAME" if item else name)
@@ -98,8 +100,8 @@ def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, T
 
 
 def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
-    """Types of a part of a value, which pydantic names by key, index or tag. For any other name,
-    they are `members`, the types of the value."""
+    """Types of an item of a value. `part` is the key or index of the item, or the tag of the value.
+    For any other name, the result is `members`, the types of the value."""
     for member in members:
         if member.get("title") == f"!{part}":
             return [member]
@@ -111,7 +113,7 @@ def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
 
 
 def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str, str]:
-    """Inner key and problem in one of pydantic's errors."""
+    """Key within the value, and problem in words, for one of pydantic's errors."""
     kind, context, found = error["type"], error.get("ctx", {}), f"found {described(value)}"
     if kind == "value_error":
         cause = context["error"]
@@ -129,8 +131,8 @@ def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str
 
 
 def joined(key: str, inner: str) -> str:
-    """Dotted key of a key in a section: "robot.gravity" for "gravity" in "robot", or "pairs[0]" for
-    "[0]" in "pairs"."""
+    """Dotted key of an inner key: "robot" and "gravity" give "robot.gravity", "pairs" and "[0]"
+    give "pairs[0]"."""
     return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 
@@ -158,5 +160,5 @@ def hint(name: Any, names: Iterable[str]) -> str:
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
-    """Error text for a name that is neither shipped nor a file."""
+    """Error text with advice, for a name that is neither shipped nor a file."""
     return f"no such {what}; {hint(name.rpartition('/')[2], shipped)}"

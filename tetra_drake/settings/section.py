@@ -1,4 +1,4 @@
-"""Sections of settings as pydantic models, with tagged kinds and errors of one line.
+"""Sections of settings: pydantic models that are read from YAML, with errors of one line.
 
 A *tree* is the content of a YAML file: mappings, lists, numbers and texts. Quantities are texts
 with units. A tagged kind, written `!Name {...}` as in Drake's YAML, is a mapping with its tag under
@@ -30,11 +30,12 @@ from tetra_drake.settings.refusals import TAG, Tree, input_error, joined
 from tetra_drake.settings.units import plainest
 
 Show = Callable[[float, str], str]
-"""Function that makes a text from a number and its SI unit."""
+"""Function that formats a number and its SI unit as text."""
 
 
 def _complete_schema(schema: Tree, section: type[Section]) -> None:
-    """Changes pydantic's JSON Schema of a section to what files may contain."""
+    """Adapts pydantic's JSON Schema of a section to files: no required keys, units,
+    descriptions."""
     schema |= EMPTY
     schema.pop("required", None)  # a base may have the keys
     for key, text in section.keys_of_files.items():
@@ -93,11 +94,12 @@ _CORRECT_NAMES = {
     "le": "maximum",
     "oneOf": "anyOf",
 }
-"""Names in a JSON Schema by those that pydantic writes. A mapping may be of several kinds."""
+"""JSON Schema's names by the names that pydantic writes. With anyOf, a mapping may fit several
+types."""
 
 
 class Section(BaseModel):
-    """Section of settings. Numbers are SI; values cannot be changed in place."""
+    """Base class of a section of settings. Numbers are SI; values cannot be changed in place."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -108,7 +110,7 @@ class Section(BaseModel):
     )
 
     keys_of_files: ClassVar[dict[str, str]] = {}
-    """Keys that only files have, with their descriptions."""
+    """Keys that a file may have besides the fields, such as `base`, with their descriptions."""
 
     tag: ClassVar[str] = ""
     """Tag in files, without "!"; by default the name of the class."""
@@ -149,19 +151,20 @@ class Section(BaseModel):
         return hash(_hashable(self.values()))
 
     def values(self) -> dict[str, Any]:
-        """Values by dotted keys."""
+        """Values of all settings in the section, by dotted keys."""
         return flattened(self.model_dump())
 
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
-        """All lengths (m) in the section. A copy with disturbed numbers keeps the original ones."""
+        """All lengths (m) in the section. They are cached: a disturbed copy keeps the original
+        lengths."""
         numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
-        """Makes the section from a tree that stands at `key`. Raises InputError that names `source`
-        and key."""
+        """Makes the section from the parsed content of a file. `key` is the dotted key of the
+        section there. Raises InputError that names `source` and key."""
         tree = tree_value(tree)
         try:
             return cls.model_validate(tree, context=IN_FILE)
@@ -170,13 +173,13 @@ class Section(BaseModel):
 
 
 IN_FILE = "in a file"
-"""Context of pydantic's validation of files, where quantities need units. Without it, numbers are
+"""Validation context for the content of files: quantities need units. Without it, numbers are
 SI."""
 
 
 class Kinds:
-    """Annotation of a union of sections. In a file, a tag such as `!Coulomb` gives the kind of a
-    mapping; a mapping without a tag is of the first kind."""
+    """Annotation of a union of sections. In a file, a tag such as `!Coulomb` chooses the type of a
+    mapping; a mapping without a tag is of the first type."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
@@ -208,14 +211,14 @@ def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
 
 @dataclass(frozen=True)
 class Varied:
-    """Annotation of a number that the default disturbances vary. Numbers with the same `name` get
-    the same factor."""
+    """Annotation of an uncertain number, which the default disturbances change. Numbers with the
+    same `name` get the same factor."""
 
     name: str = ""
 
 
 def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
-    """Keys of the numbers in a section with the annotation Varied, and the names that it gives."""
+    """Keys of the numbers in a section that are annotated with Varied, each with Varied.name."""
     for name, field in type(section).model_fields.items():
         value, inner = getattr(section, name), joined(key, name)
         yield from ((inner, mark.name) for mark in field.metadata if isinstance(mark, Varied))
@@ -226,7 +229,8 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Copy of a tree with change(x) in place of each x that is no list and no mapping."""
+    """Copy of a nested value, where change(x) replaces each x that is neither a list nor a
+    mapping."""
     if isinstance(value, Mapping):
         return {name: mapped(item, change) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -235,7 +239,8 @@ def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def tree_value(value: Any) -> Any:
-    """Converts a value from Python, such as a section, a tuple, an array or a path, to a tree."""
+    """Converts a value from Python, such as a section, a tuple, an array or a path, to the lists,
+    mappings, numbers and texts that YAML has."""
 
     def convert(part: Any) -> Any:
         if isinstance(part, Section):
@@ -248,7 +253,7 @@ def tree_value(value: Any) -> Any:
 
 
 def parts_of(key: str) -> list[str | int]:
-    """Names in a dotted key, and indices of list items: "loads.n3[2]" has "loads", "n3" and 2."""
+    """Splits a dotted key into names and list indices: "loads.n3[2]" gives "loads", "n3" and 2."""
     parts: list[str | int] = []
     for part in key.split("."):
         name, _, indices = part.partition("[") if _ITEMS.search(part) else (part, "", "")
@@ -257,11 +262,11 @@ def parts_of(key: str) -> list[str | int]:
 
 
 _ITEMS = re.compile(r"[^\[](\[\d+\])+$")
-"""Indices at the end of a key, such as "[2]"."""
+"""Pattern of the indices at the end of a name, such as "[2]" in "n3[2]"."""
 
 
 def value_at(tree: Any, key: str) -> Any:
-    """Value of a tree at a dotted key; None if there is none."""
+    """Value at a dotted key in the content of a file; None if there is none."""
     for part in parts_of(key):
         try:
             tree = tree[part]
@@ -271,15 +276,15 @@ def value_at(tree: Any, key: str) -> Any:
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
-    """Copy of a tree for a file. `show` makes texts of the quantities, by default exact ones in
-    SI."""
+    """Copy of dumped settings for a file, with quantities as texts. `show` formats a quantity, by
+    default with all digits, in SI."""
     return mapped(
         value, lambda part: show(float(part), part.unit) if isinstance(part, Quantity) else part
     )
 
 
 def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
-    """Settings in brackets after a blank, such as " (slope 5 deg)"; empty if there are none.
+    """Settings of a section as text, such as " (slope 5 deg)"; empty if there are none.
 
     Numbers have the unit that needs the fewest digits. Defaults are left out, except the settings
     named in `always`.
@@ -292,7 +297,7 @@ def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
 
 
 def parts_in(value: Any) -> Iterator[Any]:
-    """A tree and all values in it."""
+    """Iterates over a value and all values nested in its mappings and lists."""
     yield value
     if isinstance(value, (dict, list)):
         for item in value.values() if isinstance(value, dict) else value:
@@ -300,7 +305,7 @@ def parts_in(value: Any) -> Iterator[Any]:
 
 
 def flattened(tree: Tree, key: str = "") -> dict[str, Any]:
-    """Values of a tree by dotted keys."""
+    """Converts nested mappings to one mapping with dotted keys."""
     values: dict[str, Any] = {}
     for name, value in tree.items():
         inner = joined(key, name)

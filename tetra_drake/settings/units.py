@@ -22,29 +22,30 @@ POUND_FORCE = 4.4482216152605  # N, exact
 
 @dataclass(frozen=True)
 class Units:
-    """Units of length and force for readers. Angles are shown in degrees, other numbers in SI."""
+    """Units of length and force for printed numbers. Angles are shown in degrees, other numbers in
+    SI."""
 
     length: float
-    """Size in m."""
+    """Size of the unit of length in m."""
     length_name: str
     length_word: str
-    """Name of the unit of length in a sentence."""
+    """Name of the unit of length in a sentence, such as "inches"."""
     square: float
     """Side of a square on the floor of a replay, in m."""
     squares: int
     """Number of squares between two dark lines of the floor."""
     force: float = 1.0
-    """Size in N."""
+    """Size of the unit of force in N."""
     force_name: str = "N"
 
     @property
     def decimals(self) -> int:
-        """Number of decimals of a distance in a sentence: about 1 mm is seen. Tables and figures
-        have one more."""
+        """Number of decimals of a distance in a sentence, so that about 1 mm is visible. Tables and
+        figures have one more."""
         return round(math.log10(self.length / 0.001))
 
     def of(self, unit: str) -> tuple[float, str]:
-        """Size (SI) and name of the unit in place of an SI unit, such as "lbf/in" for "N/m".
+        """Unit that replaces an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name.
 
         A unit with other dimensions than length, force, angle and time is returned as it is.
         """
@@ -69,15 +70,15 @@ SYSTEMS = {
     "SI": Units(1.0, "m", "m", 0.1, 10),
     "in": INCHES,
 }
-"""Units by name."""
+"""Units for printed numbers, by the names that the option `--units` takes."""
 
 _chosen: ContextVar[Units | None] = ContextVar("units", default=None)
 
 
 @contextlib.contextmanager
 def shown_in(name: str | None) -> Iterator[None]:
-    """Context manager: all numbers are shown in the units of a name in SYSTEMS. Without a name,
-    each scenario keeps its own. Raises InputError for another name."""
+    """Context manager that shows all numbers in the units called `name`, a key of SYSTEMS. Without
+    a name, each scenario keeps its own. Raises InputError for another name."""
     if name and name not in SYSTEMS:
         raise InputError("units", "", f"found '{name}', expected one of {listed(list(SYSTEMS))}")
     token = _chosen.set(SYSTEMS[name] if name else _chosen.get())
@@ -94,8 +95,8 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def fitting(lengths: tuple[float, ...]) -> Units:
-    """Units that give lengths (m) the fewest digits; short ones do not count. They are metric
-    if the lengths are round in no unit, as in a turned robot."""
+    """Units that show lengths (m) with the fewest digits; short lengths do not count. They are
+    metric if the lengths are round in no unit, as in a turned robot."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
     return min(
@@ -105,14 +106,14 @@ def fitting(lengths: tuple[float, ...]) -> Units:
 
 
 _MANY = 6
-"""Number of digits from which on a number is not round."""
+"""A number with this many digits or more is not round."""
 _LONG = 0.25
-"""Least length, as a share of the greatest, that counts. Diameters are in mm also where lengths are
-in cm."""
+"""Least length, as a share of the greatest, that counts in fitting(). Diameters are often in mm
+where lengths are in cm."""
 
 
 def _digits(number: float) -> int:
-    """Number of digits of a number in a text."""
+    """Number of digits of a number that is printed with at most nine."""
     return sum(letter.isdecimal() for letter in f"{number:.9g}")
 
 
@@ -123,7 +124,7 @@ _SMALL = {
     "kg": [(1e-3, "g")],
     "kg/m^3": [(1e3, "g/cm^3")],
 }
-"""More units for printed settings, by SI unit: size in SI, and name."""
+"""Further units for printed settings, by SI unit: size in SI, and name."""
 
 LARGEST = 1e15
 """Largest size of a number in SI units. Products of several such numbers do not overflow."""

@@ -56,7 +56,8 @@ class Compared:
     scenario: Scenario
     """Scenario of the first run."""
     common: int
-    """Cost at which the shortest curve ends; all runs have fitnesses there."""
+    """Cost, in simulations, at which the shortest curve ends. All runs have a fitness at this
+    cost."""
     reach: float | None
     """Distance (m) for the columns `reached`; None if compare() got none."""
     trials: pandas.DataFrame

@@ -28,8 +28,8 @@ from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.study.robustness import by_gait, robustness
 
 LUCKY = 0.5
-"""Least share of draws that an elite must keep. The fitness of an elite below it is taken for luck,
-and the elite is left out. For `kept` see robustness.LOSS."""
+"""Least share `kept` of draws for a robust elite; see robustness.LOSS. An elite with less is left
+out, because its fitness is probably luck."""
 
 CELLS = ["cell_1", "cell_2"]
 _KEY = ["trial", "index"]
@@ -42,7 +42,8 @@ _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": 
 
 
 def elites(run: Run) -> pandas.DataFrame:
-    """Elites of a run over all trials, the fittest first; empty if the optimiser makes no map.
+    """Elites of a run, the fittest gait of each cell of its map, over all trials. The fittest is
+    first; the table is empty if the optimiser makes no map.
 
     A row is a row of Run.evaluations with more columns: cell_1 and cell_2 (numbers of the cell,
     from 0), kept (share of draws that the gait keeps, see robustness.LOSS), mean_distance (m, on
@@ -93,13 +94,13 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
 
 
 def kept_gaits(gaits: pandas.DataFrame) -> pandas.DataFrame:
-    """Elites without those that keep less than the share LUCKY of the draws, the fittest first."""
+    """Elites that keep at least the share LUCKY of the draws, the fittest first."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 
 def notable_gaits(run: Run) -> dict[str, pandas.Series]:
-    """Notable gaits of the map by name: the fittest robust elite, and the robust elites nearest to
-    the corners."""
+    """Notable gaits of the map, by name: the fittest robust elite, and the robust elites nearest to
+    the corners of the map."""
     gaits, kind = kept_gaits(elites(run)), run.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}

@@ -34,32 +34,35 @@ from tetra_drake.study.fit_problem import STEP, Bounds, FitProblem, parameter_of
 from tetra_drake.study.measurements import FitFile, Measurement, files_of
 
 LONGER, ROUGH = 10.0, 0.2
-"""Factor of a longer step; and difference of the derivatives with both steps, as a share of the
-derivative, from which a prediction is rough. Contacts that come and go make it so in long motion:
-the search may end in any of many minima, and intervals from derivatives mean nothing."""
+"""Test of smooth predictions: factor of a longer step, and difference of the derivatives with both
+steps, as a share of the derivative, from which a prediction is rough. Contacts that come and go
+make predictions of long motion rough: the search may end in any of many minima, and intervals from
+derivatives mean nothing."""
 TOLERANCE = 1e-4
 """Relative change of parameters at which the fit ends: a tenth of STEP. A smooth fit is far more
 exact by then, because its steps shrink quadratically."""
 NEGLIGIBLE = 0.01
 """Change of the sum of squares at which the fit ends; 1 is a standard deviation."""
 POPULATION, MOST = 16, 480
-"""Evaluations per iteration of a global search, which fill the lanes of two cores; and the most of
-all its iterations."""
+"""Evaluations per iteration of a global search, which fill the compiled engine on two cores; and
+largest number of evaluations of the search."""
 WIDTH_95 = 1.96
 """Half width of a 95 % interval in standard deviations."""
 SAME_DIRECTION = 1e-10
-"""Singular value, as a share of the greatest, below which the data say nothing of a direction."""
+"""Singular value, as a share of the greatest, below which the data do not determine a direction of
+the parameters."""
 LIKELY = 3.0
 """Excess of the misfit over 1, in standard deviations, up to which a fit explains the data."""
 STRONG = 0.95
-"""Correlation above which two parameters are named."""
+"""Correlation above which a warning names two parameters."""
 
 PAGE = "README.md"
 
 MANY = 100
-"""Numbers of a measurement from which their points are small."""
+"""Number of points in a panel of the figure from which on they are drawn small."""
 POINTS = 2000
-"""Largest number of points in a panel; of more numbers, some are drawn by lot."""
+"""Largest number of points in a panel of the figure. If there are more, a random selection is
+shown."""
 
 UNKNOWN = """`± ?` is an unknown interval: the data do not determine the value, or predictions are
 not smooth. Then their derivatives by steps of 0.1 % and 1 % of the start differ by more than 20 %.
@@ -84,12 +87,12 @@ class Fit:
     uncertainty, start and fitted: what the scenario predicts with the start and the fitted values.
     """
     clock_offsets: dict[str, float]
-    """Time (s) by which the clock of each measurement is ahead."""
+    """Time (s) by which the clock of each measurement is ahead of the simulated time."""
     misfit: float
-    """Sum of squares of the weighted residuals per degree of freedom; 1 if the model is right and
-    the uncertainties are."""
+    """Sum of squares of the weighted residuals per degree of freedom; 1 if the model and the
+    uncertainties are right."""
     start_misfit: float
-    """The same with the start values."""
+    """The same as `misfit`, with the start values."""
     warnings: list[str]
     evaluations: int
     """Number of scenarios that were simulated for all measurements."""
@@ -242,10 +245,11 @@ def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: fl
 def _uncertainty(
     problem: FitProblem, jacobian: np.ndarray, misfit: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Half widths (n,) of the 95 % intervals in SI, infinite if the bounds are nearer; and
-    correlations (n, n).
+    """Half widths (n,) of the 95 % intervals in SI, infinite if an interval is wider than the
+    bounds; and correlations (n, n).
 
-    Uncertainties are as given; where the residuals are larger, they are scaled to them.
+    If the residuals are larger than the given uncertainties, the intervals are widened by the same
+    factor.
     """
     width = problem.bounds[1] - problem.bounds[0]
     _, singular, rows = np.linalg.svd(jacobian * width, full_matrices=False)

@@ -31,14 +31,14 @@ HUGE = 1e200
 SEAL = 32
 """Size of the digest in the file of an evaluation, in bytes."""
 KEPT_EVALUATIONS = "evaluations"
-"""Folder of the evaluations of a fit. A file has a digest of its name and of its numbers, and the
-numbers: for each measurement the predicted ones and the offset of the clock."""
+"""Name of the folder that keeps the evaluations of a fit. A file has a digest of its name and
+numbers, then the numbers: for each measurement the predicted ones and the offset of the clock."""
 
 Bounds = Sequence[str | float]
 
 
 class Parameter(NamedTuple):
-    """A number of a scenario that is fitted, in SI."""
+    """A number of a scenario that a fit adjusts, in SI."""
 
     key: str
     """The key, or several joined by commas."""
@@ -135,7 +135,8 @@ class FitProblem:
         return with_joined_changes(self.scenario, changes)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
-        """Weighted residuals (numbers,); the neighbours of the point are simulated with it."""
+        """Weighted residuals (numbers,) at a point. The neighbours of the point, which the
+        derivatives need, are simulated at the same time."""
         before = self.evaluations
         self._evaluate([x, *self._neighbours(x, STEP)])
         residuals = self.residuals_at(x)
@@ -150,7 +151,8 @@ class FitProblem:
         return residuals
 
     def clock_offsets(self, x: np.ndarray) -> dict[str, float]:
-        """Time (s) by which the clock of each measurement is ahead, at an evaluated point."""
+        """Time (s) by which the clock of each measurement is ahead of the simulated time, at an
+        evaluated point."""
         offsets = self._known[self._name(x)][self._clocks].tolist()
         return dict(zip([each.name for each in self.measured], offsets, strict=True))
 
@@ -192,8 +194,7 @@ class FitProblem:
         return list(np.clip(x + moves, *self.bounds))
 
     def _evaluate(self, points: Sequence[np.ndarray]) -> None:
-        """Predicts all measurements at points that are not known, or takes the predictions from the
-        folder."""
+        """Predicts all measurements at new points, or takes the predictions from the folder."""
         unknown = {self._name(point): point for point in points}
         unknown = {name: each for name, each in unknown.items() if name not in self._known}
         files = {name: self._kept / f"{name}.bin" for name in unknown} if self._kept else {}

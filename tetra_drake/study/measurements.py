@@ -39,13 +39,13 @@ from tetra_drake.study.equilibrium import study_equilibrium
 SAMPLE_PERIOD = 5e-3
 """Time (s) between samples of simulated motion. Cubic curves join the samples."""
 OFFSETS = 41
-"""Offsets of a clock that are tried before the best one is refined."""
+"""Number of offsets of a clock that are tried before the best one is refined."""
 CLOCK_DIGITS = 1e-7
 """Tolerance (s) of the offset of a clock."""
 ROUNDING = 1e-6
 """Time (s) by which times in a log may be rounded."""
 CUT = 0.05
-"""Share of a command that may be missing at the end of a log."""
+"""Share of the duration of a command that may be missing at the end of a log."""
 LEAST, MOST = 1e-12, 1e12
 """Least uncertainty of a measured number, and its largest size, in SI."""
 INSTALL = "pip install 'tetra_drake[parquet]'"
@@ -59,7 +59,7 @@ class Prediction(NamedTuple):
     values: np.ndarray
     """Numbers (numbers,) in SI; NaN if there is none."""
     clock_offset: float = 0.0
-    """Time (s) by which the clock of the measurement is ahead."""
+    """Time (s) by which the clock of the measurement is ahead of the simulated time."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class MotionCapture(Section):
 
     log: str
     """CSV or Parquet file: a column time_s and columns such as "n3 x_mm". An empty cell is a gap.
-    It lasts as long as the command, or as the simulation if that is shorter."""
+    The log lasts as long as the command, or as the simulation if it is shorter."""
     command: str | None = None
     """File of the commands that the robot followed."""
     gait: str | None = None
@@ -92,11 +92,11 @@ class MotionCapture(Section):
     uncertainty: Annotated[Length, _UNCERTAINTY]
     """Standard deviation of a coordinate."""
     clock: Time = Field(default=0.0, ge=0)
-    """Largest offset of the log's clock from the command's, which is found; 0 for none."""
+    """Largest offset between the clocks of log and command. A fit finds the offset; 0 for none."""
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Measured coordinates of the log, and their prediction. Raises InputError, naming file and
-        line or column, if the log is wrong."""
+        """Reads the log: the measured coordinates, and a function that predicts them. Raises
+        InputError, naming file and line or column, if the log is wrong."""
         if (self.command is None) == (self.gait is None):
             problem = f"found {'neither' if self.gait is None else 'both'}, expected one of them"
             raise InputError(name, "command", f"{problem}, a command or a gait")
@@ -193,8 +193,8 @@ class Rest(Section):
     """Standard deviation of a frequency."""
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Measured numbers, and their prediction. Raises InputError for an unknown node or
-        cable."""
+        """The measured numbers, and a function that predicts them. Raises InputError for an unknown
+        node or cable."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
         places = _coordinates(structure.node_names)
         for key, known in {"positions": places, "tensions": structure.cable_names}.items():
@@ -213,7 +213,7 @@ class Rest(Section):
         return Measured(name, pandas.DataFrame(numbers), self.predict)
 
     def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
-        """Predictions of the numbers: positions, tensions, frequencies."""
+        """Predictions of the measured numbers by scenarios: positions, tensions, frequencies."""
         modes = len(self.frequencies)
         nothing = np.full(len(self.positions) + len(self.tensions) + modes, np.nan)
         predictions = []

@@ -54,11 +54,11 @@ ALONE = 8
 disturbance."""
 
 LOSS = 0.1
-"""Largest loss of distance, as a share of the undisturbed distance, with which a gait keeps a draw.
-The gait must also meet the scenario's requirements in the draw."""
+"""Largest loss of distance, as a share of the undisturbed distance, for which a gait "keeps" a
+draw. The gait must also meet the requirements of the scenario in the draw."""
 
 _Planned = tuple[dict[str, Any], Draw]
-"""Labels of a draw in the tables of Judgement, and the draw."""
+"""A draw, and its labels in the tables of Judgement."""
 
 _DOTS: Any = {"color": OKABE_ITO["sky_blue"], "markersize": 2.0, "alpha": 0.4, "zorder": 0}
 _LINE = {"color": OKABE_ITO["blue"], "linewidth": 1.2}
@@ -84,7 +84,7 @@ class Judgement:
     """
 
     scenario: Scenario
-    """Scenario with the disturbances that the draws are made of."""
+    """Scenario with the disturbances that the draws were made from."""
     seed: int
     undisturbed: pandas.DataFrame
     """A row per gait, simulated without disturbances."""

@@ -60,7 +60,7 @@ class LiveView:
         return time >= self._due
 
     def show(self, frame: xarray.Dataset) -> None:
-        """Shows a trajectory's sample. Waits until its time has come in real time."""
+        """Shows one sample of a trajectory. Waits until its time has come in real time."""
         now = float(frame["time"].values[0])
         if self._started is not None:
             time.sleep(max(0.0, self._started + now - time.monotonic()))

@@ -62,7 +62,8 @@ _IN_HEAD = (
     '<meta name="viewport" content="width=device-width, initial-scale=1">'
     '<link rel="icon" href="data:,">'
 )
-"""Without these elements, phones show a page small, and browsers ask the host for an icon."""
+"""Elements for the head of the page. Without them, phones show a page small, and browsers ask the
+host for an icon."""
 _USUAL = 99.0
 """Percentile of tensions and forces that is drawn at full size. Impacts are far larger."""
 

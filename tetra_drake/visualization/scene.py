@@ -99,7 +99,7 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
 def place_robot(
     meshcat: Meshcat, structure: Structure, frame: xarray.Dataset, *, per_newton: float
 ) -> None:
-    """Moves bodies and cables to a trajectory's sample. `frame` has one sample."""
+    """Moves bodies and cables to their poses in `frame`, one sample of a trajectory."""
     for body, name in enumerate(structure.bodies):
         turn = Quaternion(frame["q_WB"].values[0, body])
         position = frame["p_WB"].values[0, body]
