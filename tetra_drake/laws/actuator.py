@@ -100,8 +100,8 @@ def has_drive(actuator: Actuator) -> bool:
 
 @inlined
 def wound(actuator: Actuator, drive: Any, otherwise: Any) -> Any:
-    """Free length (m) of driven cables: the state `drive` of winches; `otherwise` if the actuators
-    are no winches. Both may be numbers or arrays."""
+    """Selects `drive` if the actuators are winches, whose state is the free length (m) of the
+    cable, and `otherwise` for other actuators. Both may be numbers or arrays, and also rates."""
     if actuator.kind == WINCH:
         return drive
     return otherwise
@@ -111,8 +111,11 @@ def wound(actuator: Actuator, drive: Any, otherwise: Any) -> Any:
 def exertion(
     actuator: Actuator, drives: Table, drive: int, tension: Real, length: Real, signal: Real
 ) -> Exertion:
-    """Forces of an actuator whose cable has a tension (N) and a length (m). `drive` is the
-    actuator's row in the table `drives`, if it has a state."""
+    """Forces of an actuator whose cable has a tension (N), a length (m) and a signal (N).
+
+    `drives` is the table of the actuators' states. `drive` is the actuator's row in it; ideal
+    actuators have none.
+    """
     if not has_drive(actuator):
         return Exertion(load=tension, pull=signal, left=length, limited=0.0 * length)
     load, left = tension - drives[drive, BESIDE], wound(actuator, drives[drive, DRIVE], length)
@@ -123,8 +126,12 @@ def exertion(
 def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
 ) -> ActuatorForce:
-    """Force of an actuator with the state `drive` on a cable with a length (m) that grows at a rate
-    (m/s)."""
+    """Force of a winch or tension motor on a cable with a length (m) that grows at a rate (m/s).
+
+    `drive` is the actuator's state: the free length (m) of a winch, the tension (N) of a motor.
+    `signal` is in N, `law` has the constants of the cable. Raises ValueError for ideal actuators,
+    which have no state.
+    """
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
         return winch_force(drive, length, rate, signal, law, limits)
@@ -137,15 +144,16 @@ def actuator_force(
 def winch_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a winch on its cable. The winch's state `drive` is the free length (m).
+    """Force of a winch on a cable with a length (m) that grows at a rate (m/s).
 
-    The cable goes slack as a passive one does; see laws.cable. The winch follows its command
-    with a lag. It pays out with at most max_speed, and winds with at most max_speed
-    (1 - tension / max_force). Above max_force the cable pulls it backward. The tension depends on
-    the winding speed because of the cable's damping, and the winding speed depends on the tension
-    because of the force-speed line. Both equations are linear, within limits, and are solved
-    together. A command below least_length counts as least_length, so the winch slows down before
-    it. A sudden stop would be a jump of the tension, which an integrator cannot handle.
+    The winch's state `drive` is the free length (m). Its command is the free length l0 - signal /
+    k, with l0 and k from `law`. The cable goes slack as a passive one does; see laws.cable. The
+    winch follows its command with a lag. It pays out with at most max_speed, and winds with at most
+    max_speed (1 - tension / max_force). Above max_force the cable pulls it backward. The tension
+    depends on the winding speed because of the cable's damping, and the winding speed depends on
+    the tension because of the force-speed line. Both equations are linear, within limits, and are
+    solved together. A command below least_length counts as least_length, so the winch slows down
+    before it. A sudden stop would be a jump of the tension, which an integrator cannot handle.
     """
     elastic = elastic_tension(length - drive, law)
     wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
@@ -171,11 +179,12 @@ def winch_force(
 def motor_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a tension motor on its cable. The motor's state `drive` is the tension (N).
+    """Force of a tension motor on a cable with a length (m) that grows at a rate (m/s).
 
-    The motor keeps its cable taut at any length. Its software imitates the spring and the damper of
-    Eq. 6, but the motor does not push. It follows its command with a lag. Its tension is at most
-    max_force (1 - winding speed / max_speed).
+    The motor's state `drive` is the tension (N). Its command is the tension of Eq. 6 of the thesis,
+    spring plus damper plus `signal` (N): software imitates the cable, but the motor does not push.
+    The motor keeps its cable taut at any length. It follows its command with a lag. Its tension is
+    at most max_force (1 - winding speed / max_speed).
     """
     left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
     most = limits.max_force * left
@@ -218,7 +227,7 @@ class DrivenCables(NamedTuple):
 class ActuatorKind(Section):
     """Base class for the settings of actuators. Each driven cable has an actuator.
 
-    The methods here are for actuators without a state.
+    The methods here are for ideal actuators, which have no state.
     """
 
     kind: ClassVar[int]
@@ -237,7 +246,8 @@ class ActuatorKind(Section):
     effect."""
 
     def actuator(self) -> Actuator:
-        """Kind and limits of the actuators for the kernels, from the settings of the same names."""
+        """Kind and limits of the actuators for the kernels. Settings with the names of limits give
+        the limits."""
         return Actuator(self.kind, np.array(Limits(**dict(self))))
 
     def excess(self, signal: float, *, free_length: float) -> str:
@@ -248,21 +258,24 @@ class ActuatorKind(Section):
         return ""
 
     def drives(self, cables: DrivenCables) -> Any:
-        """States of the actuators (..., drives) for cables in a given condition."""
+        """States of the actuators (..., driven cables) that fit cables in a given condition: free
+        lengths (m) or tensions (N). Empty if actuators have no state."""
         return cables.signal[..., :0]
 
     def commands(self, cables: DrivenCables) -> Any:
-        """Setpoints of the actuators, in SI units."""
+        """Setpoints of the actuators (..., driven cables) for cables in a given condition, in SI
+        units: force, free length or tension, depending on the kind."""
         return cables.signal
 
     def signals(self, commands: Any, law: CableLaw) -> Any:
-        """Signals (N) with the same effect as setpoints (..., driven cables)."""
+        """Signals (N) with the same effect as setpoints (..., driven cables). `law` has the
+        constants of the cables."""
         return commands
 
 
 class Force(ActuatorKind):
-    """Ideal actuators: the signals are forces on the cables, without limits (thesis section
-    2.1.3)."""
+    """Ideal actuators: the signals are forces that add to the tensions of the cables, without
+    limits (thesis section 2.1.3)."""
 
     kind = DIRECT
     lacking = (LIMITS,)
@@ -282,7 +295,8 @@ class LimitedActuator(ActuatorKind):
 
 
 class Winch(LimitedActuator):
-    """A winch on each driven cable: signals command its free length. See laws.actuator."""
+    """A winch on each driven cable. A signal S commands the free length l0 - S / k; k is the
+    cable's stiffness, l0 its original free length. See laws.actuator."""
 
     kind = WINCH
     commanded = "free_length_mm"

@@ -113,7 +113,7 @@ def elastic_energy(stretch: Real, law: CableLaw) -> Real:
 
 @inlined
 def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
-    """Tension (N) of a cable by Eq. 6.
+    """Tension (N) of a cable by Eq. 6 of the thesis: spring plus damper plus actuation force.
 
     `length` is in m, `rate` (m/s) is the rate of the length, `signal` (N) is the actuation force.
     """
@@ -122,7 +122,8 @@ def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real
 
 @inlined
 def most_tension(elastic: Real) -> Real:
-    """Greatest tension (N) of a cable that goes slack, 2 E. `elastic` (N) is elastic_tension()."""
+    """Greatest tension (N) of a cable that goes slack, 2 max(0, E): its damper at most doubles the
+    elastic tension E. `elastic` (N) is E; see elastic_tension()."""
     return 2.0 * maximum(elastic, 0.0)
 
 
@@ -130,7 +131,8 @@ def most_tension(elastic: Real) -> Real:
 def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]:
     """Tension (N) of a cable that goes slack, and its derivative by the rate (N s/m).
 
-    `elastic` (N) is elastic_tension(), `rate` (m/s) the rate of the length.
+    It is elastic + damping rate, limited to 0 ... 2 max(0, elastic). `elastic` (N) is
+    elastic_tension(), `rate` (m/s) the rate of the length.
     """
     linear = elastic + law.damping * rate
     tension = minimum(maximum(linear, 0.0), most_tension(elastic))

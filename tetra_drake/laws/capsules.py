@@ -72,7 +72,7 @@ LEAST_SQUARE = 1e-30
 
 
 class StrutSearch(NamedTuple):
-    """Distances (m) at which struts count as near, and limits of steps near contacts."""
+    """Constants of the search for near struts, and limits of steps near contacts; lengths in m."""
 
     near: Real
     """Distance of the axes of two struts below which the pair is near."""
@@ -113,7 +113,8 @@ class NearStruts(NamedTuple):
 
 
 def near_sizes(struts: Struts) -> dict[str, int]:
-    """Sizes of the tables of NearStruts, for allocate()."""
+    """Sizes of the tables of NearStruts by name, for allocate(), which makes them. There is room
+    for all pairs of struts of different bodies."""
     of_bodies = np.diff(struts.first_strut)
     pairs = (of_bodies.sum() ** 2 - (of_bodies**2).sum()) // 2
     return {
@@ -131,10 +132,11 @@ def find_near_struts(
     nodes: Table,
     near: NearStruts,
 ) -> None:
-    """Finds the pairs of struts that are near each other in any lane.
+    """Lists in `near` the pairs of struts of different bodies that are near each other in any lane
+    (each lane is a robot). Also stores the positions of the nodes there.
 
     `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
-    laws.kinematics for a `state` (13 bodies,).
+    laws.kinematics for a `state` [q; v] (13 bodies,).
     """
     limit, count = named(StrutSearch, contact.search).near, 0
     for first in range(radius.size):
@@ -159,7 +161,7 @@ def find_near_struts(
 
 
 class Touch(NamedTuple):
-    """Contact of two struts."""
+    """Geometry of a contact of two struts."""
 
     s: Real
     """Position of the contact along the first axis: 0 at its start, 1 at its end."""
@@ -212,7 +214,7 @@ def time_to_pass(
 @inlined
 def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
     """Weight w (m²) that makes nearly parallel struts count as thicker in the middle, and its first
-    and second derivative with respect to the product uv of the axes.
+    and second derivative with respect to uv, the scalar product of the axes.
 
     `reach` (m) is the sum of the radii.
     """
@@ -225,7 +227,8 @@ def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
 
 @inlined
 def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
-    """Contact of struts i and j: its position, depth, and gradient."""
+    """Position, depth and gradient of the contact of struts i and j; the depth is negative if they
+    are apart. `nodes` is the table with the positions of the nodes."""
     axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]
     weight, weight_rate, _ = barrel(axes, reach)
     half, uu, vv = 0.5 * weight, axes.uu + weight, axes.vv + weight
@@ -252,9 +255,9 @@ def add_strut_forces(
     nodes: Table,
     near: NearStruts,
 ) -> None:
-    """Adds the forces between struts that touch to the forces on the nodes.
+    """Adds the forces between struts that touch to the forces on the nodes, in `nodes`.
 
-    Finds the near pairs anew if a node has moved far since the latest search; see
+    Finds the near pairs anew, into `near`, if a node has moved far since the latest search; see
     find_near_struts().
     """
     if not law.acts:
@@ -272,7 +275,8 @@ def add_strut_forces(
 
 @inlined
 def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j: int) -> None:
-    """Adds the force between two struts to the forces on their nodes."""
+    """Adds the force between struts i and j, if they touch, to the forces on their nodes, in
+    `nodes`."""
     touch = find_touch(struts, nodes, i, j)
     if not any_lane(touch.depth > 0.0):
         return
@@ -282,7 +286,8 @@ def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j:
 
 @inlined
 def push_ends(struts: Struts, nodes: Table, i: int, j: int, touch: Touch, force: Real) -> None:
-    """Adds a force (N) that pushes struts i and j apart to the forces on their nodes."""
+    """Adds a force (N) that pushes struts i and j apart to the forces on their nodes, in `nodes`.
+    The gradient of `touch` says how the ends share it."""
     start_i, end_i, start_j, end_j = touch.gradient
     add_vector(scaled(force, start_i), struts.node_a[i], kinematics.FORCE, nodes)
     add_vector(scaled(force, end_i), struts.node_b[i], kinematics.FORCE, nodes)
@@ -292,7 +297,7 @@ def push_ends(struts: Struts, nodes: Table, i: int, j: int, touch: Touch, force:
 
 @inlined
 def depth_rate(struts: Struts, nodes: Table, i: int, j: int, touch: Touch) -> Real:
-    """Rate (m/s) of the depth of the contact of struts i and j."""
+    """Rate (m/s) of the depth of the contact of struts i and j, positive as they approach."""
     start_i, end_i, start_j, end_j = touch.gradient
     rate_i = dot(start_i, vector_at(nodes, struts.node_a[i], kinematics.V_WN))
     rate_i += dot(end_i, vector_at(nodes, struts.node_b[i], kinematics.V_WN))
@@ -307,13 +312,14 @@ class NoStrutContact(Section):
     tag: ClassVar[str] = "Nothing"
 
     def law(self, search: StrutSearch) -> StrutContactLaw:
-        """Constants of the law for the kernels. `search` has the distances of the search."""
+        """Law for the kernels that exerts no force. `search` has the constants of the search for
+        near struts; it is stored but has no effect."""
         return StrutContactLaw(acts=False, normal=np.zeros(2), search=np.array(search))
 
 
 class HuntCrossley(Section):
     """Contact of struts as capsules with the struts' radii, without friction. The force at a depth
-    d of the overlap is F = k d (1 + c d'); see laws.capsules."""
+    d of the overlap, with the rate d', is F = k d (1 + c d'); see laws.capsules."""
 
     stiffness: Stiffness = Field(gt=0)
     """Stiffness k of a contact: force divided by depth of the overlap."""
@@ -322,7 +328,8 @@ class HuntCrossley(Section):
     a low speed v: e = 1 - 2/3 c v."""
 
     def law(self, search: StrutSearch) -> StrutContactLaw:
-        """Constants of the law for the kernels. `search` has the distances of the search."""
+        """Law for the kernels, with these settings as constants. `search` has the constants of the
+        search for near struts."""
         normal = NormalForce(self.stiffness, damping=self.stiffness * self.dissipation)
         return StrutContactLaw(acts=True, normal=np.array(normal), search=np.array(search))
 

@@ -55,7 +55,7 @@ normal force (N)."""
 
 
 class GroundSection(Section):
-    """Stiffness and damping of the ground, which give the normal force (Table 1)."""
+    """Stiffness and damping of the ground, which give the normal force (Table 1 of the thesis)."""
 
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of the ground: normal force divided by the depth of a node in the ground."""
@@ -65,7 +65,7 @@ class GroundSection(Section):
 
 
 class NormalForce(NamedTuple):
-    """Constants of the normal force (Table 1); SI units."""
+    """Constants of the normal force (Table 1 of the thesis); SI units."""
 
     stiffness: Real
     damping: Real
@@ -138,10 +138,11 @@ class Ground(NamedTuple):
 
 @inlined
 def meet_ground(ground: Ground, state: Table, nodes: Table, frames: Table) -> None:
-    """Computes the frames of the surface below the contact nodes and the lowest points of feet.
+    """Writes the frames of the surface below the contact nodes, and the lowest points of round
+    feet.
 
-    Frames are written to `frames` (contacts, FRAME_COLUMNS). The lowest points of round feet are
-    written to the table `nodes` of `kinematics`.
+    A frame is a row of `frames` (contacts, FRAME_COLUMNS): gap, normal and tangents. The lowest
+    points are written to rows of the table `nodes` of laws.kinematics, after all nodes.
 
     The velocity of a lowest point is the one of the body there. The gap in the frame of a round
     foot is the distance of its lowest point from the surface. On flat ground, `frames` is not used.
@@ -168,7 +169,8 @@ def meet_ground(ground: Ground, state: Table, nodes: Table, frames: Table) -> No
 
 @inlined
 def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
-    """Distance (m) from the ground to a foot; negative in the ground."""
+    """Distance (m) from the ground to the lowest point of foot i; negative in the ground. It is
+    read from `nodes` if the ground is flat, otherwise from `frames`; see meet_ground()."""
     if ground.flat:
         return nodes[ground.contacts[i], kinematics.P_WN + 2]
     return frames[i, terrain.GAP]
@@ -176,10 +178,11 @@ def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
 
 @inlined
 def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
-    """Normal force (N) on a node by Eq. 1 with n = 1.
+    """Normal force (N) on a node by Eq. 1 of the thesis with the exponent n = 1: stiffness depth +
+    damping depth depth_rate.
 
-    `depth` (m) is the node's depth in the ground, `depth_rate` (m/s) its rate. The ground never
-    pulls.
+    `depth` (m) is the node's depth in the ground, `depth_rate` (m/s) its rate, positive as it sinks
+    in. The ground never pulls.
     """
     force = law.stiffness * depth + law.damping * depth * depth_rate
     return select(depth > 0.0, maximum(force, 0.0), 0.0)
@@ -189,8 +192,8 @@ def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
 def sliding(
     state: Table, nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
 ) -> tuple[friction.Slide, Real]:
-    """Motion of foot i along the ground, with its normal force, and the rate (m/s) of its distance
-    from the ground."""
+    """Motion of foot i along the ground, with its normal force (N), and the rate (m/s) of its
+    distance from the ground, positive upward. `modes` is only read."""
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     v_WN = vector_at(nodes, ground.contacts[i], kinematics.V_WN)
     deflection = difference(p_WN, vector_at(modes, i, STICK_POINT))
@@ -210,11 +213,13 @@ def sliding(
 
 @inlined
 def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, modes: Table) -> Truth:
-    """Updates `modes` for the nodes of a state. Returns True in lanes where a mode changed.
+    """Updates the contact and friction modes in `modes` for a state [q; v] and its `nodes` and
+    `frames`.
 
-    A node that lands sticks where it lands. A node that sticks again does so at its present
-    position; this is the reset of the reset integrator, unless the deflection is kept. The stick
-    point of a node in the air is where it has left the ground.
+    Returns True in lanes where a mode changed; each lane is a robot. A node that lands sticks where
+    it lands. A node that sticks again does so at its present position; this is the reset of the
+    reset integrator, unless the deflection is kept. The stick point of a node in the air is where
+    it has left the ground.
     """
     changed = False
     for i in range(ground.contacts.size):
@@ -257,11 +262,12 @@ def move_stick_point(
     slide: friction.Slide,
     modes: Table,
 ) -> None:
-    """Moves the stick point of a contact node so that its deflection is `bend`. `along` says, for
-    t1 and t2, whether the stick point moves along this tangent.
+    """Moves the stick point of foot i, in `modes`, so that the deflection of its bristle becomes
+    `bend` (m). `along` says, for t1 and t2, whether the stick point moves along this tangent.
+    `slide` is the foot's present motion.
 
-    With round feet, the orientation is stored, and along the other tangents the stick point moves
-    so that the deflection stays.
+    With round feet, also stores the body's orientation in `modes`. Along the other tangents the
+    stick point then moves so that the deflection stays.
     """
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     if ground.is_round:

@@ -42,9 +42,9 @@ def curvature(points: np.ndarray, *, scale: float = 1.0) -> float:
 def travelling_index(waves: np.ndarray) -> float:
     """Travelling index of waves (samples, positions): 0 for standing waves, 1 for travelling waves.
 
-    It is a property of the strongest complex orthogonal mode: the ratio of the singular values of
-    its real and imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Samples
-    must be evenly spaced. The index of fewer than two positions is 0.
+    It is the ratio of the singular values of the real and imaginary parts of the strongest complex
+    orthogonal mode (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Samples must be evenly
+    spaced. The index of fewer than two positions is 0.
     """
     if waves.shape[1] < 2:
         return 0.0

@@ -78,8 +78,12 @@ class Senses(NamedTuple):
 def sense(
     senses: Senses, gains: Table, state: Table, modes: Table, forces: Forces, feedback: Table
 ) -> None:
-    """Writes the feedback of each neuron (2m,), from the state of the bodies, the modes of
-    `contact`, and the forces. `gains` are in the order of PATHWAYS."""
+    """Writes the feedback f of each neuron to `feedback` (2m,), for m oscillators: extensor and
+    flexor in turn.
+
+    It is computed from the state [q; v] of the bodies, the modes of laws.contact, and `forces`,
+    which must hold the cable and ground forces. `gains` are in the order of PATHWAYS.
+    """
     gain = named(NamedGains, gains)
     for i in range(feedback.size):
         feedback[i] = 0.0
@@ -111,7 +115,8 @@ def compute_feedback(
     drives: Table,
     feedback: Table,
 ) -> None:
-    """Computes the forces of a robot, and then its feedback; see sense().
+    """Computes the forces of a robot, then writes the feedback of each neuron to `feedback` (2m,);
+    see sense().
 
     The robot has signals (m,) in N, and actuator states `drives` (drives,).
     """

@@ -46,7 +46,8 @@ class Forces(NamedTuple):
 
 
 def sizes_of(robot: Model) -> dict[str, int]:
-    """Lengths of a robot's tables, such as "bodies" and "cables", for allocate()."""
+    """Lengths of a robot's tables by name, such as "bodies" and "cables", for allocate(), which
+    makes the arrays."""
     drivers, has_drive = robot.cables.signal, actuator.has_drive(robot.actuator)
     near = capsules.near_sizes(robot.struts)
     if not robot.strut_contact.acts:
@@ -68,8 +69,8 @@ Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
 
 @inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
-    """Computes motions of nodes and feet, ground frames and inertia for a state (13 bodies,).
-    Forces on the nodes become zero."""
+    """Writes motions of nodes and feet, ground frames and inertia for a state [q; v] (13 bodies,)
+    to `forces`. Sets the forces on the nodes to zero."""
     move_contacts(robot, state, forces)
     if not robot.isotropic:
         turn_inertia(state, robot.bodies.inertia, forces.inertia)
@@ -77,8 +78,8 @@ def move_robot(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
-    """Computes motions of nodes and feet, and ground frames, for a state. Forces on them become
-    zero."""
+    """Writes motions of nodes and feet, and ground frames, for a state [q; v] (13 bodies,) to
+    `forces`. Sets the forces on them to zero."""
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     contact.meet_ground(robot.ground, state, forces.nodes, forces.frames)
 
@@ -90,9 +91,10 @@ def pull_of_cable(
     """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the next row of
     `drives`.
 
-    If the cable's actuator has a state, `drive` is the actuator's row in the table `drives`, and
-    the other columns of this row are written. The length is in m, its rate in m/s, `signals`
-    (signals,) in N. An actuation force also acts on a cable that is slack.
+    `drives` is the table of the actuators' states. If the cable's actuator has a state, `drive` is
+    its row, and the other columns of this row are written. The next row is `drive` + 1 then,
+    otherwise `drive`. The length is in m, its rate in m/s, `signals` (signals,) in N. An actuation
+    force also acts on a cable that is slack.
     """
     driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:
@@ -116,10 +118,10 @@ def pull_of_cable(
 
 @inlined
 def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
-    """Adds the forces of all cables to the forces on the nodes.
+    """Adds the forces of all cables to the forces on the nodes, in `forces.nodes`.
 
     `signals` (signals,) are in N. Also writes the rates of the actuators' states, and with
-    `write_parts` the table `cable_forces`.
+    `write_parts` the table `forces.cable_forces`.
     """
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
     drive = 0
@@ -150,9 +152,11 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
 def add_ground_forces(
     robot: Model, state: Table, modes: Table, write_parts: bool, forces: Forces
 ) -> None:
-    """Adds the forces of the ground to the forces on nodes and round feet.
+    """Adds the forces of the ground to the forces on nodes and round feet, in `forces.nodes`.
 
-    `modes` is the table of `contact`. With `write_parts`, also writes the table `ground_forces`.
+    `state` is [q; v] (13 bodies,). `modes` says which nodes touch and stick, and is only read; see
+    laws.contact. With `write_parts`, also writes friction and normal force of each contact to
+    `forces.ground_forces`.
     """
     ground, nodes, frames, parts = robot.ground, forces.nodes, forces.frames, forces.ground_forces
     for i in range(parts.shape[0]):
@@ -180,11 +184,12 @@ def compute_forces(
     forces: Forces,
     generalized: Table,
 ) -> None:
-    """Writes the generalized force (6 bodies,) of cables, ground, anchors, loads, gravity and
-    gyroscopic torques.
+    """Writes the generalized force (6 bodies,) of cables, ground, touching struts, anchors, loads,
+    gravity and gyroscopic torques to `generalized`.
 
-    move_robot() must have been called for the same state. With `write_parts`, also writes
-    `cable_forces` and `ground_forces`.
+    move_robot() must have been called for the same `state`. `modes` are the contact and friction
+    modes, `signals` are in N. With `write_parts`, also writes `forces.cable_forces` and
+    `forces.ground_forces`.
     """
     add_cable_forces(robot, signals, write_parts, forces)
     add_ground_forces(robot, state, modes, write_parts, forces)
@@ -204,7 +209,8 @@ def compute_forces(
 
 @inlined
 def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
-    """Writes the generalized force (6 bodies,) of the forces on nodes and round feet."""
+    """Sums the forces on nodes and round feet to `generalized` (6 bodies,): torque and force [t_W;
+    f_W] at each body's origin."""
     kinematics.gather_forces(nodes, robot.first_node, generalized)
     ground = robot.ground
     if not ground.is_round:
@@ -222,7 +228,8 @@ def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
 
 @inlined
 def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
-    """Adds the forces of touching struts, anchors and loads to the forces on the nodes."""
+    """Adds the forces of touching struts, anchors and loads to the forces on the nodes, in
+    `forces.nodes`. They need neither signals nor modes."""
     nodes, anchors, loads = forces.nodes, robot.anchors, robot.loads
     radius, law, near = robot.bodies.radius, robot.strut_contact, forces.near_struts
     capsules.add_strut_forces(robot.struts, law, radius, state, nodes, near)
@@ -243,10 +250,12 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
 
 @compiled
 def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> float:
-    """Writes the generalized force of all cables (6 bodies,): [t_W; f_W] at each body's origin.
+    """Writes the generalized force of all cables to `generalized` (6 bodies,): [t_W; f_W] at each
+    body's origin.
 
-    Also writes nodes, `cable_forces` and the rates of the actuators' states. Returns a number that
-    is finite if all forces are.
+    `state` is [q; v] (13 bodies,), `signals` are in N. Also writes nodes, `cable_forces` and the
+    rates of the actuators' states to the Forces of `parts`. Returns the sum of `generalized`, which
+    is finite only if all forces are.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
@@ -260,9 +269,12 @@ def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized
 
 @compiled
 def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
-    """Writes the generalized force of the ground (6 bodies,): [t_W; f_W] at each body's origin.
+    """Writes the generalized force of the ground to `generalized` (6 bodies,): torque and force
+    [t_W; f_W] at each body's origin.
 
-    Also writes nodes, frames and `ground_forces`.
+    `state` is [q; v] (13 bodies,). `modes` (contacts, 12) says which nodes touch the ground and
+    stick; it is only read. Also writes nodes, ground frames and `ground_forces` to the Forces of
+    `parts`.
     """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
@@ -272,10 +284,10 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
 
 @compiled
 def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None:
-    """Writes the generalized force of touching struts, anchors and loads (6 bodies,): [t_W; f_W] at
-    each body's origin.
+    """Writes the generalized force of touching struts, anchors and loads to `generalized` (6
+    bodies,): [t_W; f_W] at each body's origin.
 
-    Also writes nodes.
+    `state` is [q; v] (13 bodies,). Also writes nodes to the Forces of `parts`.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
@@ -285,10 +297,11 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
 
 @compiled
 def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized: Table) -> float:
-    """Writes the generalized force of touching struts (6 bodies,): [t_W; f_W] at each body's
-    origin. Returns the longest step (s), at most `horizon`; see capsules.time_to_pass().
+    """Writes the generalized force of touching struts to `generalized` (6 bodies,): [t_W; f_W] at
+    each body's origin.
 
-    Also writes nodes.
+    Returns the longest step (s), at most `horizon`, that cannot carry a strut through another; see
+    capsules.time_to_pass(). Also writes nodes to the Forces of `parts`.
     """
     robot, forces = unpacked(parts)
     nodes, law, near = forces.nodes, robot.strut_contact, forces.near_struts
@@ -303,9 +316,10 @@ def forces_of_motion(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Node motions, cable forces and ground forces at each of the k times of a recorded motion.
 
-    Returns the tables `nodes` (k, nodes, NODE_COLUMNS), without the rows of feet, `cable_forces`
-    (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS). For
-    the shapes of the arguments see forces_along().
+    The motion has states [q; v] (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m)
+    in N, and actuator states `drives` (k, drives). Returns the tables `nodes` (k, nodes,
+    NODE_COLUMNS), without the rows of feet, `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and
+    `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
     """
     forces, samples = Forces.of(robot), len(states)
     nodes = np.empty((samples, len(robot.p_BN), kinematics.NODE_COLUMNS))
@@ -345,8 +359,8 @@ def forces_along(
 def compute_forces_at(
     robot: Model, state: Table, modes: Table, signals: Table, drives: Table, forces: Forces
 ) -> None:
-    """Computes all tables of Forces for a state (13 bodies,) and actuator states `drives`
-    (drives,)."""
+    """Computes all tables of `forces` for a state (13 bodies,), contact and friction modes, signals
+    (N) and actuator states `drives` (drives,)."""
     generalized = np.empty(6 * robot.bodies.mass.size)
     move_robot(robot, state, forces)
     for i in range(drives.size):
@@ -356,7 +370,7 @@ def compute_forces_at(
 
 @inlined
 def copy_rows(table: Table, rows: Table) -> None:
-    """Copies the first rows of a table to `rows`."""
+    """Copies the first rows of `table` to `rows`, as many as `rows` has."""
     for i in range(rows.shape[0]):
         for c in range(rows.shape[1]):
             rows[i, c] = table[i, c]

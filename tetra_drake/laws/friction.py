@@ -83,7 +83,8 @@ MUJOCO_FRICTION = 0.5
 
 @dataclass(frozen=True)
 class Cone:
-    """MuJoCo's friction: against the velocity, and at most `coefficient` times the load."""
+    """Constants of MuJoCo's friction: against the velocity, and at most `coefficient` times the
+    load."""
 
     coefficient: float
     damping: float
@@ -91,7 +92,7 @@ class Cone:
 
 
 class FrictionKind(Section):
-    """Base class of the kinds of friction."""
+    """Base class for the settings of friction."""
 
     modes: ClassVar[str]
     """Meaning of the signs of friction modes in recorded trajectories."""
@@ -139,7 +140,7 @@ class TangentSlide(NamedTuple):
 
 
 class Slide(NamedTuple):
-    """Motion of a node along the ground, and the normal force on it."""
+    """Motion of a node along the ground's tangents t1 and t2, and the normal force on it."""
 
     t1: TangentSlide
     t2: TangentSlide
@@ -150,7 +151,8 @@ class Slide(NamedTuple):
 
 
 class NextMode(NamedTuple):
-    """Friction mode of a node at the end of a step, if it stays on the ground."""
+    """Friction mode of a node after a step, if it stays on the ground: along each tangent 0 if it
+    sticks, otherwise the direction of its slip."""
 
     mode: Vector2
     begins: tuple[Truth, Truth]
@@ -161,9 +163,9 @@ class NextMode(NamedTuple):
 
 @inlined
 def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
-    """First time t in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero.
+    """First time t (s) in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero.
 
-    The horizon if there is no such time, or if `value` is not positive.
+    Returns the horizon if there is no such time, or if `value` is not positive.
     """
     reach = horizon * (abs(rate) + 0.5 * horizon * abs(rate_rate))
     if not any_lane((value > 0.0) & (value <= reach)):
@@ -228,7 +230,7 @@ class ResetIntegrator(FrictionKind):
 
 
 class ResetConstants(NamedTuple):
-    """Constants of the reset integrator (Table 2); SI units."""
+    """Constants of the reset integrator (Table 2 of the thesis); SI units."""
 
     stiction_range: Real
     stiction_damping: Real
@@ -248,7 +250,7 @@ class ResetConstants(NamedTuple):
 
 @inlined
 def reset_force(slide: Slide, law: ResetConstants) -> Vector2:
-    """Friction (N) of the reset integrator (Eq. 3-5)."""
+    """Friction (N) along both tangents by the reset integrator (Eq. 3-5 of the thesis)."""
     force_1, force_2 = tangent_force(slide.t1, law), tangent_force(slide.t2, law)
     if not any_lane(law.per_load > 0.0):
         return force_1, force_2
@@ -258,8 +260,8 @@ def reset_force(slide: Slide, law: ResetConstants) -> Vector2:
 
 @inlined
 def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
-    """Friction (N) of the reset integrator along one tangent. In slip, the deflection is the
-    stiction range times the mode."""
+    """Friction (N) of the reset integrator along one tangent, before any factor for the load. In
+    slip, the deflection is the stiction range times the mode (+1 or -1)."""
     per_length = law.stiffness + law.proportional_stiction * abs(slide.velocity)
     bristle = per_length * (1.0 + law.stiction_switch) * slide.deflection
     stick = -(bristle + law.stiction_damping * slide.velocity)
@@ -269,10 +271,10 @@ def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
 
 @inlined
 def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, Real, Real]:
-    """Damping matrix of the friction for an implicit step of length `time` (s).
+    """Damping matrix (kg) of the friction F for an implicit step of length `time` (s).
 
-    Returns the components 11, 12 and 22 of the stiff part of -(time d/dv + time² d/dx). For the
-    reset integrator this part is the damping and stiffness in stick.
+    Returns the components 11, 12 and 22, along t1 and t2, of the stiff part of -(time dF/dv + time²
+    dF/dx). For the reset integrator this part is the damping and stiffness in stick.
     """
     stiffness = time * law.stiffness * (1.0 + law.stiction_switch)
     by_load = select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
@@ -284,7 +286,8 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
 
 @inlined
 def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
-    """Next mode of the reset integrator along each tangent."""
+    """Mode of the reset integrator along each tangent after a step: 0 sticks, otherwise the
+    direction of slip."""
     slips = law.restarts == 0.0
     ends_1, ends_2 = at_range(slide.t1, law), at_range(slide.t2, law)
     breaks_1, breaks_2 = ends_1 & slips, ends_2 & slips
@@ -304,7 +307,8 @@ def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
 
 @inlined
 def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
-    """True if a node that sticks is at the stiction range and moves outward."""
+    """True if a node sticks, its bristle is bent by the stiction range or more, and it moves
+    outward: it breaks free."""
     forward = (slide.deflection >= law.stiction_range) & (slide.velocity > 0.0)
     backward = (slide.deflection <= -law.stiction_range) & (slide.velocity < 0.0)
     return (slide.mode == STICK) & (forward | backward)
@@ -312,12 +316,13 @@ def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
 
 @inlined
 def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
-    """Next mode of the reset integrator along one tangent.
+    """Mode of the reset integrator along one tangent after a step: 0 sticks, otherwise the sign of
+    slip.
 
-    If the node `breaks` free along this tangent, it slips in the direction of its velocity. If it
-    breaks free along the other tangent, it may slip along this one, too. The mode is then `share`,
-    the deflection divided by the stiction range. The node sticks again when its velocity changes
-    sign.
+    If the node `breaks` free along this tangent, it slips in the direction of its velocity. `share`
+    is for a node that breaks free along the other tangent and may slip along this one: the
+    deflection divided by the stiction range, otherwise 0. It is the mode then. The node sticks
+    again when its velocity changes sign.
     """
     from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
     mode = select(slide.mode == STICK, from_stick, slide.mode)
@@ -346,7 +351,12 @@ def reset_margin(slide: Slide, law: ResetConstants) -> float:
 def time_to_reset_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: ResetConstants
 ) -> Real:
-    """Time (s) to the next mode change of the reset integrator along either tangent."""
+    """Time (s) to the next mode change of the reset integrator along either tangent, at most
+    `horizon`.
+
+    `acceleration` (m/s²) along the tangents is taken as constant. `normal_rate` is not used: the
+    other law needs it.
+    """
     return minimum(
         time_to_tangent_change(slide.t1, acceleration[0], law, horizon),
         time_to_tangent_change(slide.t2, acceleration[1], law, horizon),
@@ -357,7 +367,8 @@ def time_to_reset_change(
 def time_to_tangent_change(
     slide: TangentSlide, acceleration: Real, law: ResetConstants, horizon: Real
 ) -> Real:
-    """Time (s) to the next mode change along one tangent."""
+    """Time (s) to the next mode change of the reset integrator along one tangent, at most
+    `horizon`, with a constant acceleration (m/s²)."""
     velocity, stuck = slide.velocity, slide.mode == STICK
     # first_zero() ignores a value of 0, so 0 stands for no mode change.
     to_front = select(stuck, law.stiction_range - slide.deflection, 0.0)
@@ -445,8 +456,8 @@ class CoulombConstants(NamedTuple):
 
 
 class BristleForce(NamedTuple):
-    """Force u of a node's bristle: c v + k x in stick, c v in slip. Friction is -u up to a
-    limit."""
+    """Force u of a node's bristle: c v + k x in stick, c v in slip, with the velocity v, the
+    deflection x, the damping c and the stiffness k. Friction is -u up to a limit."""
 
     u_1: Real
     """Component along t1 in N."""
@@ -461,7 +472,8 @@ class BristleForce(NamedTuple):
 
 @inlined
 def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
-    """Force of a node's bristle."""
+    """Force u of a node's bristle, its size, and the limit above which the node slips; see
+    BristleForce."""
     stuck = (slide.t1.mode == STICK) & (slide.t2.mode == STICK)
     stiffness = select(stuck, law.stiffness, 0.0)
     u_1 = law.damping * slide.t1.velocity + stiffness * slide.t1.deflection
@@ -473,10 +485,12 @@ def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
 
 @inlined
 def coulomb_size(u_1: Real, u_2: Real, heading: Vector2, law: CoulombConstants) -> Real:
-    """Size of a force for friction that depends on the direction.
+    """Size (N) of a force (u_1, u_2) along the tangents, for friction that depends on the
+    direction.
 
     Forces of the same size lie on an ellipse. Its half-axes are the directional factors: `forward`
-    or `backward` along the heading, depending on the sign, and `lateral` across it.
+    or `backward` along the heading, depending on the sign, and `lateral` across it. `heading` is a
+    unit vector.
     """
     along = u_1 * heading[0] + u_2 * heading[1]
     across = u_2 * heading[0] - u_1 * heading[1]
@@ -487,7 +501,8 @@ def coulomb_size(u_1: Real, u_2: Real, heading: Vector2, law: CoulombConstants) 
 
 @inlined
 def coulomb_force(slide: Slide, law: CoulombConstants) -> Vector2:
-    """Coulomb friction (N): -u, limited by the normal force."""
+    """Coulomb friction (N) along both tangents. It is opposite to the force of the node's bristle,
+    and at most the coefficient of friction times the normal force; see BristleForce."""
     bristle = bristle_force(slide, law)
     share = select(bristle.size > bristle.limit, bristle.limit / bristle.size, 1.0)
     return -share * bristle.u_1, -share * bristle.u_2
@@ -495,10 +510,11 @@ def coulomb_force(slide: Slide, law: CoulombConstants) -> Vector2:
 
 @inlined
 def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Real, Real, Real]:
-    """Damping matrix of the friction for an implicit step of length `time` (s).
+    """Damping matrix (kg) of the friction F for an implicit step of length `time` (s).
 
-    Returns the components 11, 12 and 22 of the stiff part of -(time d/dv + time² d/dx). Beyond the
-    limit only the direction of the force changes. This is exact without directional factors.
+    Returns the components 11, 12 and 22, along t1 and t2, of the stiff part of -(time dF/dv + time²
+    dF/dx). Beyond the limit only the direction of the force changes. This is exact without
+    directional factors.
     """
     bristle = bristle_force(slide, law)
     stiffness = select(bristle.stuck, time * law.stiffness, 0.0)
@@ -511,8 +527,11 @@ def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Re
 
 @inlined
 def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
-    """Next mode of Coulomb friction. A node breaks free beyond the static limit if it moves
-    outward. It sticks again when the bristle's damping alone can hold it."""
+    """Mode of Coulomb friction after a step: (0, 0) sticks, otherwise the direction of slip.
+
+    A node breaks free beyond the static limit if it moves outward. It sticks again when the
+    bristle's damping alone can hold it.
+    """
     bristle = bristle_force(slide, law)
     u_1, u_2 = bristle.u_1, bristle.u_2
     beyond = bristle.size > bristle.limit
@@ -531,7 +550,8 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
 def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
     """Mode margin (N) of Coulomb friction: positive until the mode changes.
 
-    It is limit - size of the bristle's force in stick, and size - limit in slip.
+    In slip it is the size of the bristle's force less its limit. In stick it is the limit less the
+    size, but stays positive beyond the limit while the node moves inward.
     """
     bristle = bristle_force(slide, law)
     if not bristle.stuck:
@@ -544,7 +564,12 @@ def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
 def time_to_coulomb_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: CoulombConstants
 ) -> Real:
-    """Time (s) until the bristle's force crosses the limit, at its present rate."""
+    """Time (s) until the bristle's force crosses its limit, at most `horizon`. Both are taken to
+    change at their present rates.
+
+    `acceleration` (m/s²) is along the tangents, `normal_rate` (N/s) is the rate of the normal
+    force.
+    """
     bristle = bristle_force(slide, law)
     stiffness = select(bristle.stuck, law.stiffness, 0.0)
     rate_1 = law.damping * acceleration[0] + stiffness * slide.t1.velocity

@@ -39,8 +39,8 @@ class HeightFile(str):
 
     @classmethod
     def read(cls, path: Any) -> HeightFile:
-        """Reads the height file of a setting. Refuses what is not a path, a file without heights,
-        and a file with another digest in its name."""
+        """Reads the height file of a setting. Raises InputError for what is not a path, for a file
+        without heights, and for a file whose name has the digest of other heights."""
         if isinstance(path, HeightFile):
             return path
         if not isinstance(path, str):

@@ -26,7 +26,8 @@ nothing. The last rows are the lowest points of round feet; see `contact`."""
 
 @compiled
 def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> None:
-    """Writes the table `nodes` for a state, with forces of zero.
+    """Writes positions and velocities of all nodes to the table `nodes`, and sets the forces on
+    them to zero.
 
     Args:
         state: [q; v] of the bodies, 13 numbers per body.
@@ -69,9 +70,10 @@ nodes on a line have no angular velocity about the line."""
 def pitch_rate(nodes: Table, moving: int) -> Real:
     """Angular velocity (rad/s) about the world's y axis of the structure as a whole.
 
-    It is the angular velocity of the rigid motion that fits the velocities of the first `moving`
-    nodes best (least squares): their angular momentum about their centre, divided by their inertia,
-    with a unit mass at each node. A change of shape alone does not count.
+    It is the angular velocity of the rigid motion that fits the velocities of the nodes best (least
+    squares): their angular momentum about their centre, divided by their inertia, with a unit mass
+    at each node. Only the first `moving` nodes count; the others are fixed. A change of shape alone
+    does not count.
     """
     share = 1.0 / moving
     centre = spin = (0.0, 0.0, 0.0)
@@ -100,7 +102,7 @@ def pitch_rate(nodes: Table, moving: int) -> Real:
 
 @inlined
 def rotation(state: Table, body: int) -> tuple[Vector3, Vector3, Vector3]:
-    """Rotation matrix R_WB of a body, as its rows."""
+    """Rotation matrix R_WB of a body, as its rows. `state` is [q; v] of all bodies (13 bodies,)."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
@@ -113,10 +115,10 @@ def rotation(state: Table, body: int) -> tuple[Vector3, Vector3, Vector3]:
 
 @inlined
 def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
-    """Writes the positions after a time (s) to `moved` (13 bodies,).
+    """Writes the positions and quaternions of the bodies after a time (s) to `moved` (13 bodies,).
 
-    The bodies move from `state` with constant `velocities` (6 bodies,). Quaternions get the
-    length 1.
+    The bodies move from `state` with constant `velocities` (6 bodies,), which are not written to
+    `moved`. Quaternions get the length 1.
     """
     half = 0.5 * time
     for body in range(velocities.size // 6):
@@ -144,7 +146,8 @@ def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> No
 
 @inlined
 def put_orientation(state: Table, body: int, row: int, column: int, table: Table) -> None:
-    """Writes the inverse of a body's quaternion to four columns of a table."""
+    """Writes the inverse of a body's quaternion (w first) to four columns of a table, from `column`
+    on. turn_from() reads it."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
     scale = 1.0 / (w * w + x * x + y * y + z * z)
@@ -155,7 +158,8 @@ def put_orientation(state: Table, body: int, row: int, column: int, table: Table
 @inlined
 def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> Vector3:
     """Rotation vector (rad) in the world frame from an earlier orientation of a body to its present
-    one, to third order in the angle. put_orientation() has stored the earlier orientation."""
+    one in `state`, to third order in the angle. put_orientation() has stored the earlier
+    orientation in the table."""
     w, x, y, z = state[7 * body], state[7 * body + 1], state[7 * body + 2], state[7 * body + 3]
     i_w, i = table[row, column], vector_at(table, row, column + 1)
     turned = sum_of(sum_of(scaled(w, i), scaled(i_w, (x, y, z))), cross((x, y, z), i))
@@ -174,8 +178,8 @@ def angular_velocity(state: Table, body: int) -> Vector3:
 def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int, body: int
 ) -> Vector3:
-    """Acceleration (m/s²) of a node in the world frame. `acceleration` is dv/dt of the bodies, 6
-    numbers per body."""
+    """Acceleration (m/s²) in the world frame of a node that is fixed to `body`. `acceleration` is
+    dv/dt of all bodies, 6 numbers per body."""
     a = 6 * body
     w_x, w_y, w_z = angular_velocity(state, body)
     p_x, p_y, p_z = vector_at(nodes, node, P_BN_W)
@@ -190,8 +194,8 @@ def node_acceleration(
 
 @inlined
 def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> None:
-    """Sums the forces on the nodes to the generalized force (6 bodies,): [t_W; f_W] at each body's
-    origin, as in Drake's applied_generalized_force."""
+    """Sums the forces on the nodes, and writes torque and force [t_W; f_W] at each body's origin to
+    `generalized_force` (6 bodies,), as in Drake's applied_generalized_force."""
     for body in range(generalized_force.size // 6):
         torque = total = (0.0, 0.0, 0.0)
         for node in range(first_node[body], first_node[body + 1]):
@@ -247,7 +251,8 @@ def interpolate_state(before: Table, after: Table, step: float, part: float) -> 
 
 
 def rigid_motions(p: np.ndarray) -> np.ndarray:
-    """Velocities (points, 3, 6) of points p (points, 3) of a rigid body.
+    """Velocities (points, 3, 6) of points of a rigid body for six unit motions. `p` (points, 3) are
+    their positions in m.
 
     The six motions are rotations about x, y and z through the origin with 1 rad/s, then
     translations along x, y and z with 1 m/s.

@@ -32,7 +32,8 @@ class Bodies(NamedTuple):
 
 class Couplings(NamedTuple):
     """Pairs of bodies that cables join. The cables of a pair are consecutive. They run from the
-    first body, with the lower index, to the second body. Cables from fixed nodes come first."""
+    first body, with the lower index, to the second body. Cables from fixed nodes of the world come
+    before all pairs."""
 
     first: Table
     """Index of the first body of each pair (pairs,)."""
@@ -105,7 +106,9 @@ class Model(NamedTuple):
     ) -> Self:
         """Model with cables only, or with ground contact only.
 
-        It gives forces on nodes; the masses of its bodies are 0.
+        It gives forces on nodes; the masses of its bodies are 0. `p_BN` (nodes, 3) are positions of
+        the nodes (m) in the frames of their bodies, `first_node` (bodies + 1,) the index of each
+        body's first node. With `slack`, cables go slack instead of pushing.
         """
         bodies, none = first_node.size - 1, np.zeros(0)
         no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))

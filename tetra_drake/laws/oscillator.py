@@ -114,7 +114,8 @@ class Network(NamedTuple):
 
 
 def make_neurons(state: np.ndarray) -> np.ndarray:
-    """New table `neurons` of a network whose state (4n,) is u of all neurons, then v."""
+    """New table `neurons` (2n, 9) for the kernels, of a network whose state (4n,) is u of all
+    neurons, then v."""
     neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
     neurons[:, U], neurons[:, V] = state.reshape(2, -1)
     return neurons
@@ -122,17 +123,21 @@ def make_neurons(state: np.ndarray) -> np.ndarray:
 
 @inlined
 def steered_input(external_input: Real, turn: Table, side: Table) -> Table:
-    """Tonic input of a neuron for a turn, as in the steering of snakes (arXiv 2207.04899).
+    """Tonic input of a neuron for a turn, as in the steering of snakes (arXiv 2207.04899):
+    external_input (1 + turn side).
 
-    `side` is 1 on the left, -1 on the right, 0 for neither. Arguments are numbers or arrays.
+    `side` is 1 for a neuron on the left, -1 on the right, 0 for neither, so a positive `turn`
+    raises the input on the left. Arguments are numbers or arrays.
     """
     return external_input * (1.0 + turn * side)
 
 
 @compiled
 def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
-    """Writes the rates of u and v (Eq. 7; -u as in listing B.2).
+    """Writes the rates of inner state u and self-inhibition v, and the output y, to `neurons` (Eq.
+    7 of the thesis).
 
+    The sign of u in Eq. 7 is a misprint: du/dt has the term -u, as in the thesis's listing B.2.
     `inputs` (2n,) is the sum of tonic input u0 and feedback f.
     """
     count = neurons.shape[0]
@@ -149,7 +154,8 @@ def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
 
 @compiled
 def oscillator_output(neurons: Table, output: Table) -> None:
-    """Writes the outputs y_extensor - y_flexor (n,), with y = max(0, u) (Eq. 8 and 9)."""
+    """Writes the output y_extensor - y_flexor of each oscillator to `output` (n,), with y = max(0,
+    u) (Eq. 8 and 9 of the thesis)."""
     for k in range(output.size):
         extensor, flexor = neurons[2 * k, U], neurons[2 * k + 1, U]
         output[k] = maximum(extensor, 0.0) - maximum(flexor, 0.0)
@@ -157,7 +163,8 @@ def oscillator_output(neurons: Table, output: Table) -> None:
 
 @inlined
 def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """Integrates a network by one step (s) of the forward Euler method, as in listing B.1."""
+    """Integrates a network by one step (s) of the forward Euler method, as in listing B.1 of the
+    thesis. Updates `neurons`. `inputs` (2n,) are constant."""
     neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U] += step * neurons[i, U_RATE]
@@ -166,7 +173,8 @@ def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> N
 
 @inlined
 def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """Integrates a network by one step (s) of the classical Runge-Kutta method of order 4."""
+    """Integrates a network by one step (s) of the classical Runge-Kutta method of order 4. Updates
+    `neurons`. `inputs` (2n,) are constant."""
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
         neurons[i, U_SUM], neurons[i, V_SUM] = 0.0, 0.0
@@ -188,11 +196,13 @@ def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table
 def network_output(
     network: Network, inputs: Table, step: float, listing: bool, neurons: Table, output: Table
 ) -> None:
-    """Writes the outputs (samples, n) of a single network over time, one sample per step (s).
+    """Writes the outputs of a single network over time to `output` (samples, n), one sample per
+    step (s).
 
     `inputs` has a row (2n,) for each of the first steps. Later steps use its last row. With
     `listing`, the method is forward Euler, and sample i is the state after i + 1 steps, as in
-    listing B.1. Otherwise the method is Runge-Kutta, and sample i is the state after i steps.
+    listing B.1 of the thesis. Otherwise the method is Runge-Kutta, and sample i is the state after
+    i steps. `neurons` is the state at the start, and is updated.
     """
     last = inputs.shape[0] - 1
     for i in range(output.shape[0]):
@@ -206,8 +216,9 @@ def network_output(
 
 @inlined
 def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """First half of a step (s) of Heun's method (order 2): an Euler step. `inputs` are the inputs
-    at the beginning of the step."""
+    """First half of a step (s) of Heun's method (order 2): an Euler step that updates `neurons`.
+    `inputs` (2n,) are the inputs at the beginning of the step. correct_neurons() is the second
+    half."""
     neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
@@ -220,8 +231,9 @@ def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table)
 def correct_neurons(
     network: Network, inputs: Table, step: Real, accepted: Truth, neurons: Table
 ) -> None:
-    """Second half of a step of Heun's method. `inputs` are the inputs at the end of the step. Where
-    `accepted` is false, the neurons return to their values at the beginning of the step."""
+    """Second half of a step (s) of Heun's method, after predict_neurons(). `inputs` (2n,) are the
+    inputs at the end of the step. Where the step is not `accepted`, the neurons return to their
+    values at its beginning."""
     neuron_rates(network, inputs, neurons)
     half = 0.5 * step
     for i in range(neurons.shape[0]):

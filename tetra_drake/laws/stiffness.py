@@ -17,8 +17,8 @@ from tetra_drake.laws.struts import Axes, axes_of, vector_between
 
 
 class Springs(NamedTuple):
-    """Springs between points of two bodies, or of a body and the world. The motions of both bodies
-    add up to the displacements (k,) of a spring."""
+    """Springs between points of two bodies, or of a body and the world. A spring has k
+    displacements. They are sums of one part from each body's motion."""
 
     body_a: np.ndarray
     """Indices of the first bodies (springs,)."""
@@ -35,7 +35,7 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
     """Stiffness matrix (6 bodies, 6 bodies) of a robot on flat ground: N m, N and N/m.
 
     The displacement of a body is a rotation vector in rad, then a translation in m, in the world
-    frame. `forces` are the forces of a state without motion.
+    frame. `forces` are the forces of a state without motion, with all tables computed.
     """
     bodies = robot.bodies.mass.size
     carriers = np.full(len(robot.p_BN), WORLD)
@@ -68,7 +68,8 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
 
 
 def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """The cables as springs. A slack cable has no stiffness."""
+    """The cables as springs. A slack cable has no stiffness. `carriers` (nodes,) is the index of
+    each node's body, WORLD for fixed nodes."""
     cables, parts, nodes = robot.cables, forces.cable_forces, forces.nodes
     p_BN_W = nodes[:, kinematics.P_BN_W : kinematics.P_BN_W + 3]
     direction = parts[:, cable.DIRECTION : cable.DIRECTION + 3]
@@ -88,7 +89,8 @@ def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
 
 
 def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """Contacts with the ground, and anchors, as springs to the world."""
+    """Contacts with the ground, and anchors, as springs to the world. Contacts have no stiffness
+    along the ground. `carriers` (nodes,) is the index of each node's body."""
     ground, anchors = robot.ground, robot.anchors
     law = contact.NormalForce(*ground.normal)
     presses = forces.ground_forces[:, contact.NORMAL] > 0.0
@@ -101,8 +103,9 @@ def _supports(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
 
 
 def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """Contacts of struts as springs. A displacement (12,) is one of both ends of the first strut,
-    then of both ends of the second."""
+    """Contacts of struts as springs. A displacement (12,) has the motions (3,) of both ends of the
+    first strut, then of both ends of the second. `carriers` (nodes,) is the index of each node's
+    body."""
     near, struts, nodes = forces.near_struts, robot.struts, forces.nodes
     law = contact.NormalForce(*robot.strut_contact.normal)
     ends, stiffness = [], []
@@ -129,10 +132,11 @@ def _touching_struts(robot: Model, forces: Forces, carriers: np.ndarray) -> Spri
 def _stiffness_of_touch(
     touch: capsules.Touch, axes: Axes, reach: float, stiffness: float
 ) -> np.ndarray:
-    """Second derivatives (12, 12) of the energy of a contact of struts, with respect to the
-    displacements of their ends. `reach` (m) is the sum of the radii.
+    """Second derivatives (12, 12), in N/m, of the energy of a contact of struts, with respect to
+    the displacements of their ends.
 
-    Half the squared distance, D² / 2, is the minimum of a function of the positions s and t; see
+    `reach` (m) is the sum of the radii, `stiffness` (N/m) the one of the contact. Half the squared
+    distance, D² / 2, is the minimum of a function of the positions s and t along the axes; see
     laws.capsules. Its second derivatives are those at fixed positions, less what the positions gain
     as they move. A position at the end of a strut does not move.
     """

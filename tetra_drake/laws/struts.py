@@ -35,8 +35,9 @@ class Struts(NamedTuple):
 
 
 class Axes(NamedTuple):
-    """Geometry of two struts: vectors u and v along their axes, vector r from the start of the
-    second to the start of the first, and the scalar products of these vectors."""
+    """Geometry of two struts, in m: vectors u and v from start to end of their axes, vector r from
+    the start of the second to the start of the first, and scalar products of these vectors, such as
+    uv = u . v."""
 
     u: Vector3
     v: Vector3
@@ -50,7 +51,8 @@ class Axes(NamedTuple):
 
 @inlined
 def axes_of(struts: Struts, nodes: Table, i: int, j: int) -> Axes:
-    """Geometry of struts i and j; see Axes. `nodes` is the table of laws.kinematics."""
+    """Geometry of struts i and j; see Axes. `nodes` is the table with the positions of the nodes;
+    see laws.kinematics."""
     start_i = vector_at(nodes, struts.node_a[i], P_WN)
     start_j = vector_at(nodes, struts.node_a[j], P_WN)
     u = difference(vector_at(nodes, struts.node_b[i], P_WN), start_i)
@@ -63,7 +65,8 @@ def axes_of(struts: Struts, nodes: Table, i: int, j: int) -> Axes:
 @inlined
 def nearest_on_line(axes: Axes) -> Real:
     """Position along the first axis that is nearest to the line of the second: 0 at its start, 1 at
-    its end (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9)."""
+    its end (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9). Both axes count as
+    endless lines, so it may be below 0 or above 1."""
     uu_vv = axes.uu * axes.vv
     square_of_sine = maximum(uu_vv - axes.uv * axes.uv, _PARALLEL * uu_vv)
     return (axes.uv * axes.vr - axes.ur * axes.vv) / square_of_sine
@@ -73,9 +76,8 @@ def nearest_on_line(axes: Axes) -> Real:
 def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
     """Positions along both axes, 0 to 1, that are nearest to each other.
 
-    `s` is the position along the first axis that is nearest to the line of the second axis. If a
-    position is beyond the end of its strut, the end is used, and the point of the other strut that
-    is nearest to it.
+    The argument `s` is the result of nearest_on_line(). If a position is beyond the end of its
+    strut, the end is used, and the point of the other strut that is nearest to it.
     """
     t = share((axes.uv * share(s) + axes.vr) / axes.vv)
     return share((axes.uv * t - axes.ur) / axes.uu), t
@@ -83,13 +85,15 @@ def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
 
 @inlined
 def vector_between(axes: Axes, s: Real, t: Real) -> Vector3:
-    """Vector (m) from position t along the second axis to position s along the first."""
+    """Vector (m) from position t along the second axis to position s along the first. Positions are
+    0 at the start of an axis and 1 at its end."""
     return difference(sum_of(axes.r, scaled(s, axes.u)), scaled(t, axes.v))
 
 
 @inlined
 def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
-    """Distance (m) between the axes of two struts."""
+    """Distance (m) between the axes of struts i and j, from end to end. `nodes` is the table with
+    the positions of the nodes; see laws.kinematics."""
     axes = axes_of(struts, nodes, i, j)
     s, t = nearest_on_struts(axes, nearest_on_line(axes))
     between = vector_between(axes, s, t)
@@ -104,13 +108,15 @@ def share(x: Real) -> Real:
 
 @inlined
 def origin(state: Table, body: int) -> Vector3:
-    """Position of a body's origin (m)."""
+    """Position (m) of a body's origin in the world. `state` is [q; v] of all bodies (13
+    bodies,)."""
     return state[7 * body + 4], state[7 * body + 5], state[7 * body + 6]
 
 
 @inlined
 def midpoint(struts: Struts, nodes: Table, i: int) -> Vector3:
-    """Midpoint of a strut (m)."""
+    """Midpoint (m) of strut i in the world. `nodes` is the table with the positions of the
+    nodes."""
     p_WA, p_WB = vector_at(nodes, struts.node_a[i], P_WN), vector_at(nodes, struts.node_b[i], P_WN)
     return scaled(0.5, sum_of(p_WA, p_WB))
 
@@ -120,7 +126,7 @@ def may_be_nearer(offset: Vector3, reach: Real, least: Real) -> bool:
     """Quick test of two bodies or struts: False if they are surely farther apart than `least` (m).
 
     `offset` is the vector between their centres, `reach` (m) the sum of the radii of spheres around
-    them. The result is True if they may be nearer in at least one lane.
+    them. In SIMD lanes, one robot per lane, the result is True if they may be nearer in any lane.
     """
     bound = reach + least
     return any_lane(dot(offset, offset) <= MARGIN * bound * bound)
@@ -130,10 +136,12 @@ def may_be_nearer(offset: Vector3, reach: Real, least: Real) -> bool:
 def least_strut_distance(
     struts: Struts, radius: Table, first_node: Table, state: Table, nodes: Table, least: Real
 ) -> Real:
-    """Least distance (m) between struts of different bodies, or `least` if it is smaller.
+    """Least distance (m) between the axes of struts of different bodies, or `least` (m) if that is
+    smaller.
 
-    `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
-    laws.kinematics for a `state` (13 bodies,). `first_node` is Model.first_node.
+    `radius` (bodies,) are radii of spheres around the bodies. `state` is [q; v] (13 bodies,),
+    `nodes` the table of laws.kinematics for this state. `first_node` is the index of each body's
+    first node.
     """
     for first in range(radius.size):
         for second in range(first + 1, radius.size):

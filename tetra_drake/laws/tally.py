@@ -26,8 +26,8 @@ from tetra_drake.laws.struts import least_strut_distance
 
 
 class Effort(NamedTuple):
-    """Effort of the actuators. Integrals are over the steady stretch, summed over the actuators;
-    peaks are over all steps."""
+    """Effort of the actuators. Integrals are over the steady stretch, the part of the walk that
+    metrics judge, summed over the actuators; peaks are over all steps."""
 
     left: Annotated[Table, "cables"]
     """Length of each driven cable that is not wound, at the latest step, in m."""
@@ -51,7 +51,8 @@ class Effort(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """Sums and extremes over all steps of a simulation, which metrics are computed from."""
+    """Sums and extremes over all steps of a simulation, which metrics are computed from. Kernels
+    update them in place."""
 
     begins: Annotated[Table, 1]
     """Time (s) at which the steady stretch begins."""
@@ -77,8 +78,8 @@ class Tally(NamedTuple):
 
     @classmethod
     def of(cls, robot: Model, *, signals: int, begins: float) -> Self:
-        """The tally at the start of a simulation. `begins` (s) is the time at which the steady
-        stretch begins."""
+        """The tally at the start of a simulation. `signals` is the number of signals. `begins` (s)
+        is the time at which the steady stretch begins, the part of the walk that metrics judge."""
         tally = allocate(cls, sizes_of(robot) | {"signals": signals})
         tally.begins[0] = begins
         return tally
@@ -86,10 +87,10 @@ class Tally(NamedTuple):
 
 @inlined
 def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
-    """Adds a simulation step to the tally. It ends at `time` (s) with these signals and forces.
+    """Adds a simulation step to the tally. It ends at `time` (s) with these signals (N) and forces.
 
-    The first step, and a repeated step, take no time. A step counts if it takes time and is in the
-    steady stretch.
+    The first call, and a second one for the same time, add a step of duration 0. Sums take a step
+    only if it has a duration and is in the steady stretch.
     """
     duration = time - tally.time[0]
     takes_time = duration > 0.0
@@ -147,9 +148,11 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
 
 @inlined
 def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
-    """Updates the tally's least distance between struts for a state (13 bodies,).
+    """Lowers the tally's least distance between struts if they are nearer in a state [q; v] (13
+    bodies,).
 
-    It is too slow to be called at every step. `nodes` is the table of laws.kinematics.
+    It is too slow to be called at every step. `nodes` is the table of laws.kinematics for this
+    state.
     """
     radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]
     least = least_strut_distance(robot.struts, radius, first_node, state, nodes, least)
@@ -186,19 +189,21 @@ def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -
 
 
 def total(name: str) -> Callable[[Any], float]:
-    """Makes a function that reads a number of a Walk's tally, such as "effort.work"."""
+    """Makes a function that reads one number from the tally of a Walk (a simulation for metrics).
+    `name` is its path in Tally, such as "effort.work"."""
     number = operator.attrgetter(name)
     return lambda walk: number(walk.tally)[0]
 
 
 def mean(name: str) -> Callable[[Any], float]:
-    """Makes a function that divides a total of Effort by a Walk's steady time and number of
-    actuators."""
+    """Makes a function that divides a total of Effort, such as "impulse", by the steady time and
+    the number of actuators of a Walk (a simulation for metrics)."""
     return lambda walk: walk.per_actuator_time * getattr(walk.tally.effort, name)[0]
 
 
 def greatest(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
-    """Declares a metric that is a cost. Of several simulations its greatest value is recorded."""
+    """Declares a metric that is a cost, as a field of a dataclass; see metric(). Of several
+    simulations its greatest value is recorded."""
     return metric(unit, note, compute, most=True, is_cost=True, **more)
 
 

@@ -72,9 +72,10 @@ class SurfaceGrid(NamedTuple):
 
 @inlined
 def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, Real, Real]:
-    """Height (m) of the surface at x and y (m), and its gradient.
+    """Height (m) of the surface at x and y (m), and its gradient: dh/dx and dh/dy.
 
-    `heights` (points,) are the heights of the control points, row by row.
+    The surface is a quadratic B-spline. `heights` (points,) are the heights (m) of its control
+    points, row by row.
     """
     cells_x = (x - grid.corner_x) * grid.per_cell_x
     cells_y = (y - grid.corner_y) * grid.per_cell_y
@@ -102,8 +103,8 @@ def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
 
 @inlined
 def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real]:
-    """Value and derivative of a quadratic B-spline. `part` (-1/2 to 1/2) is the distance from the
-    control point `here`, in cells."""
+    """Value and derivative of a quadratic B-spline, from the values of three neighbouring control
+    points. `part` (-1/2 to 1/2) is the distance from the control point `here`, in cells."""
     less, more, rise, next_rise = 0.5 - part, 0.5 + part, here - before, after - here
     # Each sum has one product, so there is only one way to round a product and a sum together.
     value = here - 0.5 * less * less * rise + 0.5 * more * more * next_rise
@@ -114,9 +115,11 @@ def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Re
 def find_frames(
     nodes: Table, contacts: Table, grid: SurfaceGrid, heights: Table, frames: Table
 ) -> None:
-    """Writes the tangent frames of the ground at contact nodes to the table `frames`.
+    """Writes the gap to the ground and its tangent frame, below each contact node, to the table
+    `frames`.
 
-    `contacts` (contacts,) are the indices of the nodes. A node that is too high to touch the
+    `contacts` (contacts,) are the indices of the nodes, `nodes` the table with their positions.
+    `heights` are the heights of the surface's control points. A node that is too high to touch the
     highest control point gets the frame of level ground at that height.
     """
     for i in range(contacts.size):
@@ -144,7 +147,9 @@ def find_frames(
 
 @inlined
 def to_frame(vector: Vector3, frames: Table, i: int, flat: bool) -> Vector3:
-    """Components of a vector of the world frame along t1, t2 and n of a frame."""
+    """Components of a vector of the world frame along t1, t2 and n: tangents and normal of the
+    ground in row i of `frames`. If the ground is `flat`, they are the world's axes, and `frames` is
+    not used."""
     if flat:
         return vector
     x, y, z = vector
@@ -157,7 +162,8 @@ def to_frame(vector: Vector3, frames: Table, i: int, flat: bool) -> Vector3:
 
 @inlined
 def to_world(t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool) -> Vector3:
-    """Converts components along t1, t2 and n of a frame to a vector in the world frame."""
+    """Converts components along t1, t2 and n to a vector in the world frame. These are tangents and
+    normal of the ground in row i of `frames`; if it is `flat`, they are the world's axes."""
     if flat:
         return t_1, t_2, n
     return (
@@ -190,7 +196,7 @@ class Grid:
 
 
 class Relief(Section):
-    """Base class of the kinds of terrain."""
+    """Base class for the settings of terrain, which give the heights of the ground."""
 
     is_flat: ClassVar[bool] = False
     """True if h = 0 everywhere. The kernels are faster then."""
@@ -335,10 +341,12 @@ class Rough(Relief):
 
 
 class Obstacles(Relief):
-    """Round bumps, h = height max(0, 1 - (r / radius)^2). Where bumps overlap, the highest counts.
+    """Round bumps, h = height max(0, 1 - (r / radius)^2) at the distance r from a bump's centre.
+    Where bumps overlap, the highest counts.
 
     Each square of side `spacing` has one bump, at a random position. No bump reaches before
-    `start`. The grid lowers a bump's top by about an eighth.
+    `start`. The surface is smooth between grid points, which lowers a bump's top by about an
+    eighth.
     """
 
     place = "over obstacles"
@@ -401,15 +409,17 @@ Terrain = Annotated[Flat | Nothing | Incline | Steps | Rough | Obstacles | Heigh
 
 
 def _check_size(cell: tuple[float, float], scale: float, source: object, key: str) -> None:
-    """Raises InputError that names `key` if cells of this size are too many."""
+    """Raises InputError that names `key` if cells of this size (m) would be more than MOST_CELLS.
+    The generated area grows with the robot's `scale`."""
     if MOST_CELLS * cell[0] * cell[1] < scale**2 * (BEHIND + AHEAD) * 2.0 * ASIDE:
         problem = f"is too small: cells of {min(cell):.3g} m would be more than {MOST_CELLS}"
         raise InputError(source, f"terrain.{key}", problem)
 
 
 def _axes(cell: tuple[float, float], origin: float, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates x and y (rows, columns) of a grid that covers the generated area, with a spare
-    cell at each side. One x is `origin`."""
+    """Coordinates x and y (rows, columns) in m of a grid that covers the generated area, with a
+    spare cell at each side. The area grows with the robot's `scale`. A row of points lies at x =
+    `origin`."""
     first = math.floor((-scale * BEHIND - origin) / cell[0])
     last = math.ceil((scale * AHEAD - origin) / cell[0])
     aside = math.ceil(scale * ASIDE / cell[1]) + 1
