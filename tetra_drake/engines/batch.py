@@ -24,10 +24,12 @@ class Viewer(Protocol):
     """Display of a simulation while it runs."""
 
     def wants(self, time: float) -> bool:
-        """True if the viewer needs the state at this time (s)."""
+        """True if the viewer wants to show the robot at this time (s). It is asked after each
+        step."""
 
     def show(self, frame: xarray.Dataset) -> None:
-        """Shows one sample of a trajectory (see results.trajectory.make_dataset)."""
+        """Shows the robot. `frame` is a trajectory with a single sample; see
+        results.trajectory.make_dataset."""
 
 
 class Batch:
@@ -46,7 +48,8 @@ class Batch:
         """Number m of actuator signals of each robot."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
-        """Puts robots in the first places. Raises InputError if one does not fit."""
+        """Puts robots in the first places. Raises InputError if one differs too much from the first
+        robot; see begin()."""
         for place, robot in enumerate(robots):
             if not self.begin(place, robot):
                 problem = "a robot has another structure, kind of law, or size than the first"
@@ -55,8 +58,9 @@ class Batch:
     def begin(self, place: int, robot: DrivenRobot) -> bool:
         """Puts a robot at its start into a place of the batch.
 
-        Returns False if the robot is too different from the first one: it has another structure,
-        kind of law, or size.
+        Returns False, and changes nothing, if the robot differs too much from the first one of the
+        batch: it has another structure or kind of law, or needs larger tables, such as of terrain
+        heights.
 
         Raises InputError if the engine cannot simulate it, and SimulationFailure if it fails before
         its first step.
@@ -75,12 +79,13 @@ class Batch:
         Calls time_limit.check_time() often, which raises TimeBudgetExceeded.
 
         Args:
-            until: times (s), for each place (N,) or for all. A robot that has reached its time
-                pauses.
-            signals: signals (N, m) in N that controllers hold from now on. A change takes one
-                `cpg.listing_step`. A robot that pauses, or has a gait or a command, ignores them.
-            briefly: returns as soon as a robot has ended, or after some 30 ms. An engine without
-                lanes ignores it.
+            until: simulated times (s), for each place (N,) or for all. A robot that has reached its
+                time pauses.
+            signals: signals (N, m) in N that controllers hold from now on. They change linearly
+                from the old ones, within one `cpg.listing_step`. A robot that pauses, or has a gait
+                or a command, ignores them.
+            briefly: returns as soon as a robot has ended, or after some 30 ms of wall time. Engines
+                that simulate one robot after another ignore it.
 
         Raises:
             InputError: if an argument has another shape.
@@ -112,7 +117,8 @@ class Batch:
         raise NotImplementedError
 
     def copy(self, place: int, to: int) -> None:
-        """Replaces the robot in place `to` by a copy of the one in `place`."""
+        """Replaces the robot in place `to` by a copy of the one in `place`. Both continue
+        independently."""
         raise NotImplementedError
 
     def stop(self, place: int) -> float:
@@ -129,7 +135,8 @@ class LoneRobot(Protocol):
     """Wall time (s) that the simulation has taken."""
 
     def hold(self, signals: np.ndarray) -> None:
-        """Sets the actuator signals (m,) in N that hold from now on."""
+        """Sets the actuator signals (m,) in N that hold from now on. They change linearly from the
+        old ones, within one `cpg.listing_step`."""
 
     def advance_to(self, time: float) -> None:
         """Simulates to a time (s). Raises Diverged or StepBudgetExceeded."""
@@ -150,7 +157,8 @@ class SerialBatch(Batch):
     def __init__(
         self, start: Callable[[DrivenRobot], LoneRobot], robots: Sequence[DrivenRobot], places: int
     ) -> None:
-        """Starts robots in the first of the places, with the function `start`."""
+        """Starts each robot with the function `start`, in the first places. The other places are
+        idle."""
         super().__init__(robots[0].robot.structure, places)
         self._start = start
         self._robots: list[LoneRobot | None] = [None] * places
@@ -210,8 +218,9 @@ class SerialBatch(Batch):
 def checked_numbers(
     given: npt.ArrayLike, *shapes: tuple[int, ...], source: str, key: str
 ) -> np.ndarray:
-    """Converts an argument to real numbers (floats) of one of the given shapes. Raises InputError,
-    which names `source` and `key`, for anything else."""
+    """Converts an argument to real numbers (floats) of one of the given shapes. Raises InputError
+    for anything else. Its message names `source`, the class or function, and `key`, the
+    argument."""
     found = ""
     with contextlib.suppress(TypeError, ValueError):
         numbers = np.asarray(given)

@@ -65,8 +65,8 @@ class DrakeEngine(Engine):
 
 
 class _DiagramRobot(LoneRobot):
-    """Simulation of one robot in its own Drake diagram. If the robot has no gait, a system of the
-    diagram holds the given signals."""
+    """Simulation of one robot in its own Drake diagram. If the robot has no gait, the system
+    `controller` of the diagram holds the signals of a command or of a program."""
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self.driven, self._record, self._viewer = driven, record, viewer
@@ -192,9 +192,10 @@ class _DiagramRobot(LoneRobot):
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     """Drake's Simulator for a robot's diagram, with the integrator settings of the scenario.
 
-    The default target accuracy is half the least damping ratio of a cable, within limits. The
-    damping ratio c / (2 sqrt(k m)) is for the reduced mass m of the two bodies that the cable
-    joins. A structure without elastic cables has the finest accuracy.
+    If the scenario sets no target accuracy, it is half the least damping ratio of a cable, but at
+    least 2e-5 and at most 5e-3. The damping ratio c / (2 sqrt(k m)) is for the cable's damping c
+    and stiffness k, and the reduced mass m of the two bodies that it joins. A structure without
+    elastic cables has the finest accuracy.
     """
     structure = robot.structure
     is_elastic = structure.cables["stiffness"] > 0.0
@@ -245,22 +246,25 @@ class _Work:
 class _StepAimer:
     """Limits the next integrator step by the predicted time to the next change of contact mode.
 
-    | mode change             | longest step                                                    |
-    |-------------------------|-----------------------------------------------------------------|
-    | in max_step or later    | max_step                                                        |
-    | later than _NEAR        | _APPROACH of the time: over a long step the prediction is poor  |
-    | in _NEAR or sooner      | to just after it, but at least look_ahead                       |
-    | at the end of this step | _FIRST_STEP, which then grows: long steps mostly fail at first  |
+    A change is, for instance, that a node touches the ground. `max_step` and `look_ahead` are
+    settings of the engine, in s.
+
+    | predicted mode change   | longest step                                                     |
+    |-------------------------|------------------------------------------------------------------|
+    | in max_step or later    | max_step                                                         |
+    | later than 1 ms         | 0.8 of the time to it: over a long step the prediction is poor   |
+    | in 1 ms or sooner       | to just after it, but at least look_ahead                        |
+    | at the end of this step | 0.3 ms, which then grows: long steps mostly fail at first        |
 
     The prediction uses the mean acceleration of the last step, which costs nothing. The present
     acceleration is no better: the vibrations after a mode change decay at rates of 1e4 /s.
 
     A mode change also changes the Jacobian. The integrator would keep the old one as long as
     Newton's iterations converge, slowly and with an error of one sign. So we renew the Jacobian,
-    unless the next step is shorter than _RENEW_FROM.
+    unless the next step is shorter than 0.8 ms.
 
-    With any scheme, struts that approach limit the step, so that they cannot pass through each
-    other.
+    All this is for the scheme radau3 with `mode_changes: step_end`. With any scheme, struts
+    that approach limit the step, so that they cannot pass through each other.
     """
 
     def __init__(
@@ -284,14 +288,15 @@ class _StepAimer:
         self._jacobian_is_old = False
 
     def follow(self, other: _StepAimer) -> None:
-        """Copies the state of another aimer."""
+        """Copies the state of another aimer, so that this one continues from there."""
         self._last_time, self._last_velocities = other._last_time, other._last_velocities
         self._acceleration, self._longest = other._acceleration, other._longest
         self._jacobian_is_old = other._jacobian_is_old
         self._integrator.set_maximum_step_size(other._integrator.get_maximum_step_size())
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
-        """Limits the length of the next step. Call it after each step."""
+        """Limits the length of the next step. Call it after each step, with the bodies' velocities
+        (6 bodies,) at its end."""
         longest = self._settings.max_step
         if self._struts is not None:
             here = self._struts.GetMyContextFromRoot(context)

@@ -69,7 +69,8 @@ class Engine:
         return SerialBatch(start, robots, places or len(robots))
 
     def alone(self, robot: DrivenRobot, *, record: bool, viewer: Viewer | None) -> LoneRobot:
-        """A single robot at its start, for a SerialBatch. Raises the errors of start()."""
+        """Puts a single robot at its start, for a SerialBatch, which simulates one robot after
+        another. Raises the errors of start()."""
         raise NotImplementedError
 
     def simulate(

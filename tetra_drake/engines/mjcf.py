@@ -63,15 +63,15 @@ def check_mjcf(scenario: Scenario) -> None:
 def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = False) -> str:
     """MJCF text of a robot's MuJoCo model: a tendon for each cable and a motor for each driven one.
 
-    If actuators bear the whole tension, tendons have no law: a motor for each cable exerts its
+    If actuators bear the whole tension, tendons have no springs: a motor for each cable exerts its
     tension. Motors are in the order of their cables. A motor has the name of its oscillator; if
     this drives several cables, the name of the cable is added.
 
     Args:
         robot: the robot at its start.
-        rest: state (13 bodies,) of a key frame of this name.
-        own_laws: for an engine that computes contacts of struts by its own law, and tensions where
-            is_pulled() is true.
+        rest: state (13 bodies,) of a key frame with the name `rest`; None for no key frame.
+        own_laws: True for an engine that computes contacts of struts by its own law, and tensions
+            where is_pulled() is true. The model then leaves these to the engine.
 
     Raises:
         InputError: if MuJoCo does not know the terrain or the friction.
@@ -110,9 +110,11 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
 
 
 def is_pulled(robot: Robot) -> bool:
-    """True if MuJoCo's tendons cannot exert the tensions, so that this package computes them.
+    """True if MuJoCo's tendons cannot exert the tensions. Then this package computes them, and
+    motors exert them.
 
-    This is so if actuators have drives, if driven cables go slack, and with tendon_faults().
+    This is so if actuators have states of their own (winches and tension motors), if driven cables
+    go slack, or if tendon_faults() finds a cable.
     """
     structure = robot.structure
     faults = tendon_faults(structure.cables, slack=structure.slack).values()
@@ -121,7 +123,8 @@ def is_pulled(robot: Robot) -> bool:
 
 
 def loose_remark(robot: Robot) -> str:
-    """Remark on differences of MuJoCo's tendons and the robot's cables; see tendon_faults()."""
+    """Remark on differences of MuJoCo's tendons and the robot's cables, with the cables' names; ""
+    if there are none. See tendon_faults()."""
     structure, remarks = robot.structure, []
     if not robot.scenario.actuation.keeps_spring:
         return ""
@@ -133,7 +136,9 @@ def loose_remark(robot: Robot) -> str:
 
 
 def integrator_of(robot: Robot, *, pulled: bool) -> str:
-    """Name of MuJoCo's integrator for a robot: implicit, unless its tendons are damped.
+    """Name of MuJoCo's integrator for a robot: implicitfast, but Euler if its tendons are damped.
+
+    With `pulled`, motors exert the tensions, so that no tendon is damped; see is_pulled().
 
     The implicit integrators know how a damper's force on a body depends on this body's velocity,
     but not on the other body's. Damped tendons would brake the robot as if their other ends were
@@ -207,10 +212,12 @@ def _contact(robot: Robot, mass: float) -> dict:
 
 
 def _add_strut_contacts(model: Element, robot: Robot) -> None:
-    """Adds contacts between all struts of different bodies, with the least friction.
+    """Adds contacts between all struts of different bodies, with the least friction that MuJoCo
+    takes.
 
-    The damping of a contact is constant; the other engines' damping grows with depth. Both take the
-    same energy from a weakly damped impact at _IMPACT_SPEED between the middles of struts.
+    The damping of a contact is constant; the other engines' damping grows with depth. It is chosen
+    so that both take the same energy from a weakly damped impact at 1 m/s between the middles of
+    struts.
     """
     normal = NormalForce(*robot.model.strut_contact.normal)
     model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
@@ -252,8 +259,8 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
 
 
 def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
-    """Adds an actuator for each axis of an anchor, a spring with damping, and for each component of
-    a load, a constant force."""
+    """Adds MuJoCo actuators: one for each axis of an anchor, which holds a node by a damped spring,
+    and one for each component of a load, a constant force on a node."""
     actuators, anchors, loads = add_element(model, "actuator"), structure.anchors, structure.loads
     laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
     for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
@@ -266,10 +273,13 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
 def _add_push(
     actuators: Element, world: Element, name: str, place: np.ndarray, laws: np.ndarray
 ) -> None:
-    """Adds actuators that push a node along the axes of the world.
+    """Adds MuJoCo actuators that push a node along the axes of the world, one for each axis whose
+    law is not zero.
 
-    `name` is a word, a blank, and the name of the node. The three numbers of each law are a
-    constant force, and the force per displacement from the point `place` and per velocity.
+    `name` is "anchor" or "load", a blank, and the name of the node. `laws` (3, 3) has a row per
+    axis: a constant force (N), the force per displacement of the node from the world's point
+    `place` (3,) in N/m, and the force per velocity in N s/m. A spring and a damper have negative
+    numbers.
     """
     add_element(world, "site", name=name, pos=place)
     ends = {"site": name.partition(" ")[2], "refsite": name}

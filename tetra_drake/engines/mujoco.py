@@ -85,9 +85,9 @@ class MujocoEngine(Engine):
 def is_stable(robot: Robot, step: float) -> bool:
     """True if MuJoCo's steps (s) are stable for the springs and dampers of a robot at its start.
 
-    They are explicit for positions and cables, and stable if step^2 K + 2 step C < 4 M with the
-    stiffness K, the damping C and the mass M. So a damper c counts as a spring 2 c / step. All
-    cables count as taut. Anchors and struts that touch do not count.
+    The steps are explicit for positions and cables. They are stable if step^2 K + 2 step C < 4 M
+    with the stiffness K, the damping C and the mass M. So a damper c counts as a spring 2 c / step.
+    All cables count as taut. Anchors and struts that touch do not count.
     """
     from scipy.linalg import eigvalsh
 
@@ -211,7 +211,7 @@ class _MujocoRobot(LoneRobot):
         self.wall_time += perf_counter() - started
 
     def _signals_at(self, times: Array) -> Array:
-        """Signals (times, m) in N at times (s) after the latest pause."""
+        """Signals (times, m) in N at simulated times (s), none before the latest pause."""
         if not self._is_held:
             return self.driven.signals_at(times)
         change = self.driven.robot.scenario.cpg.listing_step
@@ -219,8 +219,9 @@ class _MujocoRobot(LoneRobot):
         return self._held - left * (self._held - self._before)
 
     def _stepped(self, rollout: Any, signals: Array) -> tuple[Array, Array]:
-        """MuJoCo's states (time, qpos, qvel) and the drives (steps, drives) after each step, with a
-        row of signals (steps, n) for each step."""
+        """Simulates one step for each row of signals (steps, m) in N, from the present state.
+        Returns the results after each step: MuJoCo's states (time, qpos, qvel), and the actuators'
+        states (steps, drives)."""
         mujoco, model, data = self._mujoco, self._model, self._data
         if not (self._pulled or self._touches):
             controls = np.zeros((len(signals), model.nu))  # 0 for anchors and loads
@@ -240,8 +241,9 @@ class _MujocoRobot(LoneRobot):
         return states, all_drives
 
     def _push(self, data: Any, signals: Array, drives: Array, step: float) -> None:
-        """Sets the forces between struts, and the controls for signals (n,) in N. Advances the
-        drives by a step (s)."""
+        """Writes the forces between struts, and the motors' controls for signals (m,) in N, to
+        MuJoCo's `data`. Advances the actuators' states `drives` (drives,) in place by a step
+        (s)."""
         if self._touches:
             velocity, force = data.qvel.reshape(-1, 6), np.empty(data.qvel.size)
             poses, turns = np.hstack([data.xquat, data.xpos])[1:], data.cvel[1:, :3]
@@ -267,7 +269,8 @@ class _MujocoRobot(LoneRobot):
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
     def _motion(self, times: Array, states: Array, signals: Array, drives: Array) -> Motion:
-        """Motion from MuJoCo's states at `times` (s), with MuJoCo's contact forces."""
+        """Motion from MuJoCo's states (rows) at `times` (s), with MuJoCo's contact forces.
+        `signals` are in N, `drives` are the actuators' states."""
         mujoco, model, data = self._mujoco, self._model, self._mujoco.MjData(self._model)
         ground, structure = self.driven.robot.ground, self.driven.robot.structure
         names = [structure.node_names[node] for node in structure.contacts]
@@ -334,10 +337,12 @@ def pull_cables(
     drives: Array,
     tensions: Array,
 ) -> None:
-    """Writes the cables' tensions (cables,) in N, by the law of the other engines. Advances the
-    states `drives` (drives,) of the actuators by a step (s).
+    """Writes the cables' tensions in N to `tensions` (cables,), by the law of the other engines.
 
-    `lengths` (cables,) are in m, their `rates` in m/s, `signals` (n,) in N.
+    Advances the states of the actuators `drives` (drives,) in place by a step (s).
+
+    `parts` has the robot's model. `lengths` (cables,) are in m, their `rates` in m/s, positive if a
+    cable becomes longer. `signals` (m,) are in N.
     """
     robot, _ = unpacked(parts)
     drive, table = 0, np.zeros((drives.size, DRIVE_COLUMNS))

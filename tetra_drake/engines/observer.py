@@ -27,7 +27,8 @@ TallyParts: TypeAlias = Packed[tuple[Model, Tally, Forces]]
 
 
 class Observer:
-    """Sums over the steps of a simulation, such as work and lifted time, from its states.
+    """Sums over the steps of a simulation, such as the actuators' work and the time that bodies are
+    off the ground, from its states.
 
     States are added in the order of time, beginning at t = 0. Observing does not change the
     simulation.
@@ -46,8 +47,9 @@ class Observer:
     def add(
         self, times: np.ndarray, states: np.ndarray, signals: np.ndarray, drives: np.ndarray
     ) -> None:
-        """Adds states (k, 13 bodies), signals (k, m) in N, and drives (k, drives) at times (k,) in
-        s to the tally."""
+        """Adds the steps that end at `times` (k,) in s to the tally. At the ends, the bodies have
+        `states` (k, 13 bodies), the signals (k, m) are in N, and the actuators have the states
+        `drives` (k, drives)."""
         self._observe(self._parts, times, states, signals, drives)
 
 
@@ -55,11 +57,14 @@ class Observer:
 def observe_states(
     parts: TallyParts, times: Table, states: Table, signals: Table, drives: Table
 ) -> None:
-    """Adds states (k, 13 bodies), signals (k, m) and drives (k, drives) at times (k,) in s to the
-    tally.
+    """Adds steps of a simulation to the sums in the tally of `parts`; see Observer.add().
 
-    The tally does not depend on friction modes. The clearance is computed for each CLEARED-th
-    state, and for the last.
+    The steps end at `times` (k,) in s. At the ends, the bodies have `states` (k, 13 bodies), the
+    signals (k, m) are in N, and the actuators have the states `drives` (k, drives). The forces are
+    computed again from these numbers; the tally does not need to know which nodes stick.
+
+    The least distance between struts is slow to compute. So it is computed only for each 16th of
+    the k states, and for the last.
     """
     robot, tally, forces = unpacked(parts)
     modes = np.zeros((robot.ground.contacts.size, MODE_COLUMNS))

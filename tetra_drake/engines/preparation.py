@@ -37,7 +37,8 @@ def prepare(tell: Callable[[], None] = lambda: None) -> None:
     It takes half a minute on two cores: a second process compiles the kernel of the lanes.
 
     Args:
-        tell: function that is called for each compiled function, about FUNCTIONS times.
+        tell: function without arguments that is called for each compiled function, to show the
+            progress: about FUNCTIONS (380) times.
     """
     program = f"from {__name__} import *; compile_lanes(lambda: print(end='.', flush=True))"
     lanes: list[subprocess.Popen[bytes]] = []
@@ -59,13 +60,15 @@ def prepare(tell: Callable[[], None] = lambda: None) -> None:
 
 
 def compile_lanes(tell: Callable[[], None]) -> None:
-    """Compiles the kernel of the compiled engine."""
+    """Compiles the kernel of the engine `compiled`, which simulates robots in SIMD lanes. Calls
+    `tell` after each compiled function."""
     with event.install_listener("numba:compile", _Count(tell)):
         _prepare_engine("thesis", {"engine": "!Compiled"})
 
 
 def compile_others(tell: Callable[[], None]) -> None:
-    """Compiles the kernels without lanes."""
+    """Compiles the kernels of single robots, for the other engines. Calls `tell` after each
+    compiled function."""
     with event.install_listener("numba:compile", _Count(tell)):
         witness = "!Drake {scheme: runge_kutta3, mode_changes: witness}"
         _prepare_engine("feedback", {"engine": witness})

@@ -74,9 +74,9 @@ class SimulationQueue:
     ) -> list[Future[SimulationResult]]:
         """Queues gaits or commands with their scenarios. Returns futures of the results.
 
-        A future raises the same errors as simulate(), and TimeBudgetExceeded if the simulation
-        takes longer than `time_budget` (s), on an engine with lanes. Callbacks of futures run in
-        the threads of the queue.
+        A future raises the same errors as simulate(). On the compiled engine it raises
+        TimeBudgetExceeded if the simulation takes longer than `time_budget` (s of wall time); other
+        engines ignore the budget. Callbacks of futures run in the threads of the queue.
         """
         jobs = [_Job(scenario, driver, time_budget) for scenario, driver in drivers]
         with self._changed:
@@ -125,7 +125,8 @@ class SimulationQueue:
 
 @dataclass
 class _Crew:
-    """Simulations of one thread of the queue: a batch, and the jobs that it simulates."""
+    """Simulations of one thread of the queue: a batch of robots, and the jobs that it simulates. A
+    job is a gait or a command on a scenario, with the future of its result."""
 
     driven: Callable[[_Job], DrivenRobot]
     """Function that makes the robot of a job."""
@@ -138,8 +139,9 @@ class _Crew:
     batch: Batch | None = None
 
     def begin(self, job: _Job) -> bool:
-        """Puts a job into an idle place of the batch. Returns False if it must wait until all
-        places are idle."""
+        """Puts a job into an idle place of the batch. Returns False if its robot does not fit the
+        others: then it must wait until all places are idle. If the job cannot start, its future
+        gets the error."""
         try:
             robot, engine = self.driven(job), engine_of(job.scenario)
             if self.batch and engine is self.engine and self.batch.begin(self.idle[0], robot):
@@ -157,7 +159,8 @@ class _Crew:
         return True
 
     def advance(self) -> None:
-        """Simulates for a short time, and removes finished jobs."""
+        """Simulates until a robot has ended, or for some 30 ms of wall time. Sets the futures of
+        finished jobs and removes these jobs."""
         batch = self.batch
         if batch is None or not self.jobs:
             return

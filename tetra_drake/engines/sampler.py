@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 class Sampler:
-    """Samples of a simulation at given times, where no step has to end.
+    """Samples of a simulation at given times. The integrator's steps need not end at these times.
 
-    States are interpolated within a step; modes are those at its end. Samples are taken in a
-    context of their own. So recording does not change the simulation.
+    States are interpolated within a step; contact modes are taken at its end. Samples are evaluated
+    in a Drake context of their own. So recording does not change the simulation.
     """
 
     def __init__(self, diagram: Diagram, times: np.ndarray, *, max_step: float) -> None:
@@ -38,7 +38,7 @@ class Sampler:
         self._samples, self._latest = other._samples.copy(), other._latest
 
     def after_step(self, context: Context) -> None:
-        """Takes the samples within the step that has just ended."""
+        """Takes the samples within the step that has just ended. `context` is the simulator's."""
         due = self._times[len(self._samples) :]
         end = context.get_time()
         if due.size == 0 or due[0] > end + self._ahead:
@@ -85,7 +85,8 @@ def frame_of(robot: Robot, diagram: Diagram, context: Context) -> xarray.Dataset
 
 
 def drives_at(diagram: Diagram, context: Context) -> np.ndarray:
-    """States of the actuators (drives,) of a robot's diagram in a context; empty without states."""
+    """States of the actuators (drives,) of a robot's diagram in a context; empty if its actuators
+    have no states."""
     if not diagram.HasOutputPort("drives"):
         return np.zeros(0)
     drives: np.ndarray = diagram.GetOutputPort("drives").Eval(context)

@@ -54,7 +54,7 @@ def simulate(
         record: records the trajectory.
         viewer: observer that shows the robot during the simulation.
         steering: the turn, -1 to 1, in place of the gait's turn; or a function from time (s) to the
-            turn.
+            turn. A positive turn gives the left oscillators more input, the right ones less.
 
     Raises:
         Diverged, StepBudgetExceeded: if the simulation fails; they have the time and the reason.

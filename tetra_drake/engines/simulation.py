@@ -46,9 +46,9 @@ class Simulation:
     Each driven cable has an action: the setpoint of its actuator, by the kind of `actuation`. It is
     a force (N) of !Force, a free length (m) of a !Winch, a tension (N) of a !TensionMotor. The
     order is the same as in `robot.driven`, oscillator by oscillator. An action is held for a
-    control period. Like a sample of a command, it begins with a linear change that takes one
-    `cpg.listing_step`; the first action acts from the start on. There is no network and no start-up
-    time. On all engines, steps with the samples of a command give the motion of
+    control period. Like a sample of a command, it begins with a linear change from the last action
+    that takes one `cpg.listing_step`; the first action acts from the start on. There is no network
+    and no start-up time. On all engines, steps with the samples of a command give the motion of
     simulate(command=...), if each sample differs from the one before.
 
     One thread at a time may use a simulation. If a step is interrupted, as by Ctrl-C, reset() puts
@@ -240,7 +240,8 @@ class Simulation:
     @contextlib.contextmanager
     def _used(self, method: str, *, is_whole: bool | None = None) -> Iterator[None]:
         """Context manager: this thread alone uses the robots. Raises InputError, which names
-        `method`, if another thread does, or if a step of them was interrupted."""
+        `method`, if another thread does, or if a step was interrupted. After that only a reset of
+        all robots is allowed: it passes `is_whole` True."""
         if not self._owner.acquire(blocking=False):
             problem = "another thread uses these robots; give each thread its own Simulation"
             raise InputError("Simulation", method, problem)
@@ -257,7 +258,8 @@ class Simulation:
         return DrivenRobot(robot=robot, name=self._name, samples=samples)
 
     def _time_after(self, steps: np.ndarray) -> np.ndarray:
-        """Time (N,) in s after a number of control periods (N,), at most the duration."""
+        """Time (N,) in s that robots have reached after a number of control periods (N,), at most
+        the duration."""
         step, duration = self.scenario.cpg.listing_step, self.scenario.simulation.duration
         times = (step * (self._listing_steps * steps)).round(MARK_DECIMALS)
         return np.where(times > duration - 0.5 * step, duration, times)
@@ -281,15 +283,17 @@ def is_list(values: object) -> TypeGuard[Sequence[Any]]:
 
 
 def checked_actions(actions: npt.ArrayLike, shape: tuple[int, ...], *, source: str) -> np.ndarray:
-    """Actions of a shape (N, actions); of a single robot also (actions,). Raises InputError, which
-    names `source`, if they have another shape, or are not real numbers."""
+    """Converts actions to an array of `shape` (N, actions); for a single robot they may be
+    (actions,). Raises InputError, which names `source`, if they have another shape, or are not real
+    numbers."""
     least = shape[1:] if shape[0] == 1 else shape
     return checked_numbers(actions, least, shape, source=source, key="actions").reshape(shape)
 
 
 def _listing_steps(period: float | None, scenario: Scenario) -> int:
-    """Length of a control period (s), by default the scenario's, in steps of `cpg.listing_step`.
-    Raises InputError unless it is a whole number."""
+    """Number of steps of `cpg.listing_step` in a control period (s), by default the scenario's.
+    Raises InputError unless it is a whole number, or if the period is longer than the
+    simulation."""
     source, key, step = "Simulation", "control_period", scenario.cpg.listing_step
     if period is None:
         period = scenario.simulation.control_period

@@ -84,7 +84,7 @@ def inlined(function: F) -> F:
 
 
 def machine_code(kernel: F, *arguments: object) -> F:
-    """Machine code of a kernel for arguments of the given types.
+    """Machine code of a kernel for arguments of the same types as `arguments`.
 
     A call does not check types: with other types it fails or computes nonsense.
     """
@@ -173,7 +173,7 @@ def _seal(key: str, content: bytes) -> bytes:
 
 
 def announce(kept: bool) -> None:
-    """Logs that kernels are being compiled, at most once in _MINUTE. `kept` is True if the machine
+    """Logs that kernels are being compiled, at most once in a minute. `kept` is True if the machine
     code will be cached."""
     global _told
     if time.monotonic() < _told + _MINUTE:

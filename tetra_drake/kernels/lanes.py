@@ -133,7 +133,9 @@ def _operator(
     over: type = Lanes,
     to: type = Lanes,
 ) -> None:
-    """Registers an operator of the type `over` with numba. One of two operands may be a scalar."""
+    """Registers functions of the module operator with numba, by their `names`. Operands have the
+    type `over`, but one of two may be a scalar; the result has the type `to`. `emit` writes the
+    LLVM instruction."""
 
     def generic(self: Any, args: tuple[Any, ...], kws: Any) -> Any:
         vector: Any = next((kind for kind in args if type(kind) is over), None)
@@ -183,7 +185,8 @@ def _call(builder: Any, name: str, x: Any) -> Any:
 
 
 def _llvm_function(name: str) -> Any:
-    """An LLVM function of one number, for kernels."""
+    """Function for kernels that calls an LLVM function of one number or one vector, such as
+    llvm.sqrt."""
 
     @_intrinsic
     def function(context: Any, x: types.Type) -> Any:
@@ -199,7 +202,7 @@ overload(abs)(lambda x: (lambda x: _abs(x)) if isinstance(x, Lanes) else None)
 
 
 def floor(x: Real) -> Real:
-    """Rounds down to a whole number."""
+    """Largest whole number that is not above x, as a float or in lanes."""
     return float(np.floor(x))
 
 
@@ -293,8 +296,8 @@ overload(inverse_sqrt)(lambda x: _inverse_sqrt_by_newton)
 
 
 def gather(numbers: Table, index: Real, offset: int) -> Real:
-    """Reads numbers[index + offset], with an own index for each lane. `numbers` (size,) has no
-    lanes; an index is a whole number."""
+    """Reads numbers[index + offset], with a separate index for each lane. `numbers` (size,) has no
+    lanes. `index` has whole numbers as floats."""
     return numbers[int(index) + offset]
 
 
@@ -324,7 +327,8 @@ overload(gather)(
 
 
 def named(kind: type[NamedTupleT], table: Table) -> NamedTupleT:
-    """Converts a table of numbers to a NamedTuple, in the order of its fields."""
+    """Converts the rows of a table (fields, ...) to a NamedTuple of the class `kind`, in the order
+    of its fields."""
     return kind(*table)
 
 
@@ -363,10 +367,10 @@ class Field(types.Type):
 class FieldArray:
     """Wrapper that passes a contiguous array to kernels, which see a Field.
 
-    With `width`, the last axis of the array is the lanes.
+    With `width`, the last axis of the array has this length: it is the lanes of a number.
 
-    Numbers are float64, or int64 without lanes. The type fixes all lengths but the first, or none
-    with `any_size`. Raises ValueError for another array.
+    Numbers are float64, or int64 without lanes. The numba type fixes all lengths but the first, or
+    none with `any_size`. Raises ValueError for another array.
     """
 
     def __init__(
@@ -430,7 +434,8 @@ def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
 
 
 def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> Any:
-    """Pointer to a number of a field. The flag nsw promises arithmetic without overflow."""
+    """Emits the address of field[index]. The flag nsw promises LLVM that the arithmetic does not
+    overflow."""
     indices = [index] if len(kind.lengths) == 1 else cgutils.unpack_tuple(builder, index)
     lengths = _lengths(context, builder, kind, value)
     offset = indices[0]

@@ -83,7 +83,8 @@ def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
 
 
 def write_tables(to: NamedTupleT, source: NamedTupleT) -> None:
-    """Copies the numbers of a NamedTuple of tables to another one with tables of equal shapes."""
+    """Copies the numbers of `source` into the tables of `to`, in place. Both are NamedTuples of
+    tables of equal shapes."""
     for ours, theirs in zip(to, source, strict=True):
         if isinstance(ours, tuple):
             write_tables(ours, theirs)
@@ -110,7 +111,7 @@ _kind = functools.cache(PackedKind)  # numba needs longer to make a type than to
 
 
 def _words(kind: types.Type) -> int:
-    """Number of words of a value."""
+    """Number of 64-bit words of a packed value of this numba type."""
     if isinstance(kind, PackedKind):
         return kind.words
     return 1 + len(kind.lengths) if isinstance(kind, Field) else 1
@@ -176,7 +177,7 @@ class _Attributes(AttributeTemplate):
 
 
 def _member(context: Any, builder: Any, packed: PackedKind, words: Any, place: int) -> Any:
-    """Emits code that reads a member of packed values."""
+    """Emits code that reads member number `place` of packed values. `words` is their address."""
     kind: Any = packed.members[place]
     first = sum(map(_words, packed.members[:place]))
 

@@ -236,7 +236,8 @@ class LaneThread:
         heights: np.ndarray,
         readings: Readings,
     ) -> None:
-        """Makes lanes for robots like `first`. All threads share the tables of the places."""
+        """Makes lanes for robots like `first`. The other arguments are tables with a row per robot,
+        which all threads share; `heights` (places, heights) of the terrains are in m."""
         width = processor_lanes()
         self._lane_places = np.zeros_like(log.place)
         self._queue, self._waiting = np.zeros_like(places.queue), np.zeros_like(places.waiting)
@@ -285,7 +286,7 @@ class LaneThread:
         """Simulates until all robots have ended or paused. With `briefly` it returns earlier; see
         Batch.advance().
 
-        The wall time (s) is divided equally among the robots and added to `wall_times`.
+        The wall time (s) is divided equally among the robots and added to `wall_times` (places,).
         """
         while robots := [*self._lane_places[self._status == loop.RUNNING], *self.waiting]:
             started = time.perf_counter()

@@ -56,9 +56,11 @@ class Solver(NamedTuple):
 
 @inlined
 def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table) -> None:
-    """Writes the accelerations (6 bodies,) of bodies under forces (6 bodies,).
+    """Writes the accelerations of bodies under forces `force` (6 bodies,) to `acceleration` (6
+    bodies,).
 
-    `inertia_W` is Forces.inertia.
+    Each body has 6 numbers, rotation before translation, in the world frame. `inertia_W` is
+    Forces.inertia: the inertia of each body about the world's axes.
     """
     for body in range(force.size // BLOCK):
         i = BLOCK * body
@@ -75,9 +77,11 @@ def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table
 
 @inlined
 def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tuple[Real, ...]:
-    """Momentum of a body: its mass matrix times its velocity, part of `velocity` (6 bodies,).
+    """Momentum of body number `body`: its mass matrix times its velocity, part of `velocity` (6
+    bodies,).
 
-    `inertia_W` is Forces.inertia.
+    Each body has 6 numbers, rotation before translation, in the world frame. `inertia_W` is
+    Forces.inertia: the inertia of each body about the world's axes.
     """
     i, mass = BLOCK * body, robot.bodies.mass[body]
     if robot.isotropic:
@@ -101,11 +105,12 @@ def implicit_matrix(
     lines: Table,
     blocks: Table,
 ) -> None:
-    """Writes the implicit matrix: mass matrix + time * damping matrix + time² * stiffness of
-    contacts and anchors.
+    """Writes the implicit matrix of a step to `blocks`: mass matrix + time * damping matrix + time²
+    * stiffness of contacts and anchors.
 
-    `blocks` has the form of sparse; `time` is in s. The damping of cables, normal forces and
-    stiction makes the equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
+    `blocks` (blocks, 6, 6) has a block per body and per pair of coupled bodies; see module sparse.
+    `time` is in s, a share of the step. The damping of cables, normal forces and stiction makes the
+    equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
     """
     for body in range(robot.bodies.mass.size):
         for r in range(BLOCK):
@@ -164,13 +169,16 @@ def add_cables(
     lines: Table,
     blocks: Table,
 ) -> None:
-    """Adds the damping of a pair's cables to the implicit matrix, as time * damping * l lᵀ.
+    """Adds the damping of a pair's cables to the implicit matrix `blocks`, as time * damping * l
+    lᵀ.
 
-    The cables are at most CABLES_AT_ONCE, from cable `first` on.
+    `pair` is the number of a pair of bodies that cables join. At most CABLES_AT_ONCE (6) of its
+    cables are added, from cable `first` on. `time` is in s; `lines` is scratch memory, a row per
+    cable.
 
     The 12 numbers of l, times the velocities of both bodies, are the rate of the cable's length.
-    With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and
-    w = p_b x d. The sum over cables is a product of two columns of `lines`.
+    With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and w =
+    p_b x d. The sum over cables is a product of two columns of `lines`.
     """
     last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
     for j in range(CABLES_AT_ONCE):
@@ -216,9 +224,9 @@ def add_cables(
 
 @inlined
 def put(value: Real, adds: bool, block: int, r: int, c: int, blocks: Table) -> None:
-    """Writes a number to a block, or adds it if `adds`.
+    """Writes a number to row r and column c of a block, or adds it to the number there if `adds`.
 
-    If all blocks were set to zero first, a step would take 2 to 5 % longer.
+    If all blocks were set to zero first, to add only, a step would take 2 to 5 % longer.
     """
     if adds:
         blocks[block, r, c] += value
@@ -233,7 +241,7 @@ Column = tuple[Real, Real, Real, Real, Real, Real]
 
 @inlined
 def column(lines: Table, c: int) -> Column:
-    """Column c of `lines`."""
+    """Column c of `lines` (6, LINE_COLUMNS): a number for each of 6 cables."""
     return lines[0, c], lines[1, c], lines[2, c], lines[3, c], lines[4, c], lines[5, c]
 
 
@@ -259,9 +267,10 @@ def add_contact(
     time: Real,
     blocks: Table,
 ) -> None:
-    """Adds the contact of a foot to the implicit matrix, in lanes where the foot touches.
+    """Adds the contact of a foot to the implicit matrix `blocks`, in lanes where the foot touches.
 
-    The contact is time * damping + time² * stiffness.
+    The foot is contact node number `i`. The contact is time * damping + time² * stiffness, `time`
+    in s.
     """
     nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
     touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
@@ -289,10 +298,10 @@ def add_contact(
 def add_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], blocks: Table
 ) -> None:
-    """Adds Jᵀ diag(k_x, k_y, k_z) J of a node to the diagonal block of its body.
+    """Adds Jᵀ diag(k_x, k_y, k_z) J of a node to its body's block of the implicit matrix.
 
-    The node is at p from the body's origin. J = [-[p]x 1] gives the node's velocity from the
-    body's.
+    `node` is a row of `nodes`; `k` is along the world's axes. The node is at p from the body's
+    origin. J = [-[p]x 1] gives the node's velocity from the body's.
     """
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     k_x, k_y, k_z = k
@@ -317,7 +326,8 @@ def add_diagonal(
 def add_off_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], blocks: Table
 ) -> None:
-    """Adds Jᵀ K J of a node to its body's block, for the symmetric matrix K of k_xy, k_xz and k_yz.
+    """Adds Jᵀ K J of a node to its body's block of the implicit matrix. `k` is k_xy, k_xz and k_yz,
+    the elements of the symmetric matrix K beside its diagonal, which is 0 here.
 
     For J see add_diagonal().
     """

@@ -103,7 +103,8 @@ class Constants(NamedTuple):
 class LaneState(NamedTuple):
     """State of the simulations in the lanes, with scratch memory.
 
-    The numbers before `step.end` are the state of a simulation; see places.Places.
+    The fields before `step.end` are the whole state of a simulation. Only they are kept while a
+    robot waits for a lane; see places.Places.
     """
 
     clock: Annotated[Table, CLOCK_ROWS]
@@ -163,7 +164,12 @@ class Log(NamedTuple):
 
 @merged
 def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
-    """Tries a step in all lanes. Returns True if a simulation has ended."""
+    """Tries one step in each lane, with a length of its own. A lane whose error is too large stays
+    where it is, and plans a shorter step.
+
+    `live` is True if the network is integrated together with the robot; otherwise signals are
+    samples. Returns True if a simulation has reached its pause or has failed.
+    """
     clock, ended = lanes.clock, False
     if any_lane((clock[STATUS] == RUNNING) & (clock[TIME] >= clock[MARK])):
         if not live:
@@ -217,7 +223,8 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
 
 @inlined
 def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
-    """Writes the signals at the end of the step. For a live network they are a prediction."""
+    """Writes the signals (N) at the end of the step to `lanes.end_signals`. For a live network,
+    integrated together with the robot, they are a prediction."""
     clock = lanes.clock
     if live:
         feel(constants, lanes, log, clock[TIME], lanes.step.state)
@@ -232,7 +239,8 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
 
 @inlined
 def move_on(lanes: LaneState, is_running: Truth, accepted: Truth) -> None:
-    """Copies the end of the step to the state, in lanes that accept the step."""
+    """Copies the end of the step to the state, in lanes that accept the step. Counts the steps,
+    tried in lanes that run and taken in lanes that accept."""
     clock, state = lanes.clock, lanes.step.state
     for i in range(state.size):
         state[i] = select(accepted, lanes.step.end[i], state[i])
@@ -248,9 +256,10 @@ def move_on(lanes: LaneState, is_running: Truth, accepted: Truth) -> None:
 
 @merged
 def aim(constants: Constants, lanes: LaneState) -> Real:
-    """Length (s) of the step to try: the planned one, or less. A near mode change or mark shortens
-    it: the step ends just after the mode change, at the mark, or halfway to the mark. Near struts
-    that approach shorten it so that they cannot pass through each other."""
+    """Length (s) of the step to try: as planned from the error of the last step, or less. A near
+    mode change or mark (a time at which a step must end) shortens it: the step ends just after the
+    mode change, at the mark, or halfway to the mark. Near struts that approach shorten it so that
+    they cannot pass through each other."""
     robot, clock = constants.robot, lanes.clock
     accelerate(robot, lanes.forces.inertia, lanes.step.force, lanes.acceleration)
     planned = clock[PLANNED]
@@ -267,7 +276,8 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def fate(constants: Constants, lanes: LaneState) -> Real:
-    """Status of each lane after a step: running or failed. Only lanes that run use it."""
+    """Status of each lane after a step: RUNNING, or the kind of its failure. It has no meaning in
+    lanes that do not run."""
     state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):
@@ -282,7 +292,8 @@ def fate(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> None:
-    """Runs the listing's networks until every running lane has the samples around a time (s).
+    """Integrates the networks of the thesis's listing ahead of the robots, until every running lane
+    has the samples of its signals before and after the time `until` (s).
 
     Other lanes run too, as far as their ring buffers allow. So steps for a single lane are rare.
     """
@@ -310,7 +321,8 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
 
 @inlined
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
-    """Writes the inputs of a live network at a time (s): the tonic input and the feedback."""
+    """Writes the inputs of a live network to `lanes.inputs`: tonic input and feedback. They are for
+    the robot's `state` (13 bodies,) at a time (s)."""
     steer(constants, lanes, log, time / constants.period[0])
     sense(constants.senses, constants.gains, state, lanes.modes, lanes.forces, lanes.inputs)
     for i in range(lanes.inputs.size):
@@ -319,9 +331,10 @@ def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Ta
 
 @inlined
 def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> None:
-    """Writes the tonic input of the neurons for the present steering, if the steering varies.
+    """Writes the tonic input of the neurons to `lanes.tonic`, for the steering at `sample`. Does
+    nothing if the steering is constant.
 
-    `sample` is a position in the table of turns: an index with a fraction.
+    `sample` is a position in `log.turns`, the steering over time: an index with a fraction.
     """
     turns = log.turns.shape[1]
     if turns == 1:
@@ -340,7 +353,8 @@ def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> Non
 
 @inlined
 def drive(constants: Constants, lanes: LaneState) -> None:
-    """Writes the signals (N) of a live network at the end of the step."""
+    """Writes the signals (N) of a live network at the end of the step to `lanes.end_signals`: the
+    gain times the oscillators' outputs, but 0 before the start-up time."""
     oscillator.oscillator_output(lanes.neurons, lanes.output)
     active, gain = lanes.clock[ACTIVE] != 0.0, constants.gain[0]
     for k in range(lanes.output.size):
@@ -351,7 +365,9 @@ def drive(constants: Constants, lanes: LaneState) -> None:
 def interpolate(
     constants: Constants, lanes: LaneState, log: Log, lane: int, time: float, signals: Table
 ) -> None:
-    """Writes the listing's signals of a lane at a time (s) to `signals` (n, W), in N."""
+    """Writes the signals of one lane at a time (s) to its column of `signals` (m, W), in N. They
+    are linear between samples: of the listing's network, a command or a controller. They are 0
+    before the start-up time."""
     if by_lane(lanes.clock)[ACTIVE, lane] == 0.0:
         for k in range(signals.shape[0]):
             signals[k, lane] = 0.0
@@ -369,15 +385,18 @@ def interpolate(
 
 @inlined
 def row_of(sample: int, log: Log) -> int:
-    """Row of a sample in the ring buffer: its index modulo the number of rows, a power of two."""
+    """Row of sample number `sample` of the signals in the ring buffer `log.recent`: the number
+    modulo the rows, a power of two."""
     return sample & (log.recent.shape[1] - 1)
 
 
 @merged
 def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
-    """Sets the next mark (time at which a step must end) and the signals, in lanes at a mark.
+    """Sets the next mark and the present signals, in lanes that have reached their mark. A mark is
+    a time at which a step must end.
 
-    Returns True if a simulation is finished.
+    A lane that has reached its pause gets the status DONE. Returns True if there is one. `live` is
+    True if the network is integrated together with the robot.
     """
     clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
     oscillator.oscillator_output(lanes.neurons, lanes.output)
@@ -404,7 +423,8 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
 
 @inlined
 def next_mark(log: Log, place: int, time: float) -> float:
-    """Next time (s), after a time (s), at which a step of a simulation must end."""
+    """Next time (s), after `time` (s), at which a step of the robot in a place must end: a mark,
+    its pause, or the end of a change of its controller's signals."""
     mark = min(log.marks[place, log.passed[place]], log.until[place])
     if log.change_ends[place] > time:
         mark = min(mark, log.change_ends[place])
@@ -413,7 +433,8 @@ def next_mark(log: Log, place: int, time: float) -> float:
 
 @merged
 def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
-    """Records the samples within the step, in lanes that accept the step."""
+    """Records the samples that are due within the step in the tables of `log`, in lanes that accept
+    the step. All but the contact modes are interpolated."""
     clock, modes, accepted = by_lane(lanes.clock), by_lane(lanes.modes), by_lane(lanes.scratch)
     signals = np.empty((lanes.signals.size, log.place.size))
     for lane in range(log.place.size):
@@ -445,7 +466,7 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
 
 @inlined
 def column(table: Table, lane: int) -> np.ndarray:
-    """Copy of one lane of a table (size, W)."""
+    """Copy (size,) of one lane of a table (size, W)."""
     copy = np.empty(table.shape[0])
     for k in range(copy.size):
         copy[k] = table[k, lane]

@@ -46,7 +46,8 @@ class Places(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Numbers of the robots in the lanes, in the order of a row of `Places`."""
+    """Memory of the tables of all lanes: a column per lane, with its numbers in the order of a row
+    of `Places`."""
 
     states: Table
     constants: Table
@@ -59,7 +60,8 @@ is live."""
 
 @functools.partial(compiled, nogil=True)
 def advance(parts: LaneParts, rounds: int) -> None:
-    """Simulates the robots in the lanes for a number of rounds of ROUND steps.
+    """Simulates the robots in the lanes for a number of rounds. A round is ROUND (32) tried steps
+    per lane; then the clearance, the least distance between struts, is due.
 
     Returns earlier if no robot is left, or after a round if a robot has ended and no robot waits. A
     robot has ended at its pause, or if it has failed. The robots that wait at first begin together
@@ -135,10 +137,11 @@ def exchange(parts: LaneParts) -> None:
 
 @inlined
 def read_paused(lanes: LaneState, log: Log, to: Readings) -> None:
-    """Writes the readings of robots that have reached their pause to the rows of their places.
+    """Writes the readings of robots that have reached their pause to `to`, in the rows of their
+    places.
 
-    Call it before the clearance is computed: the computation moves the nodes of all lanes, and
-    their last digits change.
+    Call it before the clearance is computed. For this the nodes' positions are computed again in
+    all lanes, which changes their last digits.
     """
     clock = by_lane(lanes.clock)
     state, nodes = by_lane(lanes.step.state), by_lane(lanes.forces.nodes)

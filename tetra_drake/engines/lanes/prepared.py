@@ -103,7 +103,8 @@ class Prepared:
         return cls(driven, record, times, turns, sizes, constants, kind, start)
 
     def like(self, driven: DrivenRobot) -> Prepared:
-        """Prepares a robot like Prepared.of(), but faster if only gait or first signals are new."""
+        """Prepares another driven robot, like Prepared.of(). It is faster if only the gait or the
+        first signals differ from this one, whose constants are then used again."""
         robot, own = driven.robot, self.driven.robot
         is_alike = (
             type(driven) is type(self.driven)

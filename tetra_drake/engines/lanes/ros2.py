@@ -92,10 +92,12 @@ def take_step(
     step: Real,
     write_parts: bool,
 ) -> Real:
-    """Writes the end of a step of length `step` (s). Returns an estimate of its error.
+    """Writes the end of a step of length `step` (s) to `work.end`. Returns an estimate of its
+    error.
 
-    Input: `work.state`, `work.force` and `forces` at the state, `signals` at the end of the step.
-    `forces` is overwritten; with `write_parts` it holds the forces of stage 2.
+    Input: `work.state`; `work.force` and `forces`, both computed for this state; and `signals` (m,)
+    in N at the end of the step. `forces` is overwritten; with `write_parts` it holds the forces of
+    cables and ground in stage 2 of ROS2.
 
     The error is the difference to the embedded first-order solution: the largest difference of a
     velocity (m/s) of a body or, for rotations, of its nodes. NaN if a velocity is NaN.
@@ -147,8 +149,9 @@ def take_step(
 def compute_end_forces(
     robot: Model, work: StepMemory, modes: Table, forces: Forces, signals: Table, write_parts: bool
 ) -> None:
-    """Writes work.end_force: the forces at work.end. Torques are converted to the mass matrix at
-    the beginning of the step: the angular accelerations stay the same."""
+    """Writes the forces at work.end to work.end_force. Torques are converted to the mass matrix at
+    the beginning of the step: the angular accelerations stay the same. With `write_parts`, the
+    forces of cables and ground are also written to `forces`."""
     force = work.end_force
     move_robot(robot, work.end, forces)
     compute_forces(robot, work.end, modes, signals, write_parts, forces, force)
@@ -166,7 +169,9 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
     """Largest component of k1 + k2, as the acceleration (m/s²) of a body or, for rotations, of its
     nodes and feet. NaN if a component is NaN.
 
-    The spin of a thin bar about its axis does not count, unless it moves a round foot.
+    With the stages k1 and k2 (6 bodies,) of ROS2, (k1 + k2) / 2 times the step is the difference to
+    the first-order solution. The spin of a thin bar about its axis does not count, unless it moves
+    a round foot.
     """
     largest = 0.0
     for body in range(k1.size // BLOCK):
@@ -191,7 +196,8 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
 
 @inlined
 def motion_at(nodes: Table, row: int, turn: Vector3) -> Real:
-    """Largest component of turn x p, with the vector p from a body's origin to a row of `nodes`."""
+    """Largest component of turn x p. `turn` is an angular rate of a body, and p the vector from its
+    origin to the node in a row of `nodes`."""
     x, y, z = cross(turn, vector_at(nodes, row, P_BN_W))
     return larger(larger(abs(x), abs(y)), abs(z))
 

@@ -86,7 +86,8 @@ def factorise(blocks: Table, schedule: Schedule) -> None:
 
 @inlined
 def reduce_block(blocks: Table, i: int, a: int) -> None:
-    """Applies the factors of body i's own block to block `a` of its row."""
+    """Applies the factors of body i's own block to block `a`, which couples it to a later body: the
+    first part of the elimination of body i in factorise()."""
     f_01, _, _, _, _, _ = factors(blocks, i, i, 1)
     f_02, f_12, _, _, _, _ = factors(blocks, i, i, 2)
     f_03, f_13, f_23, _, _, _ = factors(blocks, i, i, 3)
@@ -105,8 +106,8 @@ def reduce_block(blocks: Table, i: int, a: int) -> None:
 
 @inlined
 def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, product: int) -> None:
-    """Eliminates body i from the rows of the later body of block a. `product` is the index of the
-    first product of block a."""
+    """Eliminates body i from the rows of the later body that block `a` couples it to; part of
+    factorise(). `product` is the index in `schedule.target` of the first product of block `a`."""
     j = schedule.later[a]
     for t in range(BLOCK):
         column = factors(blocks, i, a, t)
@@ -120,7 +121,8 @@ def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, product: int) -
 
 @inlined
 def factors(blocks: Table, i: int, k: int, c: int) -> tuple[Real, ...]:
-    """Column c of block k, each number divided by the pivot of its row."""
+    """Column c of block k in the row of body i, each number divided by the pivot of its row. The
+    inverse pivots are on the diagonal of block i."""
     return (
         blocks[k, 0, c] * blocks[i, 0, 0],
         blocks[k, 1, c] * blocks[i, 1, 1],
@@ -133,7 +135,7 @@ def factors(blocks: Table, i: int, k: int, c: int) -> tuple[Real, ...]:
 
 @inlined
 def reduced(x: Real, column: tuple[Real, ...], blocks: Table, k: int, c: int) -> Real:
-    """x minus the product of a column of factors and column c of block k."""
+    """x minus the scalar product of `column`, a column of factors(), and column c of block k."""
     x = x - column[0] * blocks[k, 0, c] - column[1] * blocks[k, 1, c] - column[2] * blocks[k, 2, c]
     return (
         x - column[3] * blocks[k, 3, c] - column[4] * blocks[k, 4, c] - column[5] * blocks[k, 5, c]
@@ -142,7 +144,8 @@ def reduced(x: Real, column: tuple[Real, ...], blocks: Table, k: int, c: int) ->
 
 @inlined
 def solve(blocks: Table, schedule: Schedule, x: Table) -> None:
-    """Solves a factorised system. `x` (6 bodies,) is the right-hand side, then the solution.
+    """Solves a system that factorise() has factorised. `x` (6 bodies,) is the right-hand side, and
+    is overwritten by the solution.
 
     The numbers of a body are in variables. In a loop over x, each operation would wait for memory.
     """

@@ -10,7 +10,8 @@ from tetra_drake.kernels.lanes import FieldArray, lane_table
 
 
 def numbers_of(values: Any) -> np.ndarray:
-    """All real numbers of NamedTuples of arrays, in one row."""
+    """All real numbers of nested NamedTuples of arrays, in one row (numbers,), field after
+    field."""
     if isinstance(values, tuple):
         return np.concatenate([np.zeros(0), *map(numbers_of, values)])
     return values.ravel() if _is_real(values) else np.zeros(0)

@@ -45,10 +45,12 @@ class Touching(NamedTuple):
 def add_touching(
     robot: Model, schedule: Schedule, forces: Forces, time: Real, blocks: Table, touching: Touching
 ) -> None:
-    """Computes the contacts of struts for the implicit matrix, in the state of `forces`.
+    """Writes the contacts of struts for the implicit matrix to `touching`, in the state of
+    `forces`.
 
-    `blocks` is the factorised matrix without them, `time` is in s. Forces on nodes are overwritten.
-    Each lane numbers its own contacts, so that it does not depend on the other lanes.
+    `blocks` is the factorised matrix without them, and stays so. `time` is in s, a share of the
+    step. Forces on nodes are overwritten. Each lane numbers its own contacts, so that it does not
+    depend on the other lanes.
     """
     near, nodes, vector = forces.near_struts, forces.nodes, touching.vector
     law = named(contact.NormalForce, robot.strut_contact.normal)
@@ -84,9 +86,11 @@ def add_touching(
 def put_contact(
     touching: Touching, takes_place: Truth, place: Real, spring: Real, damping: Real
 ) -> None:
-    """Stores a contact in lanes where `takes_place`, as contact number `place` of the lane.
+    """Stores a contact of struts in lanes where `takes_place`, as contact number `place` of the
+    lane.
 
-    Its vector g is `touching.vector`, and its weight w is `spring` + `damping`.
+    Its vector g, the derivative of the struts' distance, is in `touching.vector`. Its weight w in
+    the implicit matrix is `spring` + `damping`.
     """
     size = touching.vector.size
     count = touching.count[0]
@@ -106,7 +110,8 @@ def put_contact(
 
 @inlined
 def product(vectors: Table, k: int, x: Table) -> Real:
-    """Scalar product of vector k and x."""
+    """Scalar product of x and vector number k of `vectors`, where vectors of the length of x are
+    one after the other."""
     total = 0.0
     for n in range(x.size):
         total += vectors[k * x.size + n] * x[n]
@@ -115,7 +120,8 @@ def product(vectors: Table, k: int, x: Table) -> Real:
 
 @inlined
 def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Table) -> None:
-    """Solves the factorised system with the contacts of `touching`; see sparse.solve()."""
+    """Solves the factorised system with the contacts of `touching`. `x` (6 bodies,) is the
+    right-hand side, and is overwritten by the solution."""
     solve(blocks, schedule, x)
     for k in range(touching.count[0]):
         scale = touching.factor[k] * product(touching.along, k, x)
@@ -125,7 +131,8 @@ def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Tab
 
 @inlined
 def subtract_springs(touching: Touching, factor: Real, k1: Table, k2: Table) -> None:
-    """Subtracts factor * time² * stiffness * k1 of the contacts from k2."""
+    """Subtracts factor * K * k1 from k2, where K is time² * the stiffness matrix of the contacts.
+    k1 and k2 (6 bodies,) are the stages of the step."""
     for k in range(touching.count[0]):
         scale = factor * touching.spring[k] * product(touching.along, k, k1)
         for n in range(k2.size):
