@@ -22,7 +22,8 @@ class LabelIndex(PandasIndex):
     def sel(
         self, labels: dict[Any, Any], method: str | None = None, tolerance: Any = None
     ) -> IndexSelResult:
-        """Positions of one label, or of several in a list. Raises InputError for other labels."""
+        """Positions of all entries that have one given label, or one of several in a list. Slices
+        and Boolean masks work as in xarray. Raises InputError for an unknown label."""
         ((coordinate, given),) = labels.items()
         wanted = np.asarray(given)
         if isinstance(given, slice) or wanted.dtype.kind == "b":

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 class IntegratorWork(Section):
-    """Settings and cost of an integrator."""
+    """Work of an integrator in one simulation: settings, and counts of steps and evaluations."""
 
     scheme: str
     accuracy: float
@@ -54,8 +54,8 @@ class IntegratorWork(Section):
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """Result of one simulation: metrics, fitness, path of the centre, and the trajectory if it was
-    recorded."""
+    """Result of one simulation: metrics, fitness, path of the centre of mass, and the trajectory
+    if it was recorded."""
 
     scenario: Scenario = field(repr=False, compare=False)
     robot: Robot = field(repr=False, compare=False)
@@ -110,7 +110,8 @@ class SimulationResult:
 
     @property
     def title(self) -> str:
-        """Name of the gait and its headline, such as "gait: walks 14.3 inches in 15 s"."""
+        """Name of the gait or command, and its result in words, such as "gait: walks 14.3 inches in
+        15 s"."""
         return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
 
     def show(self, *, height: int = 480) -> ReplayFrame:
@@ -145,7 +146,8 @@ class ReplayFrame:
 
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
-    """Times (s), ascending, for which make_result() needs the motion of a simulation."""
+    """Times (s), ascending, for which an engine must give the motion to make_result(): the points
+    of the path and, with `record`, the samples of the trajectory."""
     times = [np.array([0.0, simulation.settling_time, simulation.duration])]
     times.append(sample_times(simulation.duration, PERIOD))
     if record:
@@ -164,8 +166,8 @@ def make_result(
 ) -> SimulationResult:
     """Result of a simulation, from its motion and tally. With `record`, it has a trajectory.
 
-    `motion` has the times of motion_times(). `totals` is the tally of the whole simulation.
-    `wall_time` is in s.
+    `motion` has the times of motion_times(). `totals`, the tally, has sums and extremes over all
+    steps; see laws.tally. `work` is the integrator's work, `wall_time` (s) its wall time.
     """
     robot = driven.robot
     simulation, structure = robot.scenario.simulation, robot.structure
@@ -204,9 +206,11 @@ def compute_metrics(
     """The metrics of a simulation.
 
     Args:
-        nodes: positions p_WN (3, nodes, 3) in m at 0, at `simulation.steady_from` and at the end.
-        path: path of the centre.
-        totals: tally of the whole simulation, as plain arrays.
+        robot: the simulated robot, with its scenario.
+        nodes: positions p_WN (times, nodes, 3) in m at three times: 0, `simulation.steady_from`,
+            and the end.
+        path: path of the centre of mass, from start to end.
+        totals: sums and extremes over all steps (see laws.tally), of this robot alone.
         signals: signals (k, m) in N at evenly spaced times from `simulation.steady_from` on.
     """
     structure, scenario = robot.structure, robot.scenario
@@ -225,10 +229,10 @@ def compute_metrics(
 
 
 def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) -> Poses:
-    """Positions of a structure's followed nodes, tip and centre at three times, for metrics.
+    """Positions of a structure's markers, tip (its foremost node) and centre of mass, for metrics.
 
-    They are computed from node positions p_WN (3, nodes, 3) in m. The last two times are
-    `since_steady_from` (s) apart.
+    They are computed from the positions p_WN of all nodes (3, nodes, 3) in m at three times: start,
+    `simulation.steady_from`, and end. The last two are `since_steady_from` (s) apart.
     """
     return Poses(
         markers=followed_nodes(nodes, structure),
@@ -239,8 +243,8 @@ def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) 
 
 
 def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
-    """Short result of a gait, chosen by the scenario's objective, such as "walks 14.3 inches in
-    15 s"."""
+    """Result of a gait in a few words, such as "walks 14.3 inches in 15 s". The scenario's
+    objective chooses what it tells. `metrics` has metrics by name, in SI units."""
     seconds = f"in {scenario.simulation.duration:g} s"
     units, distance = scenario.units, metrics["distance"]
     length = fixed(abs(distance) / units.length, units.decimals)

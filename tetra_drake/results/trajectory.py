@@ -72,14 +72,16 @@ class Motion:
     contact. None if they follow from states and modes."""
 
     def at(self, times: np.ndarray) -> Motion:
-        """The motion at a selection of its times."""
+        """The motion at `times` (s), which must be among its own times: rows are selected, nothing
+        is interpolated."""
         rows = np.searchsorted(self.times, times)
         given = {name: table for name, table in vars(self).items() if table is not None}
         return Motion(**{name: table[rows] for name, table in given.items()})
 
 
 def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
-    """Makes a trajectory: a motion with the resulting lengths and forces.
+    """Makes a trajectory, an xarray dataset: the samples of a motion, with the lengths and forces
+    that follow from them.
 
     Dimensions: time, body, node, cable, contact, oscillator, axis, horizontal, quaternion. A
     contact is a node that the ground can touch. Every variable has a `units` attribute; modes have
@@ -140,8 +142,8 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
 
 @functools.lru_cache(maxsize=32)
 def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
-    """Coordinates with their indexes, from name, dimension and values of each. They are cached,
-    because making them takes half of the time of make_dataset()."""
+    """Coordinates with their indexes. `named` has a tuple for each: name, dimension, then values.
+    They are cached, because making them takes half of the time of make_dataset()."""
     import xarray
 
     given = {name: (along, list(values)) for name, along, *values in named}
@@ -149,8 +151,8 @@ def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
 
 
 def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
-    """A dataset with indexes, so that each coordinate can select by its labels. Files do not keep
-    indexes."""
+    """A dataset with an index for each coordinate, so that sel() finds its labels. Use it after
+    reading a file, because files do not keep indexes."""
     from tetra_drake.results.label_index import LabelIndex
 
     for name in dataset.coords.keys() - dataset.xindexes.keys():
@@ -159,7 +161,8 @@ def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
-    """Coordinates of a trajectory, except time: dimension and values of each, by name."""
+    """Coordinates of a trajectory of a structure, except time. Key: the name; value: the dimension,
+    and the labels along it."""
     oscillators, cables = structure.oscillators, structure.cables
     driving = ["" if i == cable.PASSIVE else oscillators[i] for i in cables["signal"]]
     body_of_node = list(structure.body_of_node)

@@ -23,15 +23,16 @@ turns such a body, and its rotation moves nothing."""
 
 
 def strut_pose(p_BA: np.ndarray, p_BC: np.ndarray) -> RigidTransform:
-    """Pose X_BS of a strut from A to C. The origin is in the middle, the z axis along the strut."""
+    """Pose X_BS of a strut in frame B, from its ends A and C at p_BA and p_BC (3,) in m. The origin
+    of S is in the middle of the strut; its z axis points from A to C."""
     return RigidTransform(RotationMatrix.MakeFromOneVector(p_BC - p_BA, 2), (p_BA + p_BC) / 2)
 
 
 def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Inertia of the bodies of a blueprint.
 
-    Returns masses (bodies,), centres of mass in the frames F of the blueprint (bodies, 3), and unit
-    inertias (bodies, 6) as in Structure.
+    Returns masses (bodies,) in kg, centres of mass (bodies, 3) in m in the blueprint's body frames
+    F, and unit inertias (bodies, 6) in m², as in Structure.unit_inertia.
     """
     made: dict[tuple[bytes, ...], Inertia] = {}  # equal bodies share one
     inertias = []
@@ -69,8 +70,9 @@ def _body_inertia(
     node_density: np.ndarray,
     node_mass: np.ndarray,
 ) -> Inertia:
-    """Inertia of a body: struts, and spheres and point masses at its nodes. Struts are solid
-    cylinders. Rounding errors become 0."""
+    """Inertia of one body: of its struts (solid cylinders), and of spheres and point masses at its
+    nodes. `struts` (struts, 2) has the two nodes of each strut, counted within the body. Numbers
+    that are rounding errors become 0."""
     total, along = SpatialInertia.Zero(), [0.0, 0.0, 1.0]
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
         if density > 0.0:

@@ -19,7 +19,7 @@ from tetra_drake.scenario.scenario import Scenario
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """Setpoints of actuators at evenly spaced times, beginning at 0.
+    """Setpoints of actuators at evenly spaced times from t = 0 on, in place of a gait.
 
     A sample holds until the next one. The last sample holds for ever.
     """
@@ -41,9 +41,10 @@ def driven_robot(
 ) -> DrivenRobot:
     """The robot of a scenario, driven by a gait or a command.
 
-    The signals of a command are linear between multiples of `cpg.listing_step`. A change of
-    setpoint begins at the time of its sample and takes one such step. Raises InputError for a
-    command without samples, or for another number of cables.
+    The signals of a command are linear between multiples of `cpg.listing_step` (s). A change of
+    setpoint begins at the time of its sample and takes one such step. `steering` replaces the
+    turn of a gait; a command ignores it. Raises InputError for a command without samples, or with
+    another number of cables than the robot has driven ones.
     """
     if isinstance(driver, Gait):
         return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
@@ -66,7 +67,7 @@ def driven_robot(
 def controlled_robot(scenario: Scenario) -> Robot:
     """The robot of a scenario for a controller: one signal for each driven cable.
 
-    With its first signals, the actuators start as they do with a network."""
+    Its `first_signals` let the actuators start in the same state as with an oscillator network."""
     by_network, actuation = Robot.of(scenario), scenario.actuation
     setpoints = actuation.commands(by_network.starting_cables())
     robot = by_network.without_network()

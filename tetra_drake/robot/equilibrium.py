@@ -82,7 +82,7 @@ class Equilibrium(NamedTuple):
 
 
 class Unactuated:
-    """A robot without actuation, and arrays for the forces on it."""
+    """A robot whose cables are all passive, and arrays that kernels fill with the forces on it."""
 
     def __init__(self, model: Model) -> None:
         """Makes all cables of a model passive."""
@@ -102,8 +102,9 @@ def find_equilibrium(
 ) -> Equilibrium:
     """Finds the equilibrium of a robot on flat ground without actuation.
 
-    The search goes downhill in potential energy from the state `start` (13 n,) to a minimum.
-    Friction bears no load. Raises InputError, naming `source` and a body, if none is found.
+    The search goes downhill in potential energy from the state `start` (13 n,) of the n bodies to
+    a minimum. Friction bears no load there. `bodies` are the names of the bodies. Raises
+    InputError, naming `source` (the scenario) and a body, if no equilibrium is found.
     """
     weights = np.array([0.0, 0.0, -model.bodies.weight.sum()])
     forces = np.vstack([model.loads.forces, weights])
@@ -146,8 +147,9 @@ def find_equilibrium(
 class _Descent:
     """Descent to a minimum of the potential energy, by Newton's method.
 
-    The same stiffness is added to all displacements: a shift. It makes the energy convex and the
-    step no longer than the reach. The reach grows after good steps and shrinks after bad ones.
+    A shift, the same stiffness for all displacements, is added to the stiffness matrix. It makes
+    the energy convex and the step no longer than the reach, the upper limit of a step. The reach
+    grows after good steps and shrinks after bad ones.
 
     The energy of a mechanism has long curved valleys, whose sides are up to 10^12 times as steep as
     their floor. A step along the floor ends on a side. Corrections lead it back to the floor. Only
@@ -161,7 +163,8 @@ class _Descent:
         self._arrive(start, force_at_rest(robot, start))
 
     def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
-        """Makes a state the current one. Its forces must have been computed last."""
+        """Makes `state` (13 n,) the current one, with its generalized `force` (6 n,). No forces of
+        another state may have been computed in between."""
         self.state, self.force = state, force
         if not np.isfinite(force).all():
             return
@@ -188,8 +191,8 @@ class _Descent:
         return bool(np.abs(self.force).max() <= self._rounding)
 
     def step(self) -> bool:
-        """Takes one step downhill in energy. Returns False if no step leads down, for example in a
-        stable equilibrium."""
+        """Takes one step downhill in energy, to a new state. Returns False without a step if none
+        leads down, for example in a stable equilibrium."""
         if self.is_balanced() and self._factor(self._stiffness, self._doubt) is not None:
             return False
         while self._reach > SHORTEST_REACH * self._robot.radius and np.isfinite(self.force).all():
@@ -206,10 +209,11 @@ class _Descent:
         return False
 
     def _longest_step(self) -> tuple[np.ndarray, float]:
-        """Next step (6 n,) within reach, and twice the energy that it should release.
+        """Next step (6 n,) in m within reach, and twice the energy (J) that it should release.
 
-        It is Newton's step with the least shift. In an equilibrium that is not stable, it is a step
-        along the least stable motion.
+        It is Newton's step with the smallest shift that keeps it within reach. In an equilibrium
+        that is not stable, it is a step along the least stable motion. For the components of a
+        step see displaced().
         """
         if self.is_balanced():
             shift = self._least
@@ -236,10 +240,12 @@ class _Descent:
     def _corrected(
         self, step: np.ndarray, expected: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Step that is led back to the floor of the energy's valley; see the class.
+        """Takes a trial `step` and corrects it back to the floor of the energy's valley; see the
+        class.
 
-        Returns state, force, displacements and gain (see LEAST_GAIN). `expected` is the energy in J
-        from _longest_step().
+        `step` and `expected` (J) are from _longest_step(). Returns the state after the corrected
+        step, the force there, the corrected step (6 n,), and its gain: the released energy divided
+        by the expected one.
         """
         longest = 0.5 * np.abs(step).max()
         moved = displaced(self._robot, self.state, step)
@@ -259,22 +265,23 @@ class _Descent:
         return moved, force, step, gain
 
     def _factor(self, stiffness: np.ndarray, shift: float) -> np.ndarray | None:
-        """Cholesky's factor of the stiffness matrix plus a shift; None if the energy is not convex
-        even then."""
+        """Cholesky's factor of `stiffness` plus `shift` (N/m) on its diagonal; None if this sum is
+        not positive definite."""
         factor = stiffness + shift * np.eye(len(stiffness))
         return factor if factorise(factor, 0.5 * self._least) else None
 
     def _solved(self, factor: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Displacements (6 n,) under a force, without the motions of the whole robot that nothing
-        resists."""
+        """Displacements (6 n,) under a force (6 n,), from the `factor` of _factor(). Motions of the
+        whole robot that nothing resists are projected out."""
         step = solve(factor, force)
         return step - self._held @ (self._held.T @ step)
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Displacements (6 n, motions) of the whole robot that change no energy: along x, along y and
-    about z, and the other three for a robot without weight and contacts. Motions that anchors or
-    loads resist are left out. The forces of the state must have been computed."""
+    """Orthonormal basis (6 n, motions) of rigid displacements of the whole robot that change no
+    energy: along x, along y and about z; for a robot without weight and contacts all six. Motions
+    that anchors, cables from fixed nodes, or loads resist are left out. The forces of the state
+    must have been computed."""
     model, nodes = robot.model, robot.forces.nodes
     floats = not model.bodies.weight.any() and not model.ground.contacts.size
     kept = [3, 4, 2, 5, 0, 1] if floats else [3, 4, 2]  # in the order of rigid_motions()
@@ -299,8 +306,8 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 @compiled
 def factorise(matrix: Table, least: float) -> bool:
-    """Replaces the upper half of a symmetric matrix by Cholesky's factor. Returns False if a pivot
-    is at most `least`.
+    """Replaces the upper half of a symmetric matrix, in place, by its Cholesky factor U, with
+    matrix = UᵀU. Returns False, with the work half done, if a pivot is at most `least`.
 
     LAPACK is not used because its threads wait for each other on busy processors.
     """
@@ -317,7 +324,7 @@ def factorise(matrix: Table, least: float) -> bool:
 
 @compiled
 def solve(factor: Table, right: Table) -> Table:
-    """Solves a symmetric system that was factorised by factorise()."""
+    """Solution x of matrix x = right, with the `factor` that factorise() left of the matrix."""
     n, x = right.size, right.copy()
     for i in range(n):
         x[i] /= factor[i, i]
@@ -328,8 +335,10 @@ def solve(factor: Table, right: Table) -> Table:
 
 
 def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Generalized force (6 n,) at rest: [t_W / radius; f_W] at each body's origin. Contact nodes
-    stick at their positions."""
+    """Generalized force (6 n,) in N on the bodies at rest in a state (13 n,).
+
+    It is [t_W / radius; f_W] at each body's origin: torques are divided by `robot.radius`. Contact
+    nodes stick where they are, so friction exerts no force."""
     modes = np.zeros((len(robot.forces.ground_forces), MODE_COLUMNS))
     force = np.empty(6 * robot.model.bodies.mass.size)
     compute_forces_at_rest(robot.parts, state, modes, force)
@@ -339,7 +348,11 @@ def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 @compiled
 def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
-    """Writes the generalized force (6 n,) at rest. `modes` must be 0, for nodes in the air."""
+    """Writes the forces on a robot at rest in `state` (13 n,) to `generalized` (6 n,): [t_W; f_W]
+    at each body's origin, in N m and N.
+
+    `modes` (contacts, 12) must be 0, which means nodes in the air. The kernel replaces them: nodes
+    in the ground stick. The other forces in `parts` are also overwritten."""
     robot, forces = unpacked(parts)
     move_robot(robot, state, forces)
     update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
@@ -347,7 +360,8 @@ def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized
 
 
 def displaced(robot: Unactuated, state: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """A state displaced by `step` (6 n,): rotation times radius, and translation, in m."""
+    """A copy of a state (13 n,), displaced by `step` (6 n,) in m. For each body the step has a
+    rotation vector times `robot.radius`, then a translation, in the world frame."""
     moved, motion = state.copy(), step.copy()
     motion.reshape(-1, 6)[:, :3] /= robot.radius
     displace(state, motion, moved)
@@ -356,20 +370,23 @@ def displaced(robot: Unactuated, state: np.ndarray, step: np.ndarray) -> np.ndar
 
 @compiled
 def displace(state: Table, motion: Table, moved: Table) -> None:
-    """Writes a state displaced by `motion` (6 n,) to `moved`; see move_bodies()."""
+    """Writes the poses of `state` (13 n,), displaced by `motion` (6 n,), to `moved` (13 n,).
+
+    For each body, `motion` has a rotation vector (rad), then a translation (m)."""
     move_bodies(state, motion, 1.0, moved)
 
 
 def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
-    """Stiffness matrix (6 n, 6 n) in N/m at the last computed state, for the displacements of
-    displaced()."""
+    """Stiffness matrix (6 n, 6 n) in N/m of the robot without actuation, for displacements as
+    in displaced(). The state is the one of the last call of force_at_rest()."""
     matrix = stiffness_matrix(robot.model, robot.forces)
     per_radius = np.tile(np.repeat([1.0 / robot.radius, 1.0], 3), len(matrix) // 6)
     return per_radius[:, np.newaxis] * matrix * per_radius
 
 
 def mass_matrix(robot: Unactuated) -> np.ndarray:
-    """Mass matrix (6 n, 6 n) at the last computed state, for the displacements of displaced()."""
+    """Mass matrix (6 n, 6 n) in kg, for displacements as in displaced(). The state is the one of
+    the last call of force_at_rest()."""
     bodies = robot.model.bodies
     inertia_W = bodies.inertia if robot.model.isotropic else robot.forces.inertia
     matrix = np.diag(np.repeat(bodies.mass, 6))

@@ -39,7 +39,7 @@ _MOST_COLUMNS = 8
 
 @dataclass(frozen=True)
 class Gait:
-    """Parameters of an oscillator network."""
+    """Parameters of an oscillator network: what evolution searches for."""
 
     name: str
     weights: tuple[float, ...]
@@ -56,7 +56,8 @@ class Gait:
     """Names such as "3->1 extensor": from oscillator 3 onto oscillator 1. Empty if unknown."""
 
     def __post_init__(self) -> None:
-        """Raises InputError for a number that no gait has."""
+        """Raises InputError for a weight below 0, a time constant of 0 or less, or a number that is
+        not finite."""
         wrong = [weight for weight in self.weights if not 0.0 <= weight < math.inf]
         wrong += [tau for tau in (self.tau_a, self.tau_b) if not 0.0 < tau < math.inf]
         if wrong:
@@ -93,13 +94,13 @@ class Gait:
 
     @property
     def _further(self) -> list[list[str]]:
-        """Names and values of the turn and the gains that are not 0."""
+        """Names and values, as texts, of the turn and the feedback gains, except zeros."""
         numbers = {"turn": self.turn, **{f"gain of {name}": gain for name, gain in self.gains}}
         return [[name, f"{number:.4g}"] for name, number in numbers.items() if number]
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
-        """Content of a gait file. The gait must fit `scenario`, which gives the names of the
-        weights, and the scenario's name if the gait has none."""
+        """Content of a gait file, for json.dumps(). The gait must fit `scenario`, which gives the
+        names of the weights. The file names the gait's own scenario, or `scenario` if unknown."""
         names = Weights.of(scenario).names
         content: dict[str, Any] = {"schema": 2, "name": self.name}
         content["scenario"] = self.scenario or scenario.name
@@ -118,8 +119,8 @@ class Gait:
 class ParameterSpace:
     """Parameter space of a scenario's gaits, for your own search algorithm.
 
-    A vector has the weights, the feedback gains (if the scenario has feedback), tau_A and tau_B
-    (s).
+    A vector has the weights, the feedback gains (if the scenario has feedback), and the time
+    constants tau_A and tau_B in s.
 
     >>> space = td.ParameterSpace.of("thesis")
     >>> vector = space.repair(0.5 * (space.low + space.high))
@@ -149,7 +150,8 @@ class ParameterSpace:
     def of(cls, scenario: GivenScenario) -> Self:
         """The parameter space of a scenario, given by its name or file, or by a run.
 
-        A parameter with equal bounds is fixed. The bounds of tau_B are twice the bounds of tau_A.
+        The bounds are from its section `gait_bounds`. A parameter with equal bounds is fixed. The
+        bounds of tau_B are twice the bounds of tau_A.
         """
         scenario = given_scenario(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
@@ -182,8 +184,9 @@ class ParameterSpace:
         )
 
     def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
-        """Gait with the parameters of a vector. Raises InputError for a vector of another size,
-        a number that is not finite, a weight below 0, or a time constant that is not above 0."""
+        """Gait with the parameters of a vector; the bounds are not checked. Raises InputError for a
+        vector of another size, a number that is not finite, a weight below 0, or a time constant
+        that is not above 0."""
         vector = self._numbers(vector)
         first_gain = len(self.names) - 2 - len(self.pathways)
         gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
@@ -198,8 +201,9 @@ class ParameterSpace:
         )
 
     def vector(self, gait: Gait) -> Vector:
-        """Parameter vector of a gait. If weights are mirrored, the first of each pair is used.
-        Raises InputError if the gait has another number of weights."""
+        """Parameter vector of a gait. If weights are mirrored, left and right ones share a
+        parameter: the first of each pair is used. Raises InputError if the gait has another number
+        of weights."""
         if len(gait.weights) != len(self.weights):
             problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
             raise InputError("ParameterSpace", f"gait {gait.name}", problem)
@@ -209,20 +213,22 @@ class ParameterSpace:
         return np.concatenate([weights, gains, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:
-        """Random parameter vector: uniform between the bounds, with tau_B = 2 tau_A."""
+        """Random parameter vector, uniform between the bounds. Even if tau_B is independent in the
+        search, it begins as 2 tau_A."""
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
     def repair(self, vector: npt.ArrayLike) -> Vector:
-        """A copy of the vector with tau_B = 2 tau_A, unless tau_B is independent. Raises InputError
-        for a vector of another size."""
+        """A copy of the vector with tau_B = 2 tau_A, for example after mutation. If the scenario
+        makes tau_B independent, it stays. The bounds are not enforced. Raises InputError for a
+        vector of another size."""
         repaired = self._numbers(vector)
         if self.couples_tau_b:
             repaired[TAU_B] = TAU_B_PER_TAU_A * repaired[TAU_A]
         return repaired
 
     def _numbers(self, vector: npt.ArrayLike) -> Vector:
-        """A copy of a vector. Raises InputError unless it has a number for each name."""
+        """A copy of a vector. Raises InputError unless it has a number for each parameter."""
         try:
             given = np.array(vector)
         except ValueError:  # rows of different lengths
@@ -238,14 +244,17 @@ WALKING_SEED = 80
 
 
 def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
-    """The random gait with a seed, uniform between the scenario's bounds (Table 5).
+    """Random gait, the same for the same seed: uniform between the scenario's bounds of gaits.
+
+    The default bounds are from Table 5 of the thesis.
 
     >>> td.seeded_gait("thesis", 80)
     <Gait random gait 80>
 
     Args:
         scenario: a scenario, its name or file, or a run.
-        seed: an integer, 0 or more. The default gait walks forward on the thesis's scenario.
+        seed: an integer, 0 or more. The default gives a gait that walks forward in the scenario
+            "thesis".
 
     Raises:
         InputError: if an argument cannot be used.
@@ -256,7 +265,8 @@ def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
 
 
 def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
-    """Writes a gait file. load_gait() reads the same numbers."""
+    """Writes a gait file (JSON). `scenario` must fit the gait and gives the names of its weights.
+    load_gait() reads exactly the same numbers."""
     write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
 
 
@@ -264,7 +274,7 @@ Weight = Annotated[float, Field(ge=0)]
 
 
 class GaitFile(Section):
-    """Content of a gait file; see Gait."""
+    """Content of a gait file as it was read, before it is checked against a scenario; see Gait."""
 
     version: Literal[1, 2] = Field(alias="schema")
     name: str = ""
@@ -333,7 +343,8 @@ GivenGait = Gait | HasBestGait | str | Path
 
 
 def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
-    """The gait of an argument: a gait, a file or a run. Raises InputError for anything else."""
+    """The gait that an argument means: a gait itself, one read from a file for `scenario`, or the
+    best gait of a run. Raises InputError for anything else."""
     if isinstance(gait, Gait):
         return gait
     if isinstance(gait, (str, Path)):
@@ -348,7 +359,11 @@ def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
 def check_gait(
     gait: Gait, scenario: Scenario, weights: Weights, *, source: object, key: str = ""
 ) -> None:
-    """Raises InputError, naming source and key, if a gait does not fit the scenario."""
+    """Raises InputError, naming source and key, if a gait does not fit the scenario.
+
+    It needs as many weights as `weights` has connections, gains only for the scenario's feedback,
+    and a turn only where the robot has left or right oscillators.
+    """
     prefix = f"{key}." if key else ""
     count, expected = len(gait.weights), len(weights.couplings)
     if count != expected:

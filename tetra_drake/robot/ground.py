@@ -25,10 +25,12 @@ foot may also be as deep as the weight would press it, because a robot may start
 
 
 def lift(scenario: Scenario, placed: Structure) -> float:
-    """Distance (m) to move a structure up so that its feet stand on the ground. A structure that is
-    held along z or without ground is not moved; one with other anchors is not moved down. Raises
-    InputError if a contact node, or a foot of a structure that is held along z, is clearly below
-    the ground."""
+    """Distance (m) by which a structure must move up so that its lowest foot touches the plane
+    z = 0; negative for down.
+
+    It is 0 without contact nodes, or if anchors hold a node along z. A structure with other anchors
+    is never moved down. Raises InputError if a contact node is clearly below the plane; if the
+    structure is held along z, also if the bottom of a foot is."""
     if not placed.contacts.size:
         return 0.0
     stays, shown, heights = placed.held[:, 2].any(), scenario.units.shown, placed.p_WN[:, 2]
@@ -45,7 +47,8 @@ def lift(scenario: Scenario, placed: Structure) -> float:
 
 
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:
-    """Ground of a scenario below a structure, as an argument of the compiled kernels.
+    """Ground of a scenario below a structure in its initial pose, as an argument of the compiled
+    kernels: laws, heights and contact nodes.
 
     Raises InputError if the terrain cannot be made, or if the structure starts outside the terrain
     or with a contact node in the ground.
@@ -83,8 +86,10 @@ def make_surface(
     terrain_kind: Relief,
     grid: Grid | None = None,
 ) -> Ground:
-    """Ground with the given laws and terrain, without contact nodes. `grid` has the terrain's
-    heights; by default the terrain begins at the origin."""
+    """Ground with the given laws and terrain, but without contact nodes, for AddGroundContact().
+
+    `grid` has the terrain's heights. By default it is made from `terrain_kind`, and a terrain that
+    begins in front of a robot begins at x = 0."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     rows, columns = grid.heights.shape
     inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
@@ -110,15 +115,16 @@ def make_surface(
 
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:
-    """Heights (...) of the surface at x and y (..., 2), in m."""
+    """Heights (...) of the surface, z in the world, at the horizontal positions `x_y` (..., 2); all
+    in m."""
     top = np.full((x_y.size // 2, 1), terrain.SurfaceGrid(*ground.grid).top)
     frames = ground_frames(np.hstack([x_y.reshape(-1, 2), top]), ground)
     return (top[:, 0] - frames[:, terrain.GAP] / frames[:, terrain.N_Z]).reshape(x_y.shape[:-1])
 
 
 def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
-    """Axes of the surface below points (points, 3) in m: t1, t2 and n (see laws.terrain) as rows
-    of (points, 3, 3)."""
+    """Axes of the surface below the points p_WN (points, 3) in m: an array (points, 3, 3) whose
+    rows are the tangents t1 and t2 and the normal n at each point; see laws.terrain."""
     frames = ground_frames(p_WN, ground)
     axes = np.zeros((len(p_WN), 3, 3))
     axes[:, 0] = frames[:, terrain.T1_X : terrain.T1_Z + 1]
@@ -128,8 +134,8 @@ def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
 
 
 def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
-    """Frames (points, FRAME_COLUMNS) of the surface below points (points, 3) in m; see
-    laws.terrain."""
+    """Table `frames` of laws.terrain (points, FRAME_COLUMNS) for the points p_WN (points, 3) in m:
+    gap above the surface, and axes of the surface."""
     frames = np.empty((len(p_WN), terrain.FRAME_COLUMNS))
     nodes = np.zeros((len(p_WN), NODE_COLUMNS))
     nodes[:, P_WN : P_WN + 3] = p_WN

@@ -32,7 +32,7 @@ _PADDING = 16
 
 @dataclass(frozen=True)
 class CentrePath:
-    """Path of the robot's centre of mass, and the robot's heading."""
+    """Path of the robot's centre of mass over time, and the robot's heading along it."""
 
     times: np.ndarray
     """Times (k,) in s, ascending."""
@@ -66,28 +66,31 @@ def follow(times: np.ndarray, poses: np.ndarray, structure: Structure) -> Centre
 
 
 def path_of_centre(trajectory: xarray.Dataset, structure: Structure) -> CentrePath:
-    """Path of the robot's centre at all samples."""
+    """Path of the robot's centre of mass, at all samples of a recorded trajectory."""
     poses = np.concatenate([trajectory.q_WB.values, trajectory.p_WB.values], axis=2)
     return follow(trajectory.time.values, poses, structure)
 
 
 def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> np.ndarray:
-    """Displacement along x since the start (time,), in m: of the first marker (the bottom left node
-    of T1), or of the centre for a robot without markers."""
+    """Displacement (time,) in m along the world's x axis since the start, negative if backward.
+
+    It is the displacement of the first marker (in a row of tetrahedra the bottom left node of T1,
+    the first one), or of the centre of mass for a robot without markers."""
     x = followed_nodes(trajectory.p_WN.values, structure)[:, 0, 0]
     return x - x[0]
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """True if a contact node bears no normal force (time, contact)."""
+    """Boolean array (time, contact): True where a contact node bears no normal force."""
     return trajectory.normal_force == 0.0
 
 
 def intervals(times: np.ndarray, active: np.ndarray) -> list[Span]:
     """Intervals where a Boolean signal is true, as starts and ends (s).
 
-    `times` (samples,) are in s and ascend; `active` (samples,) is the signal. A sample has the
-    modes of the step before it. Therefore an interval begins one sample before the first true one.
+    `times` (samples,) are in s and ascend; `active` (samples,) is the signal. A sample tells what
+    was true in the step that ends there, such as contact. Therefore an interval begins one sample
+    before the first true one.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
     ends = times[np.maximum(edges - 1, 0)]
@@ -95,7 +98,7 @@ def intervals(times: np.ndarray, active: np.ndarray) -> list[Span]:
 
 
 def share_of_time(active: xarray.DataArray) -> float:
-    """Share of time, 0 to 1, during which a Boolean signal (time,) is true."""
+    """Share of time, 0 to 1, during which a Boolean signal (time,) is true, by intervals()."""
     times = active.time.values
     length = sum(end - start for start, end in intervals(times, active.values))
     return length / float(times[-1] - times[0])
@@ -118,7 +121,7 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
 
 
 def last_step(trajectory: xarray.Dataset) -> Span | None:
-    """Start and end (s) of one period of the signals, late in the trajectory.
+    """Start and end (s) of the robot's last step: one period of the signals, late in a trajectory.
 
     The period is taken from the signal with the largest swing in the second half of the trajectory.
     The step ends where this signal rises through its mean for the last time. None if no signal

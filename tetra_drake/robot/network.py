@@ -42,10 +42,11 @@ class Weights:
 
     @functools.cached_property
     def couplings(self) -> np.ndarray:
-        """Neurons of each weight (weights, 2): the inhibited one, then the inhibiting one.
+        """Indices of the two neurons of each weight (weights, 2): the inhibited one, then the
+        inhibiting one. The neurons 2k and 2k + 1 are extensor and flexor of oscillator k.
 
-        The order is from listing B.2: by inhibited neuron, then by inhibiting neuron. Both neurons
-        have the same kind.
+        Weights are sorted by inhibited neuron, then by inhibiting neuron, as in listing B.2 of the
+        thesis. Both neurons of a weight have the same kind.
         """
         kind = np.arange(2 * self.blueprint.signals) % 2
         coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
@@ -69,7 +70,8 @@ class Weights:
 
     @functools.cached_property
     def images(self) -> np.ndarray:
-        """Index of the mirror image of each weight (weights,); the weight itself if it has none."""
+        """Index of the mirror image of each weight (weights,): the weight between the oscillators
+        on the robot's other side. The weight's own index if it has none."""
         images = self.blueprint.images
         opposite = [k if image is None else image for k, image in enumerate(images)]
         neurons = np.add.outer(2 * np.array(opposite, dtype=int), [0, 1]).ravel()
@@ -79,13 +81,15 @@ class Weights:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the weights: "3->1 extensor" is from oscillator 3 onto 1, counted from 1."""
+        """Names of the weights: with "3->1 extensor", the extensor of oscillator 3 inhibits the
+        extensor of oscillator 1. Oscillators are counted from 1."""
         pairs = self.couplings.tolist()
         return tuple(f"{j // 2 + 1}->{i // 2 + 1} {NEURONS[i % 2]}" for i, j in pairs)
 
 
 def constant_steering(turn: float) -> SteeringSignal:
-    """Steering with a constant turn. Raises InputError if it is not a number."""
+    """Steering function that gives the same turn, -1 to 1, at all times. Raises InputError unless
+    the turn is a number; checked_turn() checks its limits later."""
     if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
         expected = "a number from -1 to 1, or a function of the time in s"
         raise InputError("steering", "", f"found {turn!r}, expected {expected}")
@@ -93,15 +97,16 @@ def constant_steering(turn: float) -> SteeringSignal:
 
 
 def checked_turn(turn: float, *, time: float) -> float:
-    """Turn as a number, if it is between -1 and 1. Raises InputError otherwise, naming the `time`
-    (s)."""
+    """The turn as a float. Raises InputError unless it is a number from -1 to 1; the message names
+    the `time` (s) for which a steering function gave it."""
     if not isinstance(turn, numbers.Real) or not abs(turn) <= 1.0:
         raise InputError("steering", f"at {time:g} s", f"found {turn!r:.60}, expected -1 to 1")
     return float(turn)
 
 
 def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
-    """State of the neurons at t = 0 (4n,): u of all neurons, then v (Table 4)."""
+    """State of the neurons of n oscillators at t = 0 (4n,), by default from Table 4 of the thesis:
+    the inner states u of all neurons, then the self-inhibitions v."""
     inner_state, extensor_self_inhibition, flexor_self_inhibition = cpg.initial_state
     u = np.full(2 * oscillators, inner_state)
     v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)

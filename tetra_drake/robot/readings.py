@@ -43,7 +43,7 @@ class Readings(NamedTuple):
 
     @classmethod
     def empty(cls, structure: Structure, count: int) -> Self:
-        """Readings of a number of robots, not filled yet."""
+        """Readings with room for `count` robots of a structure; fill them with put()."""
         sizes = {
             "robots": count,
             "cables": len(structure.cables),
@@ -63,8 +63,10 @@ class Readings(NamedTuple):
         cable_forces: np.ndarray,
         ground_forces: np.ndarray,
     ) -> Self:
-        """The readings of a robot at a time (s), from the state (13 n,) of its bodies and the
-        tables `cable_forces` of laws.cable and `ground_forces` of laws.contact."""
+        """The readings of one robot at a time (s), as copies.
+
+        They are from the state [q; v] (13 n,) of its bodies and the tables `cable_forces` (cables,
+        7) of laws.cable and `ground_forces` (contacts, 3) of laws.contact at that time."""
         nodes, bodies = moved_nodes(structure, state), len(structure.bodies)
         return cls(
             time=time,
@@ -79,21 +81,23 @@ class Readings(NamedTuple):
         )
 
     def rows(self, which: int | slice) -> Self:
-        """Readings of one robot, or of several, as views of the arrays."""
+        """Readings of one robot (an index; without the first axis) or of several (a slice). They
+        are views: they change with these readings."""
         return type(self)(*(values[which] for values in self))
 
     def copied(self) -> Self:
-        """A copy of the readings."""
+        """A copy of the readings, which does not change with them."""
         return type(self)(*(values.copy() for values in self))
 
     def put(self, place: int, readings: Readings) -> None:
-        """Writes the readings of a single robot to row `place`."""
+        """Writes the `readings` of a single robot into these arrays, at index `place` of the first
+        axis."""
         for values, given in zip(self, readings, strict=True):
             values[place] = given
 
 
 def first_readings(robot: Robot) -> Readings:
-    """The readings of a robot at its start."""
+    """The readings of a robot at its start, t = 0, without a simulation."""
     return readings_at(
         robot,
         time=0.0,
@@ -114,14 +118,15 @@ def readings_at(
     drives: np.ndarray,
     ground_forces: np.ndarray | None = None,
 ) -> Readings:
-    """The readings of a robot at a time (s).
+    """The readings of one robot, computed from its full state at a time (s).
 
     Args:
-        state: state (13 n,) of the bodies.
-        modes: modes of the contact nodes; see laws.contact.
+        state: state [q; v] (13 n,) of the bodies.
+        modes: table `modes` (contacts, 12) of the contact nodes; see laws.contact.
         signals: signals (m,) in N.
-        drives: states of the actuators (drives,).
-        ground_forces: table `ground_forces` of an engine with its own law of contact.
+        drives: states of the actuators (drives,); see laws.actuator.
+        ground_forces: forces (contacts, 3) in N along t1, t2 and n from an engine with its own law
+            of contact. By default they are computed from state and modes.
     """
     _, cables, ground = forces_of_motion(
         robot.model, state[np.newaxis], modes[np.newaxis], signals[np.newaxis], drives[np.newaxis]
@@ -136,8 +141,8 @@ def readings_at(
 
 
 def pitch_rates(readings: Readings, structure: Structure) -> np.ndarray:
-    """Angular velocities (N,) about the world's y axis of robots as a whole; see
-    kinematics.pitch_rate()."""
+    """Pitch rates (N,) in rad/s of N robots: the angular velocity of each robot as a whole about
+    the world's y axis; see kinematics.pitch_rate()."""
     rates = np.empty(len(readings.time))
     write_pitch_rates(readings.p_WN, readings.v_WN, structure.first_node[-1], rates)
     return rates
@@ -145,7 +150,8 @@ def pitch_rates(readings: Readings, structure: Structure) -> np.ndarray:
 
 @compiled
 def write_pitch_rates(p_WN: Table, v_WN: Table, moving: int, rates: Table) -> None:
-    """Writes the pitch rates (N,) of robots, from positions and velocities (N, nodes, 3)."""
+    """Writes the pitch rates (rad/s) of N robots to `rates` (N,), from positions (m) and velocities
+    (m/s) of nodes (N, nodes, 3). Only the first `moving` nodes count; the others are fixed."""
     nodes = np.empty((moving, kinematics.NODE_COLUMNS))
     for robot in range(rates.size):
         for node in range(moving):

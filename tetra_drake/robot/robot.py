@@ -42,7 +42,8 @@ SAME_LENGTH = 1e-10
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot on its ground, ready to be simulated."""
+    """A robot of a scenario on its ground at t = 0: what an engine needs for a simulation, except
+    a gait or other signals."""
 
     scenario: Scenario
     structure: Structure
@@ -55,11 +56,12 @@ class Robot:
 
     @classmethod
     def of(cls, scenario: Scenario, *, at_rest: bool = False) -> Self:
-        """The robot of a scenario at its start.
+        """The robot of a scenario at its start: in equilibrium if its settings say so, then moved
+        by the offsets of its bodies, on the scenario's terrain.
 
         Args:
-            at_rest: leaves out the offsets, and lets struts overlap at the given positions if the
-                search for the equilibrium moves them apart.
+            at_rest: leaves out the offsets. Also allows struts to overlap at the positions of the
+                settings, because the search for the equilibrium may move them apart.
 
         Raises:
             InputError: if the robot has no equilibrium, or would start in the ground, outside its
@@ -88,10 +90,11 @@ class Robot:
         return cls(scenario, structure, model, first_signals=np.zeros(structure.signals))
 
     def without_network(self) -> Robot:
-        """The robot with one signal for each driven cable.
+        """A copy of the robot for given signals in place of oscillators: one for each driven cable,
+        in the order of `driven`.
 
-        Actuators that imitate springs and dampers do not do so here: a command contains their
-        effect.
+        Where software of the actuators imitates a cable's spring and damper, the copy has none: the
+        given signal is the whole tension.
         """
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
@@ -116,7 +119,7 @@ class Robot:
 
     @property
     def ground(self) -> Ground:
-        """The ground under the robot."""
+        """Laws, heights and contact nodes of the ground under the robot, for kernels."""
         return self.model.ground
 
     @property
@@ -126,16 +129,18 @@ class Robot:
 
     @functools.cached_property
     def equilibrium(self) -> Equilibrium:
-        """Equilibrium of the robot on flat ground without actuation. The scenario's terrain and
-        offsets are ignored. Raises InputError if there is no equilibrium."""
+        """Equilibrium of the robot on flat ground without actuation, found at the first use. The
+        scenario's terrain and offsets are ignored. Raises InputError if there is no
+        equilibrium."""
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
         return equilibrium_of(self.scenario, _placed(self.scenario))
 
     @functools.cached_property
     def senses(self) -> Senses:
-        """Constants of the oscillators' sensors. Raises InputError if feedback needs an
-        equilibrium and there is none."""
+        """Constants for the feedback from cable lengths and contacts to the oscillators; see
+        laws.feedback. Raises InputError if the feedback of lengths needs the robot's equilibrium
+        and there is none."""
         structure, pathways = self.structure, self.scenario.cpg.feedback if self.has_network else []
         drivers = structure.cables["signal"].copy()
         bodies = structure.carriers[structure.cable_ends]
@@ -154,7 +159,8 @@ class Robot:
         )
 
     def network(self, gait: Gait) -> Network:
-        """Oscillator network of a gait. Raises InputError if the gait does not fit the scenario."""
+        """Constants of the oscillator network that a gait gives this robot. Raises InputError if
+        the gait does not fit the scenario."""
         cpg = self.scenario.cpg
         weights = Weights(self.structure, cpg.reach)
         check_gait(gait, self.scenario, weights, source=f"gait {gait.name}")
@@ -170,9 +176,11 @@ class Robot:
         )
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-        """Steering, -1 to 1, at multiples of `cpg.listing_step`; one value without `steering`.
+        """Values of `steering`, -1 to 1, at multiples of `cpg.listing_step` from t = 0 to the end;
+        without `steering` one value, the gait's constant turn.
 
-        Raises InputError if a turn is not between -1 and 1, or if the robot cannot be steered.
+        At 1 only the left oscillators have input, at -1 only the right ones. Raises InputError if a
+        value is not between -1 and 1, or if no oscillator is on one side of the robot.
         """
         if steering is None:
             return np.array([gait.turn])
@@ -183,19 +191,19 @@ class Robot:
         return np.array([checked_turn(steering(time), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
-        """Input u0 of each neuron (..., 2m), for turns (...); see
+        """Tonic input u0 of each of the 2m neurons (..., 2m), for turns (...) from -1 to 1; see
         laws.oscillator.steered_input()."""
         sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.external_input
         return np.asarray(steered_input(u0, turns[..., np.newaxis], sides))
 
     def starting_drives(self) -> np.ndarray:
-        """States of the actuators at t = 0 (drives,), in the order of the cables; see
-        laws.actuator."""
+        """States of the actuators at t = 0 (drives,), in the order of the cables; empty if the
+        kind of actuators has no states. See laws.actuator."""
         cables = self.starting_cables(np.sort(self.driven))
         return np.asarray(self.scenario.actuation.drives(cables))
 
     def starting_cables(self, numbers: np.ndarray | None = None) -> DrivenCables:
-        """Lengths and constants of driven cables at t = 0.
+        """Driven cables at t = 0, for methods of the actuators: lengths, signals and constants.
 
         Args:
             numbers: indices of the cables, by default all driven ones.
@@ -207,8 +215,8 @@ class Robot:
 
     @functools.cached_property
     def starting_modes(self) -> np.ndarray:
-        """Modes of the contact nodes at t = 0 (see laws.contact). A node that touches the ground
-        sticks."""
+        """Table `modes` (contacts, 12) of laws.contact at t = 0. A contact node that touches the
+        ground sticks at its position."""
         modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
         parts = Packed((self.model, Forces.of(self.model)))
         modes_after_step(parts, self.structure.initial_state, modes)
@@ -216,7 +224,8 @@ class Robot:
 
 
 def _placed(scenario: Scenario) -> Structure:
-    """The structure of a scenario's robot at the positions of its settings."""
+    """The structure of a scenario's robot at the positions of its settings, before any search for
+    equilibrium. It has no contact nodes if the scenario has no ground."""
     blueprint = scenario.robot.blueprint()
     if not scenario.terrain.is_ground:
         blueprint = dataclasses.replace(blueprint, contacts=np.array([], dtype=np.int64))
@@ -224,9 +233,10 @@ def _placed(scenario: Scenario) -> Structure:
 
 
 def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Structure, Model]:
-    """A structure in equilibrium on flat ground, and its model, from those at the given positions.
+    """Moves a structure into equilibrium on flat ground. Returns the moved structure and its model.
 
-    Elastic struts become as long as their forces in equilibrium make them. The forces depend on the
+    `placed` and `model` are the structure and its model at the positions of the settings. Elastic
+    struts become as long as their forces in equilibrium make them. The forces depend on the
     lengths, so both are corrected alternately.
     """
     up = np.array([0.0, 0.0, lift(scenario, placed)])
@@ -272,7 +282,8 @@ def equilibrium_of(
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
-    """Constants of a robot for the kernels: of its structure and of its physical laws."""
+    """Constants of a robot as arguments of the compiled kernels: its structure, and the physical
+    laws of the scenario. Raises InputError for a wrong start on the terrain, as make_ground()."""
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,

@@ -22,7 +22,8 @@ FIXED = "fixed nodes"
 
 
 def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
-    """SDFormat text for the bodies of a structure, at the poses of a state (13 bodies,)."""
+    """SDFormat text of a model called `name`: the bodies of a structure at the poses of a state
+    (13 bodies,), with a frame for each node. Cables are left out."""
     root = Element("sdf", version="1.9")
     model = add_element(root, "model", name=name)
     shapes = [*shapes_of(structure)]
@@ -66,7 +67,10 @@ def _add_pose(parent: Element, X: RigidTransform) -> None:
 
 
 def _add_shape(link: Element, purpose: str, shape: Shape, kind: str) -> Element:
-    """Adds a solid with the SDFormat tag `kind`, or a sphere for a shape without length."""
+    """Adds a shape to a link, with the tag `purpose`: "visual" or "collision".
+
+    `kind` is the SDFormat tag of its solid: "cylinder" or "capsule". A shape of length 0 is a
+    sphere."""
     element = add_element(link, purpose, name=shape.name)
     _add_pose(element, shape.X_BS)
     solid = add_element(add_element(element, "geometry"), kind if shape.length else "sphere")

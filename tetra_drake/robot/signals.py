@@ -44,19 +44,20 @@ class DrivenRobot:
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
-        """A robot driven by the network of a gait."""
+        """A robot driven by the network of a gait. `steering`, a function of time, replaces the
+        gait's constant turn."""
         none = np.zeros((0, robot.structure.signals))
         return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)
 
     @property
     def start_up(self) -> float:
-        """Time (s) from which the signals act."""
+        """Time (s) from which the signals act: `cpg.start_up` for a gait, otherwise 0."""
         return self.robot.scenario.cpg.start_up if self.gait else 0.0
 
     @property
     def steady_start(self) -> float:
-        """Time (s) at which the steady stretch of the motion starts. Mean values are over this
-        stretch."""
+        """Time (s) from which mean values are taken: `simulation.steady_from`, or the start-up time
+        if this is later."""
         return max(self.robot.scenario.simulation.settling_time, self.start_up)
 
     @property
@@ -66,12 +67,13 @@ class DrivenRobot:
 
     @property
     def is_live(self) -> bool:
-        """True if a network is integrated together with the robot."""
+        """True if a network is integrated together with the robot's motion (`cpg.signals: live`).
+        False if its signals are computed beforehand, or given."""
         return self.gait is not None and self.robot.scenario.cpg.signals == "live"
 
     @property
     def sample_count(self) -> int:
-        """Number of samples of the signals, a network's included."""
+        """Number of samples of the signals: of the given ones, or of the network's output."""
         if self.gait is None:
             return len(self.samples)
         scenario = self.robot.scenario
@@ -79,7 +81,8 @@ class DrivenRobot:
         return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
 
     def signals_at(self, times: np.ndarray) -> np.ndarray:
-        """Signals (times, m) in N at `times` (s); zero before the start-up time."""
+        """Signals (times, m) in N at `times` (s), interpolated between samples; zero before the
+        start-up time. For a gait they are from signal_samples()."""
         samples = self._all_samples
         grid = self.robot.scenario.cpg.listing_step * np.arange(len(samples))
         values = np.empty((len(times), samples.shape[1]))
@@ -90,22 +93,23 @@ class DrivenRobot:
 
     @functools.cached_property
     def _all_samples(self) -> np.ndarray:
-        """Samples (k, m) in N of the signals, a network's included."""
+        """Samples (k, m) in N of the signals at multiples of `cpg.listing_step`: the given ones, or
+        a network's output."""
         if self.gait is None:
             return self.samples
         return signal_samples(self.robot, self.gait, self.steering)
 
     @property
     def changes(self) -> dict[float, np.ndarray]:
-        """Signals (m,) in N after each change of the given signals, by the time (s) at which the
-        change begins."""
+        """Changes of the given signals: key is the time (s) at which a change begins, value the
+        signals (m,) in N after it. Empty for a gait."""
         begins = self.robot.scenario.cpg.listing_step * self._changing
         after = self.samples[self._changing + 1]
         return dict(zip(begins.round(MARK_DECIMALS).tolist(), after, strict=True))
 
     @functools.cached_property
     def _changing(self) -> np.ndarray:
-        """Indices of the given samples that differ from the next."""
+        """Indices of the given samples after which the signals change: the next sample differs."""
         return np.flatnonzero((np.diff(self.samples, axis=0) != 0.0).any(axis=1))
 
     @functools.cached_property
@@ -128,18 +132,21 @@ class DrivenRobot:
 
     @property
     def gains(self) -> np.ndarray:
-        """Gains of the network's feedback, in the order of PATHWAYS; zeros if there is none."""
+        """Gains of the network's feedback, one for each pathway in the order of
+        laws.feedback.PATHWAYS; zeros without feedback or network."""
         gains = self.gait.gains if self.gait else Gains()
         return np.array([gain for _, gain in gains])
 
     @property
     def turns(self) -> np.ndarray:
-        """Steering, -1 to 1, at multiples of `cpg.listing_step`; see Robot.turns()."""
+        """Turns, -1 to 1, at multiples of `cpg.listing_step`; one value if the turn is constant,
+        0 without a gait. See Robot.turns()."""
         return self.robot.turns(self.gait, self.steering) if self.gait else np.zeros(1)
 
 
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-    """Signals (samples, m) in N at multiples of `cpg.listing_step`, until after the duration.
+    """Signals (samples, m) in N of a gait without feedback, at multiples of `cpg.listing_step` from
+    t = 0 until after the duration.
 
     They are `cpg.gain` times the output of the network, y_extensor - y_flexor. Between samples they
     are linear. They are not set to zero before the start-up time. The turn within a step is the

@@ -17,8 +17,8 @@ LEAST_LIMIT = 10.16
 
 
 def speed_limit(driven: DrivenRobot) -> float:
-    """Speed limit of a robot's bodies in m/s: `simulation.max_speed`, by default a speed that the
-    robot cannot reach.
+    """Speed (m/s) of a body above which a simulation counts as diverged: `simulation.max_speed`, by
+    default a speed that the robot cannot reach.
 
     The default is the speed of the lightest body if it had all possible energy. This is the energy
     of a fall from the robot's top to the lowest ground, of the cables at the start, and of a pull

@@ -19,7 +19,8 @@ structure's size. Coordinates need at least six digits."""
 
 
 class Statics(NamedTuple):
-    """Self-stress states and mechanisms of a structure."""
+    """Self-stress states of a structure (tensions in balance without loads) and its mechanisms
+    (motions that change no cable's length to first order)."""
 
     self_stresses: np.ndarray
     """Orthonormal basis (s, cables) of the tensions that are in balance without loads, other than
@@ -37,7 +38,7 @@ def find_statics(
     cable_ends: np.ndarray,
     held: np.ndarray | None = None,
 ) -> Statics:
-    """Statics of rigid bodies joined by cables.
+    """Self-stress states and mechanisms of rigid bodies joined by cables.
 
     `held` (nodes, 3) is True for each axis of a node along which the world holds it; by default
     nothing is held. For the other arguments see cable_wrenches().

@@ -38,7 +38,8 @@ SLENDERNESS = 100.0
 
 @dataclass(frozen=True, kw_only=True)
 class Structure(Blueprint):
-    """Rigid bodies joined by cables; SI units. A body consists of struts between nodes."""
+    """A blueprint whose bodies have masses, inertias and poses at t = 0: rigid bodies joined by
+    cables; SI units. A body consists of struts between nodes."""
 
     p_BN: np.ndarray
     """Positions of the nodes (nodes, 3) in the frames of their bodies; of fixed nodes in the world.
@@ -72,8 +73,9 @@ class Structure(Blueprint):
         )
 
     def turned(self, slope: float) -> Self:
-        """The structure turned with an incline: the ground rises by `slope` (rad) along x, and the
-        bodies turn about the world's y axis."""
+        """A copy of the structure that stands on an incline as it did on flat ground. The incline
+        rises by `slope` (rad) along x; all bodies turn about the world's y axis through the
+        origin."""
         # Written out, because processors round a product of matrices differently.
         s, c = math.sin(slope), math.cos(slope)
         forward, left, up = self.p_WB.T
@@ -85,7 +87,8 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def cables(self) -> np.ndarray:
-        """Cables with their constants: records (cables,) of dtype CABLE."""
+        """Cables with their nodes, signals and constants: records (cables,) of dtype
+        laws.cable.CABLE. The signal of a cable without actuator is PASSIVE."""
         cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
         cables["signal"] = cable.PASSIVE
@@ -112,7 +115,8 @@ class Structure(Blueprint):
 
     @property
     def radius(self) -> np.ndarray:
-        """Largest distance of a node from the centre of mass of each body (bodies,), in m."""
+        """Radius (bodies,) in m of each body: the largest distance of its nodes from its centre of
+        mass."""
         distances = np.linalg.norm(self.p_BN[: self.first_node[-1]], axis=1)
         return np.asarray(np.maximum.reduceat(distances, self.first_node[:-1]))
 
@@ -122,8 +126,9 @@ class Structure(Blueprint):
 
     @property
     def couplings(self) -> Couplings:
-        """Pairs of bodies that cables join, in the order of the cables. Raises ValueError if the
-        cables of a pair are not next to each other."""
+        """Pairs of bodies that cables join, in the order of the cables, for kernels that go through
+        the cables pair by pair. Raises ValueError if the cables of a pair are not next to each
+        other, or cables from fixed nodes are not first."""
         pairs = self.carriers[self.cable_ends]
         held = int(np.count_nonzero(pairs[:, 0] == WORLD))
         begins = held + np.flatnonzero(np.any(np.diff(pairs[held:], axis=0, prepend=-1), axis=1))
@@ -136,7 +141,8 @@ class Structure(Blueprint):
 
     @property
     def anchors(self) -> AnchorSprings:
-        """Springs that hold nodes of bodies at their positions in the settings."""
+        """Springs that hold nodes of bodies at their positions in the settings; only the nodes with
+        such a spring."""
         nodes = np.flatnonzero(self.anchor_stiffness.any(axis=1))
         return AnchorSprings(
             nodes,
@@ -148,7 +154,7 @@ class Structure(Blueprint):
 
     @property
     def loads(self) -> NodeLoads:
-        """The constant forces on nodes."""
+        """The constant forces (N) on nodes from the settings; only the nodes with a load."""
         nodes = np.flatnonzero(self.node_load.any(axis=1))
         return NodeLoads(nodes, self.node_load[nodes])
 
@@ -199,7 +205,8 @@ def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Table `nodes` of laws.kinematics for a state (13 n,) of the bodies; without forces."""
+    """Table `nodes` of laws.kinematics (nodes, NODE_COLUMNS) for a state (13 n,) of the bodies:
+    positions and velocities. The forces are 0."""
     nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
     kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
@@ -234,7 +241,7 @@ class Shape(NamedTuple):
 
 
 def shapes_of(structure: Structure) -> Iterator[Shape]:
-    """The struts of a structure, then its spheres."""
+    """Visible shapes of a structure: its struts as cylinders, then the spheres at its nodes."""
     table, p_BN = structure.strut_table, structure.p_BN
     for strut, (a, b) in enumerate(structure.struts):
         name, X_BS = f"strut {structure.strut_name(strut)}", strut_pose(p_BN[a], p_BN[b])
@@ -249,7 +256,8 @@ def shapes_of(structure: Structure) -> Iterator[Shape]:
 def AddNodes(
     plant: MultibodyPlant, structure: Structure, bodies: Sequence[RigidBody]
 ) -> list[Frame]:
-    """Adds a frame "node NAME" for each node of a structure to a plant that is not finalized."""
+    """Adds a frame "node NAME" for each node of a structure to a plant that is not finalized, and
+    returns these frames. `bodies` are from AddBodies(); fixed nodes get frames of the world."""
     carriers = [*bodies, plant.world_body()]
     nodes = zip(structure.node_names, structure.carriers, structure.p_BN, strict=True)
     return [
@@ -259,6 +267,7 @@ def AddNodes(
 
 
 def AddFrame(plant: MultibodyPlant, name: str, parent: Frame, p: npt.ArrayLike) -> Frame:
-    """Adds a frame at a position p (3,) in m in another frame to a plant that is not finalized."""
+    """Adds a frame to a plant that is not finalized. The frame is fixed in `parent`, at the
+    position p (3,) in m, with the axes of `parent`."""
     offset = RigidTransform(np.asarray(p, dtype=float))
     return plant.AddFrame(FixedOffsetFrame(name, parent, offset))

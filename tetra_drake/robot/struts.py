@@ -37,7 +37,8 @@ ELONGATION = 1e-6
 
 
 def strut_contact_law(scenario: Scenario, structure: Structure) -> StrutContactLaw:
-    """Constants of the contact between struts for the kernels."""
+    """Constants of the contact between struts for the kernels: its law, and the distances that
+    decide which pairs of struts are checked. `acts` is False without struts."""
     lightest, radii = structure.mass.min(), structure.strut_radius
     if not radii.size:
         search = StrutSearch(0.0, drift=0.0, passage=0.0, lightest=lightest)
@@ -49,9 +50,12 @@ def strut_contact_law(scenario: Scenario, structure: Structure) -> StrutContactL
 
 
 def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:
-    """Raises InputError if struts that touch overlap in the initial pose of a structure, by more
-    than the robot's weight would press them. With `may_overlap`, only if their axes meet, as no
-    direction leads them apart then."""
+    """Raises InputError if struts of different bodies overlap in the initial pose of a structure,
+    by more than the robot's weight would press them into each other.
+
+    With `may_overlap`, overlaps are allowed, except where the axes of two struts meet: then no
+    direction leads them apart. Nothing is checked if the scenario lets struts pass through each
+    other."""
     if not strut_contact_law(scenario, structure).acts:
         return
     found = overlaps(scenario, structure, structure.initial_state)
@@ -69,9 +73,11 @@ def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool =
 def overlaps(
     scenario: Scenario, structure: Structure, state: np.ndarray
 ) -> dict[tuple[str, str], tuple[float, float]]:
-    """Struts of different bodies that overlap in a state (13 bodies,), by their names: depths and
-    distances of their axes, in m. Depths by which the robot's weight presses touching struts do not
-    count."""
+    """Overlaps of struts of different bodies in a state (13 bodies,).
+
+    Key: the names of the two struts. Value: depth of the overlap and distance of the axes, in m.
+    Depths by which the robot's weight presses touching struts into each other are left out.
+    """
     struts, contact = structure.strut_table, strut_contact_law(scenario, structure)
     allowed = START_DEPTH * structure.scale
     if contact.acts:
@@ -94,10 +100,12 @@ def elastic_struts(blueprint: Blueprint) -> np.ndarray:
 
 
 def axial_forces(structure: Structure, unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Axial forces (struts,) in N on the struts at rest in a state; negative in compression.
+    """Axial forces (struts,) in N on the struts at rest in a state (13 bodies,); negative in
+    compression.
 
-    The force on each end counts by the end's distance from the centre of mass, which stays where it
-    is as a strut becomes longer.
+    The forces on the two ends are weighted by the distances of the ends from the body's centre of
+    mass, divided by the strut's length. For the centre of mass stays where it is as a strut becomes
+    longer, so an end moves in proportion to its distance from it.
     """
     force_at_rest(unactuated, state)
     forces = unactuated.forces.nodes[:, FORCE : FORCE + 3]
@@ -126,8 +134,13 @@ def elongated(structure: Structure, elongation: np.ndarray) -> np.ndarray:
 def condensed(
     stiffness: np.ndarray, structure: Structure, unactuated: Unactuated, state: np.ndarray
 ) -> np.ndarray:
-    """A stiffness matrix (6 n, 6 n) of rigid bodies in equilibrium, with the compliance of the
-    elastic struts: their elongations follow the displacements of the bodies without inertia."""
+    """Stiffness matrix (6 n, 6 n) in N/m with the compliance of the elastic struts (static
+    condensation).
+
+    `stiffness` is the matrix of the n bodies as if rigid, from stiffness_at_rest(), in the
+    equilibrium `state` (13 n,). The elongations of the struts have no inertia: they follow the
+    displacements of the bodies at once.
+    """
     elastic = elastic_struts(structure)
     if not elastic.size:
         return stiffness

@@ -9,7 +9,8 @@ import numpy as np
 
 
 def add_element(parent: Element, tag: str, text: Any = None, **attributes: Any) -> Element:
-    """Adds an element. Its text and attributes are texts, numbers or arrays of numbers."""
+    """Adds an element `tag` to `parent` and returns it. Its text and attributes are texts, numbers
+    or arrays of numbers, which are written with spaces in between."""
     written = {name: _written(value) for name, value in attributes.items()}
     element = SubElement(parent, tag, written)
     element.text = None if text is None else _written(text)
@@ -17,11 +18,12 @@ def add_element(parent: Element, tag: str, text: Any = None, **attributes: Any) 
 
 
 def xml_text(root: Element) -> str:
-    """A document as indented text."""
+    """XML document with the element `root`, as indented text."""
     indent(root)
     return tostring(root, encoding="unicode") + "\n"
 
 
 def _written(value: Any) -> str:
-    """Text of an attribute: numbers with all their digits."""
+    """Text of an attribute's or element's value: numbers with all their digits, arrays with spaces
+    in between."""
     return value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))

@@ -47,7 +47,11 @@ def DeclareOutput(
     read: Callable[[SystemT, Context], np.ndarray],
     sources: set[DependencyTicket],
 ) -> None:
-    """Declares a vector output port of a system. `read` computes its values in a context."""
+    """Declares a vector output port of a system, without keeping the system alive.
+
+    `read`, given the system and a context, computes the values; an array is flattened row by row.
+    `sources` are the tickets of all that the values depend on.
+    """
     # A reference to the system in its port would keep it alive for ever.
     this: Any = weakref.proxy(system)
     system.DeclareVectorOutputPort(
@@ -74,7 +78,8 @@ class Nodes(NamedTuple):
 
     @classmethod
     def of(cls, plant: MultibodyPlant, frames: Iterable[Frame]) -> Self:
-        """The nodes at frames of a finalized plant; a frame may occur several times."""
+        """The nodes at the origins of frames of a finalized plant. A frame that occurs several
+        times gets one node."""
         # The world is a plant's first body, and its nodes are the last ones.
         places = {}
         for frame in frames:
@@ -152,8 +157,9 @@ class BodyForces(LeafSystem):
 def checked_numbers(
     source: str, key: str, given: npt.ArrayLike, *, count: int, least: float = -math.inf
 ) -> np.ndarray:
-    """Array (count,) of a given number for all, or of given numbers for each. Raises InputError,
-    which names `source` and `key`, unless they are finite and at least `least`."""
+    """Array (count,) from an argument that is one number for all entries, or has a number for each.
+    Raises InputError, which names `source` and `key`, unless they are finite and at least
+    `least`."""
     found = np.full(count, np.nan)
     with contextlib.suppress(TypeError, ValueError):
         found[:] = given

@@ -32,7 +32,7 @@ class CableGeometry(LeafSystem):
 
     | port          | shape       | unit | meaning                                      |
     |---------------|-------------|------|----------------------------------------------|
-    | ends          | (6 cables,) | m    | positions of the two ends, by cable          |
+    | ends          | (6 cables,) | m    | per cable: position of end a, then of end b  |
     | geometry_pose |             | SI   | FramePoseVector of all cylinders             |
 
     A shape in a SceneGraph keeps its length. So each cable is shown by PIECES cylinders, which

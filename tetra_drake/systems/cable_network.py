@@ -53,8 +53,11 @@ class CableNetwork(LeafSystem):
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (cables,)      | m/s    | rate of each cable's length              |
     | cable_forces      | (7 cables,)    | SI     | table of laws.cable, row by row          |
-    | ends              | (6 cables,)    | m      | positions of the two ends, by cable      |
+    | ends              | (6 cables,)    | m      | per cable: position of end a, then of b  |
     | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
+
+    Inputs are `state`, `signals` and `drives`. A row of `cable_forces` has the direction (3) from
+    end a to end b, length, tension, derivative of the tension by the rate, and rate.
 
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
     loop. Where the model is `slack`, a cable goes slack instead of pushing. The port `signals`
@@ -63,7 +66,8 @@ class CableNetwork(LeafSystem):
     """
 
     def __init__(self, model: Model, *, names: Sequence[str], signals: int) -> None:
-        """Cables with `names`, driven by as many signals as `signals` says."""
+        """Cables of a model, which has their constants and the bodies. `names` are the cables'
+        names, for errors. `signals` is the number m of signals."""
         super().__init__()
         self._names = names
         bodies, count = model.bodies.mass.size, model.cables.signal.size
@@ -99,7 +103,8 @@ class CableNetwork(LeafSystem):
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
     ) -> np.ndarray:
-        """The table `cable_forces`. Writes the generalized force to `force`, if given.
+        """The table `cable_forces` (cables, 7). Writes the generalized force to `force` (6 n,), if
+        given.
 
         With `moves_only`, the inputs other than the state are not read: only lengths and rates are
         valid. Raises SimulationFailure if a number of a cable is not finite although the state is.
@@ -158,11 +163,12 @@ def AddCables(
     `signals` of the returned system if cables are actuated.
 
     Args:
-        actuated: names of the cables that each signal drives, in the order of the signals.
+        actuated: for each signal, in the order of the signals, the names of the cables that it
+            drives. The keys name the signals, in errors only. By default all cables are passive.
         actuation: kind of the actuators, Force() by default. Kinds with states are added as the
             system NAME_actuators, which is Drake's Integrator of `drive_rates`.
-        drives: states of the actuators at t = 0; by default their states without signals at the
-            plant's default positions.
+        drives: states of the actuators at t = 0, in the order of the cables. By default those
+            that fit signals of 0 at the plant's default positions.
         slack: False if cables also push.
         scene_graph: where to show the cables.
         name: name of the system.
@@ -215,7 +221,8 @@ def AddCables(
 
 
 def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
-    """Raises InputError unless the cables can be between frames of a plant."""
+    """Raises InputError unless the cables have different names, valid constants, and frames of this
+    plant as their ends."""
     check_type("AddCables", "cables", cables, Sequence)
     for place, one in enumerate(cables):
         check_type("AddCables", f"cables[{place}]", one, Cable)
@@ -232,7 +239,10 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
 def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
-    """Records of the cables (cables,), of dtype CABLE. Raises InputError for a wrong `actuated`."""
+    """Records (cables,) of dtype laws.cable.CABLE: nodes, signal and constants of each cable.
+
+    Raises InputError if `actuated` has an unknown cable, or a cable twice.
+    """
     places = {one.name: place for place, one in enumerate(cables)}
     table = np.zeros(len(cables), dtype=cable.CABLE)
     table["node_a"] = [nodes.of_frame[one.frame_a.index()] for one in cables]

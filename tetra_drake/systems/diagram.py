@@ -142,7 +142,8 @@ def MakeTensegrityDiagram(
 def _AddPlant(
     builder: DiagramBuilder, meshcat: Meshcat | None
 ) -> tuple[MultibodyPlant, SceneGraph | None]:
-    """Adds `plant`, with a SceneGraph if it is shown in Meshcat."""
+    """Adds an empty, continuous `plant`. With `meshcat`, also adds a SceneGraph that is shown
+    there; otherwise None is returned in its place."""
     if meshcat is None:
         return builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0)), None
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
@@ -151,7 +152,8 @@ def _AddPlant(
 
 
 def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
-    """The cables of a structure for AddCables(). `nodes` are the frames of its nodes."""
+    """The cables of a structure, for AddCables(). `nodes` are the frames of its nodes, in their
+    order, from AddNodes()."""
     return [
         Cable(name, nodes[a], nodes[b], CableLaw(**law))
         for name, (a, b), law in zip(
@@ -167,7 +169,8 @@ def _AddFeedback(
     signals: OutputPort,
     ground: System,
 ) -> None:
-    """Adds `feedback` to the diagram and connects it to the robot and to `cpg`."""
+    """Adds `feedback` to the diagram. Its inputs are `state`, `signals`, modes of the `ground`, and
+    the states of actuators if there are any; its output goes to `cpg`."""
     builder.AddNamedSystem("feedback", feedback)
     builder.Connect(state, feedback.GetInputPort("state"))
     builder.Connect(signals, feedback.GetInputPort("signals"))
@@ -221,7 +224,8 @@ def _check_size(port: InputPort | OutputPort, size: int) -> None:
 def _AddSignals(
     builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
 ) -> OutputPort:
-    """Adds `cpg`, and `start_up` behind it. Returns the port with the signals of the cables.
+    """Adds the systems `cpg` and `start_up` to the diagram. Returns the output port of `start_up`,
+    with the signals of the cables.
 
     `cpg` is a live network with its `steering`, or a source of signals that were computed
     beforehand.

@@ -24,8 +24,8 @@ class Feedback(LeafSystem):
     | state      | (13 n,)        | SI     | [q; v] of n free bodies, from the plant           |
     | signals    | (m,)           | N      | signals of the cables                             |
     | drives     | (drives,)      | m or N | states of the actuators                           |
-    | mode_table | (12 contacts,) | SI     | table of laws.contact, row by row, of the ground  |
-    | feedback   | (2m,)          | 1      | f of Eq. 7 for the neurons of m oscillators       |
+    | mode_table | (12 contacts,) | SI     | port of GroundContact, with the state of contacts |
+    | feedback   | (2m,)          | 1      | output: f of thesis Eq. 7, for 2m neurons         |
 
     The port `drives` exists only if the kind of actuators has states.
     """
@@ -33,7 +33,7 @@ class Feedback(LeafSystem):
     def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
         """Feedback with a gain per pathway, in the order of laws.feedback.PATHWAYS.
 
-        Raises InputError if the robot has no equilibrium.
+        Raises InputError if lengths are fed back and the robot has no equilibrium to compare with.
         """
         super().__init__()
         forces, signals = Forces.of(robot.model), robot.structure.signals

@@ -48,8 +48,9 @@ class GroundContact(LeafSystem):
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
     |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
-    | mode_table        | (12 m,) | SI     | table `modes` of laws.contact, row by row         |
-    | ground_forces     | (3 m,)  | N      | table of laws.contact, row by row                 |
+    | mode_table        | (12 m,) | SI     | table `modes` of laws.contact, row by row: modes, |
+    |                   |         |        | stick point and more, by contact node             |
+    | ground_forces     | (3 m,)  | N      | along t1, t2 and n, by contact node               |
 
     On flat ground t1 and t2 are x and y; otherwise see `laws.terrain`; `laws.friction`
     explains modes.
@@ -105,9 +106,8 @@ class GroundContact(LeafSystem):
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
     ) -> tuple[bool, float]:
-        """Whether a mode changes if a step ends here, and the time (s) to the next change.
-
-        The time is at most `horizon` (s).
+        """Predicts changes of the modes. Returns whether one changes if a step ends now, and the
+        time (s) from now to the next change, at most `horizon` (s).
 
         `acceleration` (6 n,) is dv/dt of the bodies. The prediction assumes that the acceleration
         of each node is constant.
@@ -136,7 +136,8 @@ class GroundContact(LeafSystem):
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
 
     def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
-        """The table `ground_forces`. Writes the generalized force to `force`, if given."""
+        """The table `ground_forces` (contacts, 3) in N. Writes the generalized force to `force`
+        (6 n,), if given."""
         state, modes = self._state.Eval(context), self._modes(context)
         self._compute_forces(self._parts, state, modes, self._force if force is None else force)
         return self._forces.ground_forces

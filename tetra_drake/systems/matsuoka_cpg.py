@@ -34,8 +34,8 @@ class MatsuokaCpg(LeafSystem):
         initial_state: npt.ArrayLike,
         gain: float = 1.0,
     ) -> None:
-        """`tonic` is a number or has a value per neuron. `initial_state` is u and v (4n,). `gain`
-        is the force (N) per unit of y."""
+        """`tonic` is the input u0 without a connected port: a number, or a value per neuron.
+        `initial_state` (4n,) is u of all neurons, then v. `gain` is the force (N) per unit of y."""
         super().__init__()
         neurons = len(network.inhibition)
         self._network, self._gain = network, gain
@@ -53,7 +53,7 @@ class MatsuokaCpg(LeafSystem):
         DeclareOutput(self, "neurons", neurons, lambda s, c: s._neurons(c)[:, u].clip(0.0), sources)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        """Rates of u and v (Eq. 7)."""
+        """Writes the rates of u and v (thesis Eq. 7) to `derivatives`."""
         neurons = self._neurons(context)
         tonic, feedback = self._default_tonic, 0.0
         if self._tonic.HasValue(context):
@@ -64,7 +64,7 @@ class MatsuokaCpg(LeafSystem):
         derivatives.SetFromVector(neurons[:, oscillator.U_RATE : oscillator.V_RATE + 1].T.ravel())
 
     def _neurons(self, context: Context) -> np.ndarray:
-        """Table `neurons` of laws.oscillator, from the state."""
+        """Table `neurons` of laws.oscillator, a row per neuron, from the continuous state."""
         return oscillator.make_neurons(context.get_continuous_state_vector().value())
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:

@@ -40,11 +40,12 @@ class HeldSignals(LeafSystem):
         DeclareOutput(self, "signals", self._size, HeldSignals._signals, tickets)
 
     def Hold(self, context: Context, signals: np.ndarray) -> None:
-        """Sets the signals (m,) in N from now on."""
+        """Sets the signals (m,) in N that are held from now on. `context` is the system's own, and
+        is changed. After t = 0 they are reached within one `cpg.listing_step`."""
         context.SetDiscreteState(self._state_from_now(context, signals))
 
     def _state_from_now(self, context: Context, signals: np.ndarray) -> np.ndarray:
-        """The discrete state with signals (m,) in N from now on."""
+        """New discrete state, for a change to `signals` (m,) in N that begins now."""
         now = context.get_time()
         before = self._signals(context) if now > 0.0 else signals
         return np.concatenate([before, signals, [now]])
@@ -71,7 +72,8 @@ class SampledController(HeldSignals):
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
-        """Controller that calls `law` once in each `period` (s)."""
+        """Controller that calls `law` once in each `period` (s). `law` gets the time (s) and the
+        robot's Readings, and returns the signals (m,) in N."""
         super().__init__(robot)
         self._law, self._structure = law, robot.structure
         cables, contacts = len(robot.structure.cables), len(robot.structure.contacts)

@@ -17,7 +17,7 @@ class Steering(LeafSystem):
     |-------|-------|------|-----------------------------------------------------------------|
     | turn  | (1,)  | 1    | -1 to 1; at 1 only the left oscillators have input; default     |
     |       |       |      | from the constructor; other values raise InputError             |
-    | tonic | (2m,) | 1    | u0 of Eq. 7 for the neurons of m oscillators                    |
+    | tonic | (2m,) | 1    | output: u0 of thesis Eq. 7 for the neurons of m oscillators     |
     """
 
     def __init__(
