@@ -53,8 +53,8 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
 
 
 def executor_of(client: Client) -> LentExecutor:
-    """Executor on a Dask client. Raises InputError if the client is closed or asynchronous, or a
-    worker has another version of this package or of Drake."""
+    """Executor on the workers of a Dask client. Raises InputError if the client is closed or
+    asynchronous, or a worker has another version of this package or of Drake."""
     if client.asynchronous or client.status != "running":
         found = "asynchronous" if client.asynchronous else client.status
         raise InputError("executor", "", f"found a Dask client that is {found}, expected running")
@@ -69,8 +69,9 @@ def executor_of(client: Client) -> LentExecutor:
 
 
 def maker_of(executor: GivenExecutor | None) -> MakeExecutor | None:
-    """The function that makes executors, for an argument of evolve(). Raises InputError if the
-    argument is neither an executor nor a Dask client nor a function."""
+    """Converts the argument `executor` of evolve() to a function that makes an executor; None stays
+    None. Raises InputError if the argument is neither an executor nor a Dask client nor a
+    function."""
     if isinstance(executor, Executor):
         return LentExecutor(executor)
     dask = sys.modules.get("distributed")

@@ -82,7 +82,8 @@ class Line(BaseModel):
 
 
 class Draws(Line):
-    """Fitness and distance (m) of one gait in each draw of the scenario's disturbances."""
+    """Fitness and distance (m) of one gait, with one number per draw. A draw is one set of random
+    changes of the robot and its surroundings."""
 
     fitness: Annotated[list[float], Field(min_length=1)]
     distance: Annotated[list[float], Field(min_length=1)]
@@ -110,7 +111,8 @@ class EvaluationLine(Line):
 
     @classmethod
     def of(cls, task: Task, evaluation: Evaluation, **more: Any) -> EvaluationLine:
-        """The line of an evaluation, with `more` keys."""
+        """The line for a task and its evaluation. `more` are further keys of the line, such as
+        `placed`."""
         if evaluation.draws is not None:
             more = {"draws": dict(evaluation.draws), **more}
         return cls(
@@ -152,8 +154,8 @@ class IterationLine(Line):
 
 
 class EliteLine(Line):
-    """Line of an elite, the fittest gait of a cell of the map, on disturbed robots; see
-    study.elites."""
+    """Line of a record for one elite, simulated on disturbed robots. An elite is the fittest gait
+    in a cell of the map that !QualityDiversity fills; see study.elites."""
 
     identity = ("trial", "index")
 
@@ -177,14 +179,14 @@ _COUNTED = (EVALUATIONS, ITERATIONS)
 
 
 def trial_folder(directory: Path, number: int) -> Path:
-    """The folder of a trial."""
+    """Folder of a trial in the directory of its run, such as trial_00."""
     return directory / f"trial_{number:02d}"
 
 
 @dataclass(frozen=True)
 class RecordFile:
-    """An append-only file of JSON objects, one per line. Each line names its run, so foreign lines
-    are found."""
+    """An append-only file of JSON objects, one per line. Each line names its run, so that lines of
+    another run are noticed."""
 
     path: Path
     owner: Mapping[str, Any]
@@ -198,8 +200,8 @@ class RecordFile:
         return cls(trial_folder(directory, trial) / name, {"run": run, "trial": trial})
 
     def read(self) -> Iterator[Any]:
-        """All complete lines, compressed or not, as objects of their class in LINES. None if there
-        is no file.
+        """All complete lines, as objects of the file's class in LINES. Lines that were compressed
+        to NAME.xz come first. Yields nothing if there is no file.
 
         Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
         to another run or trial.
@@ -236,7 +238,7 @@ class RecordFile:
             file.write(text.encode())
 
     def repair(self) -> None:
-        """Cuts off an incomplete last line."""
+        """Cuts off an incomplete last line, which a kill during append() leaves."""
         if not os.path.lexists(self.path):
             return
         content = read_bytes(self.path, "record", most=MOST)
@@ -245,30 +247,34 @@ class RecordFile:
                 os.truncate(self.path, content.rfind(b"\n") + 1)
 
     def refuse(self, row: int, problem: str) -> NoReturn:
-        """Raises InputError about the line with this number, counted from 0."""
+        """Raises InputError about line `row`, counted from 0. The message counts lines from 1."""
         raise InputError(self.path, f"line {row + 1}", problem)
 
 
 def first_problem(error: ValidationError) -> tuple[str, str]:
-    """Key and problem of the first value of a line that is wrong."""
+    """Dotted key of the first wrong value of a line, and what is wrong with it, from pydantic's
+    error."""
     first = error.errors(include_url=False)[0]
     return ".".join(str(part) for part in first["loc"]), first["msg"]
 
 
 def compressed(path: Path) -> Path:
-    """Path of the compressed file with the lines that precede the lines of `path`."""
+    """Path of the file NAME.xz beside a record file NAME. It holds the earlier lines of NAME."""
     return path.with_name(path.name + _PACKED)
 
 
 def json_line(entry: Mapping[str, Any]) -> str:
-    """An entry as a line of text with a checksum."""
+    """Line of JSON text for an entry. Its last key, `crc`, is the CRC-32 of the text before it."""
     text = json.dumps(entry, allow_nan=False).removesuffix("}")
     return f'{text}, "crc": "{zlib.crc32(text.encode()):08x}"}}\n'
 
 
 def _entries(path: Path) -> Iterator[dict[str, Any]]:
-    """The JSON objects of a file's lines; none if there is no file. A line has a checksum, unless
-    the file is compressed. A kill may have cut the last line, but not of a compressed file."""
+    """The JSON objects of a file's lines, without their checksums; none if there is no file.
+
+    An incomplete last line, which a kill leaves, is left out. Raises InputError for any other
+    damaged line. In a compressed file, lines need no checksum, and none may be incomplete.
+    """
     if not os.path.lexists(path):
         return
     content, is_packed = read_bytes(path, "record", most=MOST), path.suffix == _PACKED

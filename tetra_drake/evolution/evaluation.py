@@ -46,7 +46,7 @@ _SEEDS_KEPT = 32
 
 @dataclass(eq=False)
 class GaitEvaluation:
-    """Fitness function of evolution: it simulates the gait of a vector.
+    """Fitness function of evolution: it simulates the gait of a parameter vector.
 
     The result is the same in any process, bit for bit, unless the time budget runs out.
     """
@@ -64,8 +64,9 @@ class GaitEvaluation:
         self._draws = functools.lru_cache(_SEEDS_KEPT)(draws)
 
     def __call__(self, task: Task) -> Evaluation:
-        """Fitness and metrics of a vector, or the reason of its failure. Draws are simulated one
-        after another; the first draw without metrics ends the evaluation."""
+        """Fitness and metrics of a task's vector, or the reason of its failure. With disturbances
+        there is one simulation per draw, one after another. The first that yields no metrics ends
+        the evaluation: the gait has failed."""
         started = time.perf_counter()
         limited = time_limit(self.scenario.evolution.time_budget)(simulate)
         draws = []
@@ -78,7 +79,8 @@ class GaitEvaluation:
         return dataclasses.replace(self._combined(task, draws), wall_time=wall_time)
 
     def on_queue(self, task: Task, queue: SimulationQueue) -> Future[Evaluation]:
-        """Future of the evaluation of a vector. All draws are simulated side by side."""
+        """Future of the evaluation of a task. The queue simulates all its draws of disturbances
+        side by side."""
         simulations, ended = self._simulations(task), itertools.count(1)
         time_budget = self.scenario.evolution.time_budget
         results = queue.submit(simulations, time_budget=time_budget)
@@ -104,13 +106,16 @@ class GaitEvaluation:
         return GaitEvaluation, (self.scenario, self.objective)  # without the caches
 
     def _simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
-        """Scenario and gait of each simulation of a task: one, or one per draw."""
+        """Scenario and gait of each simulation of a task: one, or with disturbances one per
+        draw."""
         gait = self._space.gait(task.vector, name=str(task))
         scenarios = [self.scenario] if task.seed is None else self._draws(task.seed)
         return [(scenario, gait) for scenario in scenarios]
 
     def _judged(self, scenario: Scenario, simulation: Callable[[], SimulationResult]) -> Evaluation:
-        """Runs one simulation and evaluates its result; failures become failed evaluations."""
+        """Calls `simulation` and evaluates its result. A simulation that fails, or an unmet
+        requirement, gives an evaluation with the reason. On a disturbed scenario an InputError
+        counts as a failure."""
         try:
             result = simulation()
         except (SimulationFailure, TimeBudgetExceeded) as error:
@@ -131,7 +136,8 @@ class GaitEvaluation:
         return Evaluation(fitness, metrics, wall_time=wall_time)
 
     def _combined(self, task: Task, draws: Sequence[Evaluation]) -> Evaluation:
-        """Combines the evaluations of a task's simulations into one."""
+        """Combines the evaluations of a task's simulations, one per draw, into one; see
+        combine()."""
         settings, evaluation = self.scenario.disturbances, draws[0]
         if settings is not None and task.seed is not None:
             evaluation = combine(draws, settings.tail)
@@ -163,8 +169,8 @@ _KINDS: dict[type[Exception], str] = {
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
-    """Combines the evaluations of a gait's draws. Fitness is the mean over the worst `share` of the
-    draws. The gait fails if one draw fails."""
+    """Combines the evaluations of one gait in several draws of disturbances. Fitness is the mean
+    over the worst `share` (0 to 1) of the draws. The gait fails if it fails in one draw."""
     wall_time = sum(draw.wall_time for draw in draws)
     failures = [f"draw {k}: {e.failure}" for k, e in enumerate(draws) if e.failure is not None]
     metrics = combine_metrics([draw.metrics for draw in draws])
@@ -176,8 +182,9 @@ def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
 
 
 def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Each metric over the draws: its mean, least or greatest value. Empty if a draw has no
-    metrics."""
+    """Combines the metrics of one gait in several draws. A metric that is a minimum, such as
+    clearance, keeps its least value, a maximum its greatest; of others the mean is taken. Empty if
+    a draw has no metrics."""
     if not all(draws):
         return {}
     combined: dict[str, Any] = {}
@@ -195,8 +202,8 @@ def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def worst_mean(fitnesses: Sequence[float], share: float) -> float:
-    """Mean of the lowest `share` of the fitnesses. A fractional last value gets its fraction as
-    weight. At least one value counts."""
+    """Mean of the lowest `share` (0 to 1) of the fitnesses. If this is 2.5 values, the third lowest
+    has weight 0.5. At least one value counts."""
     ranked, count = sorted(fitnesses), max(1.0, share * len(fitnesses))
     weights = [min(1.0, max(0.0, count - i)) for i in range(len(ranked))]
     return math.fsum(w * f for w, f in zip(weights, ranked, strict=True)) / count

@@ -61,9 +61,10 @@ def evaluator_of(
 ) -> Evaluator:
     """The evaluator for a scenario's engine; the engine's code is compiled on return.
 
-    It uses the given executor. By default it uses lanes or processes of this machine, one per core.
-    If the evaluation cannot be sent to worker processes, gaits are evaluated in this process, and
-    `warn` gets the reason.
+    It uses the given executor. By default it uses SIMD lanes (compiled engine) or worker processes
+    (other engines) of this machine. `workers` is the number of threads or processes, one per core
+    by default. If the evaluation cannot be sent to worker processes, gaits are evaluated in this
+    process, and `warn` gets the reason.
     """
     from tetra_drake.engines.engine import engine_of
 
@@ -82,7 +83,8 @@ def evaluator_of(
 
 @contextlib.contextmanager
 def in_lanes(evaluate: GaitEvaluation, workers: int) -> Iterator[Submit]:
-    """Evaluator in the lanes of the compiled engine, with this number of threads."""
+    """Evaluator that simulates gaits side by side, in the SIMD lanes of the compiled engine.
+    `workers` is the number of threads."""
     from tetra_drake.engines.queue import SimulationQueue
 
     with SimulationQueue(workers, record=evaluate.records) as queue:
@@ -91,8 +93,8 @@ def in_lanes(evaluate: GaitEvaluation, workers: int) -> Iterator[Submit]:
 
 @contextlib.contextmanager
 def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterator[Submit]:
-    """Evaluator on an executor of concurrent.futures. It shuts the executor down, unless it is a
-    LentExecutor.
+    """Evaluator on an executor of concurrent.futures, which make(workers) returns. It shuts the
+    executor down, unless it is a LentExecutor.
 
     If a worker dies, its future raises the error of the executor, such as BrokenExecutor. A task
     for an executor that is broken or shut down raises InputError.
@@ -122,7 +124,8 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
 
 @dataclass(frozen=True)
 class LentExecutor:
-    """An executor of the user, as a MakeExecutor. An evaluator does not shut it down."""
+    """Wrapper of an executor that belongs to the user. A call returns this executor, so that the
+    wrapper serves as a MakeExecutor. An evaluator does not shut it down."""
 
     executor: Executor
     workers: int | str = "its executor's"
@@ -168,8 +171,8 @@ class WorkerProcesses(Executor):
 
 
 def _end_with(lifeline: Connection) -> None:
-    """Ends this worker process when the other end of the pipe is closed, at the latest by the end
-    of the parent process."""
+    """Makes this worker process exit once the other end of the pipe `lifeline` is closed. The end
+    of the parent process closes it at the latest. The call returns at once; a thread waits."""
 
     def watch() -> None:
         lifeline.poll(None)
@@ -195,8 +198,9 @@ def finished(
 ) -> list[tuple[Task, Evaluation]]:
     """Removes finished tasks from `running`; returns them with their evaluations.
 
-    Returns when at least one is finished, or after `timeout` seconds. An error of a task is raised
-    after all finished tasks were returned. Raises InputError if a worker has died.
+    Returns when at least one is finished, or after `timeout` seconds. If a task raised an error,
+    the first call that finds no other finished task raises it. Raises InputError if a worker has
+    died.
     """
     done, _ = futures.wait(running, timeout, return_when=futures.FIRST_COMPLETED)
     evaluated = [f for f in done if not f.cancelled() and f.exception() is None]

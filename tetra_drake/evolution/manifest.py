@@ -87,8 +87,8 @@ class Method:
 
 
 def _name(given: object) -> str:
-    """Name of a function, class or instance. Outside this package it includes the module, and the
-    fields of a dataclass."""
+    """Name of a function, class or instance. Outside this package it includes the module and, for
+    an instance of a dataclass, the values of its fields."""
     kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
     module = kind.__module__ or "__main__"  # code run by exec() has no module
     if module.startswith("tetra_drake."):
@@ -123,13 +123,15 @@ class Manifest:
         return [f"{name} {then}" for name, then in recorded.items() if then != now[name]]
 
     def gait(self, vector: Vector, *, trial: int, index: int) -> Gait:
-        """The gait of a recorded evaluation."""
+        """The gait of a parameter vector. Its name gives scenario, seed, trial and evaluation
+        (`index`)."""
         name = f"{self.scenario.name}, seed {self.seed}, trial {trial}, evaluation {index}"
         gait = ParameterSpace.of(self.scenario).gait(vector, name=name)
         return dataclasses.replace(gait, scenario=self.scenario.name)
 
     def task(self, vector: Vector, *, trial: int, index: int, iteration: int) -> Task:
-        """Task to evaluate a vector. With disturbances it has the seed of the draws."""
+        """Task to evaluate a vector as number `index` of a trial. With disturbances it has the seed
+        of their draws, which all tasks of an iteration share."""
         draws = self.scenario.disturbances is not None
         seed = (self.seed, trial, iteration) if draws else None
         return Task(vector, trial, index, iteration, seed)
@@ -266,8 +268,8 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         return cls(directory, manifest, begun=True, _lock=_locked(directory))
 
     def begin(self) -> None:
-        """Writes the manifest, if it is not written yet. Deletes the run that is overwritten, which
-        comes back if the manifest cannot be written."""
+        """Locks the directory and writes the manifest, unless that is done already. A run that is
+        overwritten is deleted afterwards; if the manifest cannot be written, the old run stays."""
         if self.begun:
             return
         if self._lock is None:

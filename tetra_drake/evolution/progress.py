@@ -66,7 +66,7 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
             self._bars.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
     def warn(self, text: str) -> None:
-        """Prints a warning to stderr, above the bars."""
+        """Prints a warning to stderr, above the bars. Without a stream, issues a Python warning."""
         if self._bars is None:
             warnings.warn(text, RuntimeWarning, stacklevel=3)
         else:
@@ -74,7 +74,7 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
         """Shows the stage "evaluations" of all trials, with the fittest gait and the numbers of
-        finished trials and failures. evolve() calls it after each evaluation, and about once per
+        finished trials and failures. evolve() calls it whenever evaluations end, and about once per
         second."""
         done = sum(status.evaluations for status in statuses)
         # A trial that ended early needs no more evaluations.
@@ -94,8 +94,8 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
         self.stage("evaluations", done, total, ", ".join(parts))
 
     def stage(self, title: str, done: int, total: int, text: str = "") -> None:
-        """Moves the bar of one stage of the run, or prints a line if one is due: `done` of `total`,
-        a text, and the time left."""
+        """Shows that `done` of `total` steps of a stage are done, with `text` and the time left. A
+        terminal shows a bar per stage; another stream gets a line when one is due."""
         if self._bars is None:
             return
         self._bars.start()

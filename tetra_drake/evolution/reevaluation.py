@@ -30,12 +30,17 @@ def reevaluate(
     executor: MakeExecutor | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Evaluates the best gaits of a run again, on the Drake diagram, and adds them to its record.
+    """Simulates the best gaits of a run again, on the Drake diagram instead of the run's engine,
+    and adds these evaluations to its record.
 
     Gaits that were reevaluated before are skipped. Returns the run with the new evaluations.
 
     Args:
+        directory: the directory of the run.
         objective: the objective of the run; None if it is the fitness of the scenario.
+        workers: number of worker processes; one per core by default.
+        executor: function that makes an executor to use in place of worker processes.
+        progress: display that gets progress and warnings.
 
     Raises:
         InputError: if the run has another objective.

@@ -147,8 +147,8 @@ class Run:
         return best.loc[best["fitness"].idxmax()]
 
     def initial_best(self, trial: int) -> pandas.Series:
-        """Row of the fittest gait in the first iteration of a trial. Iterations without any fitness
-        are skipped."""
+        """Row of the fittest gait in the first iteration of a trial. If all gaits of an iteration
+        failed, the next one counts in its place."""
         rows = self.evaluations.query("trial == @trial").dropna(subset="fitness")
         first = rows[rows["iteration"] == rows["iteration"].min()]
         return first.loc[first["fitness"].idxmax()]
@@ -165,7 +165,8 @@ class Run:
         return [self.gait(*key) for key in zip(best["trial"], best["index"], strict=True)]
 
     def file(self, name: str, trial: int | None = None) -> RecordFile:
-        """A file of the run, or of one of its trials."""
+        """The file `name` of the run's record, such as "elites.jsonl". With `trial`, the file is in
+        the folder of this trial."""
         return RecordFile.of(self.directory, self.manifest.run, name, trial=trial)
 
     def initial(self) -> pandas.DataFrame:
@@ -173,7 +174,8 @@ class Run:
         return self.evaluations[self.evaluations["iteration"] == 0]
 
     def vector(self, trial: int, index: int) -> Vector:
-        """The parameters of an evaluation. Raises InputError if thinning removed them."""
+        """The parameter vector of evaluation `index` of a trial. Raises InputError if thinning
+        removed it."""
         rows = self.with_parameters.set_index(["trial", "index"])
         if (trial, index) not in rows.index:
             problem = f"has no genome of trial {trial}, evaluation {index}"
@@ -181,7 +183,7 @@ class Run:
         return rows.loc[(trial, index), _parameters(self.scenario)].to_numpy(dtype=np.float64)
 
     def gait(self, trial: int, index: int) -> Gait:
-        """The gait of an evaluation."""
+        """The gait of evaluation `index` of a trial."""
         return self.manifest.gait(self.vector(trial, index), trial=trial, index=index)
 
 
@@ -220,7 +222,8 @@ def load_run(path: str | Path) -> Run:
 
 
 def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
-    """The lines of one file of all trials, as a table."""
+    """Table of the lines in the files `name` of all trials, one row per line. For its columns, see
+    Run."""
     import pandas
 
     kind, parameters = LINES[name], _parameters(manifest.scenario)
@@ -258,7 +261,8 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
 
 
 def _parameters(scenario: Scenario) -> list[str]:
-    """Names of the parameter columns, in the order of ParameterSpace.names."""
+    """Names of the columns of Run.evaluations that hold the parameters of a gait, such as
+    "weight_1" and "tau_a_s". They are in the order of the parameter vector."""
     space = ParameterSpace.of(scenario)
     others = [f"gain_{name}" for name in space.pathways] + ["tau_a_s", "tau_b_s"]
     weights = len(space.names) - len(others)
@@ -268,8 +272,8 @@ def _parameters(scenario: Scenario) -> list[str]:
 def _check_iterations(
     file: RecordFile, iterations: pandas.DataFrame, evaluations: pandas.DataFrame
 ) -> None:
-    """Raises InputError, naming file and line, if the iterations of a trial do not match its
-    evaluations."""
+    """Raises InputError, naming file and line, if a line of a trial's `iterations` disagrees with
+    its `evaluations` about the number of evaluations so far, or the best fitness or gait."""
     made = np.searchsorted(evaluations["iteration"], iterations["iteration"], side="right")
     fitnesses = evaluations["fitness"].fillna(-math.inf).to_numpy()
     recorded = iterations.fillna({"best_fitness": -math.inf, "best_evaluation": -1})

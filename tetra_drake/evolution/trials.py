@@ -71,8 +71,9 @@ class TrialStatus:
 
 
 class RepeatedFile:
-    """File of a trial while a run is repeated from its start to resume it. Lines that are recorded
-    already are checked, not written again."""
+    """A file of a trial's record. When a run is resumed, its optimiser is repeated from the start:
+    lines that the file already has are compared with the repeated ones, and only new lines are
+    written."""
 
     def __init__(self, run: RunRecord, trial: int, name: str) -> None:
         self._run = run
@@ -84,7 +85,9 @@ class RepeatedFile:
             self.lines = list(self.file.read())
 
     def write(self, lines: Sequence[Line], *, first: int) -> None:
-        """Writes lines from number `first` on. Raises InputError if a recorded line differs."""
+        """Records `lines`; the first of them is line `first` of the file, counted from 0. Lines
+        that the file held when it was opened are only compared; the others are appended. Raises
+        InputError if a compared line differs."""
         recorded = self.lines[first:]
         for row, (theirs, ours) in enumerate(zip(recorded, lines, strict=False), start=first):
             then, now = theirs.content(), ours.content()
@@ -133,7 +136,8 @@ class Trial:
         self._advance()
 
     def take(self, task: Task, evaluation: Evaluation) -> bool:
-        """Takes an evaluation. Returns True if it completes the iteration."""
+        """Takes the evaluation of a task. Returns True if it completes the iteration; then
+        `unevaluated` has the tasks of the next iteration."""
         del self.unevaluated[task.index]
         self._add(task, evaluation)
         if self.unevaluated:
@@ -145,7 +149,10 @@ class Trial:
         return True
 
     def _advance(self) -> None:
-        """Runs recorded iterations, up to the first unrecorded vectors or the trial's end."""
+        """Goes through iterations whose evaluations are all on record: the optimiser gets the
+        recorded evaluations, and nothing is simulated. Ends at the first iteration that needs
+        simulations (`unevaluated` has its tasks) or at the trial's end. Then saves the best
+        gait."""
         status = self.status
         while status.stop is None:
             self._results = {}
@@ -229,8 +236,8 @@ class Trial:
 def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
     """All trials of a record, each at the end of its recorded part.
 
-    The default optimiser is the scenario's. Trials are independent: their number does not change
-    their results.
+    The default optimiser is the scenario's. Trials are independent: the results of a trial do not
+    depend on how many trials there are.
     """
     scenario = record.manifest.scenario
     make = optimizer or optimizer_of(scenario.optimizer)
@@ -249,10 +256,11 @@ def run_trials(
     *,
     show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
-    """Runs all trials to their ends.
+    """Runs all trials to their ends and returns their final states.
 
-    The record depends only on scenario, method and seed. It does not depend on the evaluator or on
-    interruptions.
+    `submit` begins an evaluation. `show` gets all states whenever evaluations end, and about once
+    per second. The record depends only on scenario, method (objective and optimiser) and seed. It
+    does not depend on the evaluator or on interruptions.
     """
     statuses = [trial.status for trial in trials]
     show(statuses)
@@ -268,8 +276,9 @@ def run_trials(
 
 
 def check_fitness(trials: Sequence[Trial], directory: Path, submit: Submit) -> None:
-    """Evaluates the first recorded gait with a fitness again. Raises InputError if its fitness
-    differs, so that a record never mixes two objectives."""
+    """Evaluates one recorded gait of a resumed run again: the first that has a fitness. Raises
+    InputError, naming `directory`, if its fitness differs, so that a record never mixes two
+    objectives."""
     recalled = [trial.recalled for trial in trials if trial.recalled is not None]
     if not recalled:
         return

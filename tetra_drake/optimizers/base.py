@@ -75,8 +75,8 @@ class Optimizer(Protocol):
     """An optimiser: ask() gives a batch of vectors, tell() takes their evaluations.
 
     It depends only on the evaluations and its random generator, so that a trial can be repeated
-    from its record. Every trial ends after `evolution.evaluations`. Its last batch is cut to the
-    number of evaluations that are left.
+    from its record. Every trial ends after `evolution.evaluations` evaluations at the latest. Its
+    last batch is cut to the number of evaluations that are left.
     """
 
     def ask(self) -> list[Vector]:

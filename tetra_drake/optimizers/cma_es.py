@@ -48,8 +48,8 @@ the number of threads."""
 
 
 class CmaEsOptimizer(Generational[kinds.CmaEs]):
-    """Several searches by CMA-ES. Each runs for TRYOUT evaluations; then the best continues. If it
-    stalls, too, a new search begins.
+    """Several searches by CMA-ES, one after another. Each runs for TRYOUT (1,000) evaluations; then
+    the search with the best gait continues. When all have stalled, a new search begins.
 
     A search starts at the mean of the best quarter of a random sample of its own. Without a sample,
     the first starts in the middle of the ranges, the others at random points.
@@ -72,7 +72,8 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
 
     @_one_thread
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the evaluations of a batch. The search learns nothing from a batch that was cut."""
+        """Takes the evaluations of a batch. The search learns nothing from a batch that the trial's
+        end cut."""
         iteration = super().tell(evaluations)
         fitnesses = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
         has_walked = np.isfinite(fitnesses)
@@ -117,26 +118,30 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
 
 @dataclass(frozen=True)
 class Box:
-    """Search space of parameters between 0 and 1.
+    """Search space of parameters between 0 and 1. An angle, the root, stands for each parameter.
 
-    A root, which pycma searches in place of a parameter, is an angle in half turns. So every root
-    is a valid point.
+    pycma searches the roots, in units of pi: parameter = (1 - cos(pi root)) / 2. So every root
+    gives a valid parameter.
     """
 
     size: int
 
     def from_roots(self, roots: Matrix) -> Matrix:
-        """Converts roots to points."""
+        """Converts roots, the numbers that pycma varies, to parameters: (1 - cos(pi root)) / 2."""
         return 0.5 - 0.5 * np.cos(np.pi * roots)
 
     def roots(self, points: Matrix) -> Matrix:
-        """Converts points to roots between 0 and 1."""
+        """Converts parameters to roots between 0 and 1; the inverse of from_roots()."""
         return np.arccos(1.0 - 2.0 * points) / np.pi
 
 
 class Search:
-    """A search by CMA-ES. When it has converged, it restarts at its best point with a larger
-    population."""
+    """A search by CMA-ES for the point of greatest fitness. When it has converged, it restarts at
+    its best point with twice the population.
+
+    `population` is the first size of the population; None for pycma's default. `start` is the first
+    point.
+    """
 
     def __init__(
         self,
@@ -164,7 +169,7 @@ class Search:
         """pycma's search; None before each start."""
 
     def draw(self) -> Matrix:
-        """Draws a population of points."""
+        """Draws the next population: points (population, size), one per row."""
         import cma
 
         if self._strategy is None:
@@ -183,7 +188,8 @@ class Search:
         return self._ranges.from_roots(self._drawn[:, : self._ranges.size])
 
     def learn(self, points: Matrix, fitnesses: Vector) -> None:
-        """Takes the fitnesses of the points from draw()."""
+        """Takes the fitnesses of the points from draw(); greater is better. CMA-ES adapts to
+        them."""
         self.evaluations += len(points)
         best = int(np.argmax(fitnesses))
         if fitnesses[best] > self.best:

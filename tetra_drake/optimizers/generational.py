@@ -41,13 +41,13 @@ class Ranges:
         self.floors = (space.floors - space.low)[self.free] / self.width
 
     def random(self, count: int, generator: np.random.Generator) -> Matrix:
-        """Points (scaled vectors) of random gaits, one per row."""
+        """Points (count, size) of random gaits: their scaled vectors, one per row."""
         vectors = np.array([self._space.random(generator) for _ in range(count)])
         return (vectors - self._space.low)[:, self.free] / self.width
 
     def from_roots(self, roots: Matrix) -> Matrix:
-        """Converts roots to points: floor + root^2 / (4 (MIDDLE - floor)). A parameter without a
-        floor is its own root.
+        """Converts roots, the numbers that a search varies, to points (scaled parameters): floor +
+        root^2 / (4 (0.5 - floor)). A parameter without a floor is its own root.
 
         Every root is a valid point. Fitness is a smooth function of the root even at the floor. In
         the middle of the range, point and root change at the same rate.
@@ -86,7 +86,7 @@ class Generational(Generic[SettingsT]):
         """Further numbers about the search, for the report of the iteration."""
 
     def ask(self) -> list[Vector]:
-        """The vectors of the next batch. Values below a floor are raised to it."""
+        """The vectors of the next batch. Values below a floor (lower limit) are raised to it."""
         self._points = self._draw()
         vectors = np.tile(self.space.low, (len(self._points), 1))
         vectors[:, self._ranges.free] += self._points * self._ranges.width

@@ -77,7 +77,8 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
         return self._ranges.from_roots(self._roots)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Adds a batch to the archive. The emitters learn from it, unless it was cut."""
+        """Adds a batch to the archive. The emitters learn from it, unless the trial's end cut
+        it."""
         objective = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
         rows = [[e.metrics.get(name) for name in self.settings.measures] for e in evaluations]
         measures = np.array(rows, dtype=float)  # None becomes NaN

@@ -84,16 +84,18 @@ class SteadyStateOptimizer:
 
 
 def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
-    """Index of the fittest of a tournament: members drawn at random, with replacement. Among equals
-    the first drawn wins (listing A.3.2)."""
+    """Index of the fittest of `tournament` members, which are drawn at random with replacement.
+    Among equals the first drawn wins (listing A.3.2 of the thesis)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)
     return int(candidates[np.argmax(fitnesses[candidates])])
 
 
 def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector:
-    """Largest change of each parameter in one mutation (Table 6); 0 if its bounds are equal.
+    """Largest change of each parameter in one mutation (Table 6 of the thesis); 0 if its bounds are
+    equal.
 
-    With `tau_mutation: listing`, tau_A does not mutate: index 26 of the listing means tau_B.
+    With `tau_mutation: listing`, tau_A does not mutate, like in the thesis's listing A.3.4, whose
+    index 26 means tau_B.
     """
     is_gain = np.array([name.startswith("gain ") for name in space.names])
     steps = np.where(is_gain, GAIN_MUTATION, settings.weight_mutation)
@@ -110,13 +112,15 @@ def make_children(
     settings: kinds.SteadyState,
     generator: np.random.Generator,
 ) -> list[Vector]:
-    """Two children of two parents, by crossover and mutation (listing A.3.3, A.3.4).
+    """Two children of two parents, by crossover and mutation (listings A.3.3 and A.3.4 of the
+    thesis).
 
     A child is a copy of a parent; with `crossover_probability` a parameter is swapped with the
-    other child. With `mutation_probability` a parameter moves up or down, by at most its step.
+    other child. With `mutation_probability` a parameter moves up or down, by at most its step; see
+    mutation_steps().
 
-    As in the listing, both children get the same changes, and only reductions are checked: a
-    parameter that would fall to its floor or below stays as it is.
+    Both children get the same changes, and only reductions are checked, like in the listing: a
+    parameter that would fall to its floor (lower limit) or below stays as it is.
     """
     steps, count = mutation_steps(space, settings), len(first)
     swapped = generator.random(count) >= 1.0 - settings.crossover_probability
@@ -137,8 +141,8 @@ def find_place(
     """Index of the member that a child with fitness `child` replaces; None if there is none.
 
     If the child is fitter than the worst of a tournament, it replaces this member; among equals the
-    last drawn counts (listing A.3.5). Otherwise, if it is fitter than the worst of the population,
-    it replaces that member.
+    last drawn counts (listing A.3.5 of the thesis). Otherwise, if it is fitter than the worst of
+    the population, it replaces that member.
     """
     drawn = generator.integers(0, len(fitnesses), size=tournament)[::-1]
     victim = int(drawn[np.argmin(fitnesses[drawn])])

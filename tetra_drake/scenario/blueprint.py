@@ -120,7 +120,7 @@ class Blueprint:
 
     @functools.cached_property
     def carriers(self) -> np.ndarray:
-        """Index of the body of each node (nodes,); WORLD for a fixed node."""
+        """Index of the body that each node belongs to (nodes,); WORLD (-1) for a fixed node."""
         of_bodies = np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
         fixed = len(self.node_names) - len(of_bodies)
         return np.pad(of_bodies, (0, fixed), constant_values=WORLD)
@@ -145,7 +145,7 @@ class Blueprint:
     @property
     def scale(self) -> float:
         """Factor by which lengths such as margins of figures grow or shrink with the robot; 1 for
-        robots of USUAL_SIZES."""
+        robots of 0.1 m to 1 m (USUAL_SIZES)."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return size / min(max(size, USUAL_SIZES[0]), USUAL_SIZES[1]) or 1.0  # a point has no size
 
@@ -156,7 +156,8 @@ class Blueprint:
 
     @functools.cached_property
     def sides(self) -> np.ndarray:
-        """Side of each oscillator's cables (m,): 1.0 left, -1.0 right, 0.0 neither."""
+        """Side of each oscillator's cables (oscillators,): 1.0 if the middles of all of them are on
+        the left, -1.0 on the right, 0.0 otherwise."""
         y, least = self.p_WN[self.cable_ends].mean(axis=1)[:, 1], self._least_distance
         is_left = [(y[list(cables)] > least).all() for cables in self.groups]
         is_right = [(y[list(cables)] < -least).all() for cables in self.groups]
@@ -164,8 +165,8 @@ class Blueprint:
 
     @property
     def images(self) -> tuple[int | None, ...]:
-        """Index of the oscillator that drives the mirror image of each oscillator's cables (m);
-        None if there is none."""
+        """For each oscillator, the index of the oscillator that drives the mirror images of its
+        cables; None if there is none."""
         ends = self.p_WN[self.cable_ends]
         image_of_cable: list[int] = []
         for mirrored, group in zip(ends * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
@@ -207,8 +208,8 @@ class Blueprint:
             refuse("contacts", "found none, expected one node at least")
 
     def check_sizes(self) -> None:
-        """Raises InputError if a list has not one item for each body, or if the size of a strut is
-        too extreme for the computation of forces."""
+        """Raises InputError if `offsets` or `payload` has not one item for each body, or if the
+        size of a strut is too extreme for the computation of forces."""
         bodies = len(self.bodies)
         for key, items in (("offsets", self.offsets), ("payload", self.payload)):
             if len(items) != bodies:
@@ -257,7 +258,7 @@ class Blueprint:
 
     def _check_cables(self) -> None:
         """Refuses cables that join no two bodies, bodies that no cables join to the others, and
-        tensions without a free length."""
+        tensions so high that the free length of a cable would be negative."""
         pairs = self.carriers[self.cable_ends]
         for key, (first, second) in zip(self.cable_keys, pairs.tolist(), strict=True):
             if first == second == WORLD:

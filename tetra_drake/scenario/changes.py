@@ -18,8 +18,9 @@ REMOVABLE = ("disturbances",)
 
 
 class Part(Tree):
-    """Mapping made from dotted keys. Merging it changes single keys of a mapping, or single items
-    of a list, by their indices."""
+    """Mapping made from dotted keys, such as "objective.speed", not written as a mapping by the
+    user. merged() changes only the keys or list indices that it has, even where another mapping
+    replaces the whole."""
 
 
 def merged(base: Any, changes: Any, key: str = "") -> Any:

@@ -19,7 +19,8 @@ from tetra_drake.settings.section import Section
 
 
 class GaitBounds(Section):
-    """Ranges of the parameters of random gaits (Table 5). Equal bounds fix a parameter."""
+    """Ranges of the parameters of random gaits (Table 5 of the thesis). Equal bounds fix a
+    parameter."""
 
     weight_min: float = Field(ge=0)
     """Least weight of the inhibition between oscillators."""

@@ -31,8 +31,8 @@ class Draw:
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
-    """Random changes for the disturbances of a scenario, from a seed. The factors do not depend on
-    the scenario's values."""
+    """The draw (set of random changes) that a seed gives for a scenario's disturbances. Its factors
+    do not depend on the scenario's numbers."""
     settings = scenario.disturbances
     if settings is None:
         return Draw({})
@@ -51,7 +51,8 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
 
 
 def _stream(seed: Sequence[int], *names: str) -> np.random.Generator:
-    """Random generator for the disturbances with these names. It does not depend on the others."""
+    """Random generator for the disturbance of the scenario keys `names`, or "start" or "terrain".
+    Its numbers do not depend on which other disturbances there are."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
@@ -75,20 +76,22 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:
-    """The disturbed scenarios of one iteration of an evolution."""
+    """The disturbed scenarios of one iteration of an evolution, one per draw. Every gait of the
+    iteration is simulated on each."""
     draws = [draw_disturbances(scenario, (*seed, k)) for k in range(scenario.draw_count)]
     return [disturbed(scenario, draw) for draw in draws]
 
 
 def fresh_draws(scenario: Scenario, seed: int, count: int) -> list[Draw]:
-    """Draws for tests of gaits. No evolution uses them, whatever its seed."""
+    """`count` draws of disturbances, to test evolved gaits on. No evolution uses them, whatever its
+    seed."""
     return [draw_disturbances(scenario, fresh_seed(seed, k)) for k in range(count)]
 
 
 def fresh_seed(seed: int, k: int) -> tuple[int, ...]:
-    """Seed of draw k in fresh_draws(): six numbers, the last not 0.
+    """Seed of draw k in fresh_draws(): six numbers, the last 1.
 
-    Seeds of evolution have four numbers (five after numpy splits a large first one) and are padded
-    with zeros, so they never end with 1.
+    No evolution has such a seed. Its seeds have four numbers (five after numpy splits a large first
+    one), and numpy pads them with zeros.
     """
     return seed, k, 0, 0, 0, 1

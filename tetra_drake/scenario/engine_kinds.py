@@ -14,7 +14,8 @@ LONGEST_LOOK_AHEAD = 2e-5
 
 
 class EngineSettings(Section):
-    """Engine of a scenario, with its settings: base class of the kinds."""
+    """Base class of the settings of a simulation engine. A scenario chooses the engine by its
+    kind."""
 
     module: ClassVar[str]
     """Module whose ENGINE simulates; see engines.engine."""
@@ -58,8 +59,8 @@ class Compiled(EngineSettings):
 
     @property
     def look_ahead(self) -> float:
-        """Time (s) from a predicted mode change to the end of the step: 0.2 s per m/s of tolerance,
-        within limits."""
+        """Time (s) from a predicted change of a node's contact or sticking to the end of the step:
+        0.2 s per m/s of tolerance, from 2e-9 s to 2e-5 s."""
         return min(LONGEST_LOOK_AHEAD, max(2.0 * SHORTEST_STEP, 0.2 * self.tolerance))
 
 

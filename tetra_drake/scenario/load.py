@@ -74,8 +74,8 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def save_scenario(folder: Path, scenario: Scenario) -> str:
-    """Writes a scenario, and its height file if it has one, to a folder that can be moved. Returns
-    the content of the scenario's file."""
+    """Writes a scenario, and its height file if it has one, to a folder. The folder can be moved
+    later. Returns the content of the scenario's file."""
     text = dump_scenario(scenario)
     scenario.terrain.save(folder)
     write_whole(folder / SCENARIO, text)
@@ -88,7 +88,8 @@ def _file(name: str, folder: Path) -> Path:
 
 
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
-    """Loads the scenario of a file, on top of its bases."""
+    """Loads the scenario of a file, on top of its bases. `seen` are the files that are based on
+    this one: naming one of them as a base is refused."""
     keys = [*keys_of(Scenario), "base"]
     given = read_mapping(file, "scenario file", keys=keys)
     if file.resolve() in seen:

@@ -67,14 +67,14 @@ class Walk(Poses):
 
     @property
     def per_steady_time(self) -> float:
-        """1 / duration (s) of the steady stretch; see Metrics."""
+        """Inverse (1/s) of the duration of the steady stretch; see Metrics."""
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
     @property
     def per_actuator_time(self) -> float:
-        """1 / duration (s) of the steady stretch (see Metrics), divided by the number of
-        actuators."""
+        """Inverse (1/s) of the duration of the steady stretch (see Metrics), divided by the number
+        of actuators."""
         return self.per_steady_time / max(self.actuators, 1)
 
     @property

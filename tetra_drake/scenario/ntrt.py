@@ -134,7 +134,8 @@ class _Translation:
 
     @functools.cached_property
     def _one_of(self) -> dict[str, str]:
-        """The first node with the same coordinates, for each node. Nodes of pairs come first."""
+        """For each node, the node that stands for it: the first with the same coordinates. Nodes of
+        pairs come first."""
         ends = (end for pair in self.whole.pairs for end in pair.nodes)
         names = list(dict.fromkeys([*ends, *self.whole.nodes]))
         p = np.array([self.whole.nodes[name] for name in names]).reshape(-1, 3)

@@ -103,8 +103,8 @@ class Assembly:
                 self._add_bond(bond, _listed(pairs, tags, part, place), part, place)
 
     def rule(self, pair: TaggedPair, kind: str) -> Rule | None:
-        """Last builder whose tags a pair has, for a kind: struts, cables or spheres. The tags of
-        its substructure count, too."""
+        """Last builder of a kind (struts, cables or spheres) whose tags a pair has; None if there
+        is none. The tags of the pair's substructure count as tags of the pair."""
         tags = pair.tags | _tags_of(pair.part)
         fitting = (one for one in reversed(self.rules) if one.tags <= tags)
         return next((one for one in fitting if one.builder.kind == kind), None)
@@ -142,8 +142,8 @@ class Assembly:
     def _move(
         self, part: str, place: Place, matrix: np.ndarray, *, about: Any = None, shift: Any = 0.0
     ) -> None:
-        """Rotates and scales a substructure's nodes by a matrix about a point, by default their
-        centre, and shifts them."""
+        """Rotates and scales a substructure's nodes by a matrix (3, 3) about a point, by default
+        their centre, and then shifts them. `place` is for the error message."""
         if names := [name for name in self.nodes if name.startswith(part)]:
             p = np.array([self.nodes[name] for name in names])
             centre = p.mean(axis=0) if about is None else np.array(about)
@@ -175,7 +175,8 @@ class Assembly:
             self.pairs.append(pair._replace(nodes=(first, second)))
 
     def _add_bond(self, bond: str, listed: list[TaggedPair], part: str, place: Place) -> None:
-        """Adds the pairs of a bond. For "a/b/c/node_node", they join a to b and b to c."""
+        """Adds a bond, which joins substructures by pairs of nodes. For "a/b/c/node_node", the
+        pairs join a to b and b to c. For "node_edge", see _bond_edges()."""
         *names, kind = bond.split("/")
         _check_size(len(names), MOST_PARTS, place)
         if kind not in ("node_node", "node_edge") or len(names) < 2:
@@ -194,8 +195,9 @@ class Assembly:
 
         The second substructure is moved onto the first. Then the centres of their bonded points are
         equal, the planes of their first three points are equal, and their first points are in the
-        same direction from the centre. Each cable at an edge becomes two cables, from its ends to
-        the node. Cables between the nodes are removed. Rods stay, but are refused as edges.
+        same direction from the centre. Each cable along an edge becomes two cables, from its ends
+        to the node. Cables between two bonded nodes are removed. Rods stay, but are refused as
+        edges.
         """
         _check_size(len(self.pairs) + len(listed), MOST_PAIRS, place)
         bonds, middles = [], []
@@ -240,7 +242,7 @@ def _listed(pairs: list[Pair], tags: str, part: str, place: Place) -> list[Tagge
 
 
 def _check_size(count: int, most: int, place: Place) -> None:
-    """Refuses a structure that has become too large."""
+    """Raises InputError if a structure has more than `most` parts of a sort."""
     if count > most:
         problem = f"found more than {most} in the whole structure, expected at most as many"
         raise InputError(*place, problem)
@@ -265,7 +267,7 @@ def _tags_of(path: str) -> Tags:
 
 def _frame(p: np.ndarray, place: Place) -> Any:
     """Orthogonal axes (3, 3), in rows, of points (points, 3). The first is normal to the plane of
-    the first three points. The second points along this plane, from the centre to the first
+    the first three points. The third points along this plane, from the centre to the first
     point."""
     axes = np.zeros((3, 3))
     if len(p) >= LEAST_PAIRS:

@@ -77,7 +77,7 @@ class BoxParameters(RigidParameters):
 
 
 class CableParameters(Section):
-    """Parameters of a cable."""
+    """Parameters of a cable, with NTRT's defaults. Fields of type Any have no effect."""
 
     density: ClassVar[float] = 0.0
     stiffness: Positive = 1000.0
@@ -155,7 +155,7 @@ class Builder(Section):
 
 
 class NtrtFile(Section):
-    """Content of a file, in NTRT's axes and unit of length."""
+    """Content of a YAML structure file of NTRT, in NTRT's axes and unit of length."""
 
     nodes: Keyed[str, Point] = Field(default={})
     """Nodes. A key is the tags of its node, separated by blanks."""

@@ -274,7 +274,8 @@ class StructureFile(Section):
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
         """Radii, densities and contact radii (3, nodes) of the spheres at the nodes. A node has the
-        sphere of its first strut in the file, unless it has one of its own."""
+        sphere of its first strut in the file, unless it has one of its own. `number` has the index
+        of each node; `held` (nodes, 3) is True along the axes of its anchor."""
         spheres: list[tuple[list[str], StrutGroup | SphereGroup, float, float]] = []
         for bar in reversed(self.struts.values()):
             ends = [node for pair in bar.pairs for node in pair]
@@ -301,8 +302,8 @@ class StructureFile(Section):
         return bodies
 
     def _names_of_bodies(self, bodies: list[list[str]], nodes: Sequence[str]) -> tuple[str, ...]:
-        """Name of each body: the group of struts with the same nodes, the part of a structure of
-        NTRT with the same nodes, such as "vertebra1", or the body's nodes."""
+        """Name of each body: the group of struts that has exactly its nodes, or the part of a
+        structure of NTRT that has them, such as "vertebra1"; otherwise the names of its nodes."""
         names: dict[frozenset[str], str] = {}
         for part in {node.rpartition("/")[0] for node in nodes} - {""}:
             names[frozenset(node for node in nodes if node.startswith(f"{part}/"))] = part
@@ -343,8 +344,9 @@ class StructureFile(Section):
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
-        """Refuses nodes that do not exist, are joined twice or to themselves, hang on nothing,
-        cannot move where they must, or are far away; then what no robot can have."""
+        """Refuses nodes that do not exist, are joined twice or to themselves, or hang on nothing;
+        fixed nodes with a mass, sphere, load or contact; and nodes that are far away. Then checks
+        what holds for any robot, see Blueprint.check()."""
         members = [*_members("struts", self.struts), *_members("cables", self.cables)]
         ends = [(member.key, node) for member in members for node in member.nodes]
         anchors = [(f"anchors.{node}", node) for node in self.anchors]
@@ -424,7 +426,8 @@ def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterato
 
 
 def _cable_numbers(names: Iterable[str]) -> dict[str, int]:
-    """Indices of cables by their names, with the two nodes in either order."""
+    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its two
+    nodes in either order."""
     numbers: dict[str, int] = {}
     for number, name in enumerate(names):
         group, first, second = name.split()

@@ -56,7 +56,7 @@ def tetrahedron_nodes(strut_length: float) -> np.ndarray:
 
 
 class RowCables(CableConstants):
-    """The cables of a row (Table 3)."""
+    """The cables of a row of tetrahedra (Table 3 of the thesis)."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Stiffness of outer cables, which join base nodes of the same name."""
@@ -68,7 +68,8 @@ class RowCables(CableConstants):
     """True if a cable pulls only while it is stretched; otherwise it also pushes (Eq. 6)."""
 
     def law(self, cable: str) -> dict[str, float]:
-        """Constants of a cable of a junction, by the names of laws.cable.CableLaw."""
+        """Constants of one cable of a junction, such as "outer top", by the names of
+        laws.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
         return self.constants(stiffness=stiffness, free_length=self.free_length)
 

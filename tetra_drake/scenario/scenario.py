@@ -236,7 +236,8 @@ class Scenario(Section):
         return changed
 
     def numbers(self) -> dict[str, float]:
-        """SI numbers of the sections by dotted keys, without `disturbances`."""
+        """SI numbers of the scenario by dotted keys, without `disturbances`, `objective` and
+        `require`."""
         tree = self.model_dump(exclude={"disturbances", "objective", "require"})
         return {key: value for key, value in flattened(tree).items() if isinstance(value, float)}
 
@@ -283,7 +284,7 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _check_disturbances(self) -> Self:
-        """Refuses disturbances that make a number invalid."""
+        """Refuses disturbances whose largest changes would make a number invalid."""
         if self.disturbances is None:
             return self
         undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()

@@ -38,7 +38,8 @@ def parse_yaml(content: str, source: object) -> Any:
 
 
 def read_mapping(file: Path, what: str, *, keys: Collection[str]) -> Tree:
-    """Content of a YAML file: a mapping with some of `keys`.
+    """Content of a YAML file: a mapping with some of `keys`. `what` is the kind of file, such as
+    "scenario file", for error messages.
 
     Raises InputError for another content. The file may be a private one, so the error does not show
     its content.

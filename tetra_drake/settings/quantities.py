@@ -18,7 +18,7 @@ from tetra_drake.settings.units import PATTERN, plainest, quantity_to_si
 
 
 class Quantity(float):
-    """SI number that carries its unit. Dumped settings contain quantities in this form."""
+    """SI number that carries its unit. model_dump() of a section gives quantities in this form."""
 
     unit: str
 

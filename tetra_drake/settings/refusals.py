@@ -81,15 +81,16 @@ _UNKNOWN = "extra_forbidden", "invalid_key"
 
 
 def members_of(node: Tree, schema: Tree) -> list[Tree]:
-    """Alternative types in a node of a JSON Schema: members of its union, or the only type.
-    References to sections are resolved."""
+    """Alternative types that a node of a JSON Schema allows: members of its union, or its only
+    type. A reference to a section is replaced by the section's schema."""
     sections = {"": {}} | schema.get("$defs", {})
     members = node.get("anyOf", [node])
     return [sections[one.get("$ref", "").rpartition("/")[2]] | one for one in members]
 
 
 def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, Tree]]:
-    """Dotted keys of a section in a JSON Schema, each with the schema of its value."""
+    """Dotted keys of a section in a JSON Schema, each with the schema of its value. NAME in a key
+    stands for a name that the user chooses."""
     for name, node in section.get("properties", {}).items():
         item = node.get("additionalProperties")
         inner = joined(key, f"{name}.NAME" if item else name)
@@ -100,8 +101,9 @@ def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, T
 
 
 def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
-    """Types of an item of a value. `part` is the key or index of the item, or the tag of the value.
-    For any other name, the result is `members`, the types of the value."""
+    """Schemas of the types that an item of a value may have. `members` are the types of the value
+    itself. `part` is the key or index of the item. If `part` is the value's tag, the result is the
+    type with this tag; for any other name it is `members`."""
     for member in members:
         if member.get("title") == f"!{part}":
             return [member]
@@ -113,7 +115,8 @@ def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
 
 
 def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str, str]:
-    """Key within the value, and problem in words, for one of pydantic's errors."""
+    """Key within the wrong value, and problem in words, for one of pydantic's errors. `members` are
+    the types that the value may have, from the JSON Schema."""
     kind, context, found = error["type"], error.get("ctx", {}), f"found {described(value)}"
     if kind == "value_error":
         cause = context["error"]
@@ -160,5 +163,6 @@ def hint(name: Any, names: Iterable[str]) -> str:
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
-    """Error text with advice, for a name that is neither shipped nor a file."""
+    """Error text with advice, for a name that is neither shipped nor a file. `what` is a kind of
+    file, such as "scenario file"."""
     return f"no such {what}; {hint(name.rpartition('/')[2], shipped)}"

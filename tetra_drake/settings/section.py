@@ -34,8 +34,8 @@ Show = Callable[[float, str], str]
 
 
 def _complete_schema(schema: Tree, section: type[Section]) -> None:
-    """Adapts pydantic's JSON Schema of a section to files: no required keys, units,
-    descriptions."""
+    """Adapts pydantic's JSON Schema of a section to files, in place. It drops required keys, and
+    adds descriptions, units of defaults, and the keys that only files have."""
     schema |= EMPTY
     schema.pop("required", None)  # a base may have the keys
     for key, text in section.keys_of_files.items():
@@ -156,8 +156,8 @@ class Section(BaseModel):
 
     @functools.cached_property
     def lengths(self) -> tuple[float, ...]:
-        """All lengths (m) in the section. They are cached: a disturbed copy keeps the original
-        lengths."""
+        """All lengths (m) in the section. They are cached: a copy with disturbed numbers keeps the
+        original lengths, which decide the units that it is shown in."""
         numbers = (part for part in parts_in(self.model_dump()) if isinstance(part, Quantity))
         return tuple(float(number) for number in numbers if number.unit == "m")
 
@@ -198,14 +198,14 @@ class Kinds:
 
 
 def _hashable(value: Any) -> Any:
-    """Converts lists and mappings to tuples."""
+    """Converts lists and mappings to tuples, nested ones included."""
     if isinstance(value, dict):
         value = list(value.items())
     return tuple(map(_hashable, value)) if isinstance(value, (list, tuple)) else value
 
 
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
-    """Fields of a section by their keys in files."""
+    """pydantic's fields of a section, by their keys in files."""
     return {field.alias or name: field for name, field in section.model_fields.items()}
 
 
@@ -276,8 +276,8 @@ def value_at(tree: Any, key: str) -> Any:
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
-    """Copy of dumped settings for a file, with quantities as texts. `show` formats a quantity, by
-    default with all digits, in SI."""
+    """Copy of a section's dumped settings for a file: each quantity becomes a text, such as "0.3
+    m". `show` makes the text from number and SI unit; by default it has all digits, in SI."""
     return mapped(
         value, lambda part: show(float(part), part.unit) if isinstance(part, Quantity) else part
     )

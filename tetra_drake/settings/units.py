@@ -40,8 +40,8 @@ class Units:
 
     @property
     def decimals(self) -> int:
-        """Number of decimals of a distance in a sentence, so that about 1 mm is visible. Tables and
-        figures have one more."""
+        """Digits after the decimal point of a distance in a sentence: 0 in mm, 1 in cm or inches, 3
+        in m, so that about 1 mm is visible. Tables and figures have one more."""
         return round(math.log10(self.length / 0.001))
 
     def of(self, unit: str) -> tuple[float, str]:
@@ -95,8 +95,8 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def fitting(lengths: tuple[float, ...]) -> Units:
-    """Units that show lengths (m) with the fewest digits; short lengths do not count. They are
-    metric if the lengths are round in no unit, as in a turned robot."""
+    """Units that show lengths (m) with the fewest digits. Lengths below a quarter of the longest do
+    not count. If the lengths are round in no unit, as in a turned robot, the units are metric."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
     return min(
@@ -113,7 +113,7 @@ where lengths are in cm."""
 
 
 def _digits(number: float) -> int:
-    """Number of digits of a number that is printed with at most nine."""
+    """Number of digits in the text of a number, which is rounded to nine significant digits."""
     return sum(letter.isdecimal() for letter in f"{number:.9g}")
 
 
