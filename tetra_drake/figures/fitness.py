@@ -31,8 +31,8 @@ _BAND: Any = {"color": OKABE_ITO["blue"], "alpha": 0.18, "linewidth": 0.0}
 
 
 def initial_extremes(run: Run) -> pandas.DataFrame:
-    """Distances (m) of the fittest and the least fit initial gait: a row per trial, columns best
-    and worst. Failed gaits are left out."""
+    """Distances (m) of the fittest and the least fit gait of each trial's initial population: a row
+    per trial, columns best and worst. Failed gaits are left out."""
     walked = run.initial().dropna(subset="fitness").sort_values(["trial", "fitness"])
     distances = walked.groupby("trial")["distance"]
     return pandas.DataFrame({"best": distances.last(), "worst": distances.first()})
@@ -40,8 +40,8 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
 
 @figure_function
 def initial_distances(run: Run) -> Drawn:
-    """Distances of the fittest and the least fit initial gait of each trial. Failed gaits are left
-    out."""
+    """Distances of the fittest and the least fit gait of each trial's initial population. Failed
+    gaits are left out."""
     unit, width = run.scenario.units, 0.4
     extremes = initial_extremes(run) / unit.length
     page = page_of(height_in=3.6)
@@ -65,7 +65,8 @@ def initial_distances(run: Run) -> Drawn:
 
 @figure_function
 def initial_fitness(run: Run, trial: int) -> Drawn:
-    """Histogram of the fitness of a trial's initial gaits. Gaits that walk backward are hatched."""
+    """Histogram of the fitness of a trial's initial population. Gaits that walk backward are
+    hatched."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
     fitness, backward = walked["fitness"], walked["distance"] < 0.0
@@ -97,8 +98,9 @@ def fitness_of_trials(run: Run) -> Drawn:
     """Fitness over evaluations: the mean of each trial's population, or the best if the optimiser
     reports no mean.
 
-    With four trials or more, the fittest and the least fit trial are dark, the others grey. Blue:
-    median and quartiles over trials. A finished trial keeps its last value in the quartiles."""
+    With four trials or more, the trials that end fittest and least fit are dark, the others grey.
+    Blue: median and quartiles over trials. A finished trial keeps its last value in the
+    quartiles."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
     # The mean of a last iteration that the budget has cut would be over few gaits.
     rows = run.iterations

@@ -49,10 +49,13 @@ _MIRRORED = 0.01  # two nodes share a panel if mean difference / mean force is a
 
 @figure_function
 def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) -> Drawn:
-    """Actuation signals and the tensions of the cables that they drive, in the last 4 s.
+    """Actuation signals and tensions of the cables that they drive, in the given time span or, by
+    default, in the last 4 s of the simulation.
 
-    The title of a panel is the name of the cable. If a signal drives several cables, the first is
-    shown. The start-up is shaded; signals are 0 there."""
+    A panel shows one signal and the tension of one cable, whose name is its title. If a signal
+    drives several cables, the first is shown. Both are forces; a positive signal shortens the
+    cable. The start-up, in which signals are 0, is shaded if the time span contains a part of
+    it."""
     unit, trajectory = result.scenario.units, _shown(result, time)
     forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
@@ -74,11 +77,13 @@ def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) 
 
 @figure_function
 def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Drawn:
-    """Normal force and friction of the feet in the last 4 s.
+    """Normal force and friction of the ground on the feet, in the given time span or, by default,
+    in the last 4 s of the simulation.
 
-    Friction is along x; on uneven ground, along x projected on the slope. Each foot that touches
-    the ground has a panel; feet of one body with equal forces share a panel. Grey: stance. Peaks of
-    impacts are cut off, because they are shorter than the time between samples."""
+    Friction is along x, the forward direction; on uneven ground, along x projected on the slope.
+    Each foot that touches the ground has a panel; feet of one body with equal forces share a panel.
+    Grey: stance. Peaks of impacts are cut off, because they are shorter than the time between
+    samples."""
     unit, end = result.scenario.units, _shown(result, time)
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)
@@ -111,15 +116,15 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
 
 
 def _shown(result: SimulationResult, time: Span | None) -> xarray.Dataset:
-    """The part of the trajectory between two times (s), by default its end."""
+    """The part of the trajectory between the two times (s) of `time`, by default its last 4 s."""
     end = float(result.trajectory.time[-1])
     return shown_part(result.trajectory, time or (max(0.0, end - _SECONDS), end))
 
 
 def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
-    """Nodes to show, with the titles of their panels. A node that touches the ground is shown,
-    unless it has the same forces as the first touching node of its body. If no node touches, the
-    first node is shown."""
+    """Contact nodes to show, with the titles of their panels, by node. A node that touches the
+    ground is shown, unless it has the same normal force as the first touching node of its body;
+    that node's title then names both. If no node touches, the first node is shown."""
     feet: dict[str, str] = {}
     for body in dict.fromkeys(trajectory.contact_body.values):
         normal = trajectory.normal_force[:, (trajectory.contact_body == body).values]
@@ -139,8 +144,12 @@ def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
 def _panels_over_time(
     names: Sequence[str], units: Units, *, groups: int, beside: str = ""
 ) -> tuple[Page, list[Axes]]:
-    """A figure, and its panels of forces over time, one per name. If there are few groups of
-    panels, each group has a column. A text `beside` the names has its own line if it needs one."""
+    """A new figure, and its empty panels for forces over time, one per name, in columns.
+
+    With 2 to 4 `groups` of panels, one per signal or body for example, there is a column for each.
+    `beside` is a text that the caller writes to the right of each name; the name gets a line of its
+    own if both do not fit.
+    """
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)

@@ -47,12 +47,12 @@ _STANCE = {"left": OKABE_ITO["blue"], "right": OKABE_ITO["sky_blue"]}
 
 @figure_function
 def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn:
-    """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
-    speed of the centre of mass.
+    """Gait diagram of the last three cycles, or of a given time span: actuation signals, stance of
+    each foot, and forward speed of the centre of mass.
 
     A bar shows when a foot bears load. The front body is on top. The duty factor is the share of
-    time during which a foot bears load. Dotted lines mark cycles. If no signal has two periods in
-    the second half of the simulation, the last quarter is shown."""
+    time during which a foot bears load. Dotted lines mark cycles, periods of the signals. If no
+    signal has two periods in the second half of the simulation, the last quarter is shown."""
     structure, cycle = result.robot.structure, measures.last_step(result.trajectory)
     first, end = (float(result.trajectory.time[i]) for i in (0, -1))
     length, title = 0.25 * (end - first), "Gait diagram"
@@ -97,12 +97,13 @@ def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn
 
 
 def _rows_of_names(names: Iterable[str]) -> float:
-    """Height of the name with the most lines, in rows of the diagram."""
+    """Height that the name with the most lines needs, in heights of a row of the diagram."""
     return 1.3 * most_lines(names) - 0.3
 
 
 def _write_names(panel: Axes, names: Sequence[str], rows: Iterable[float]) -> None:
-    """Writes names beside rows; if they have too many lines, only every second, or fewer."""
+    """Writes names at the y values `rows` of a panel. If they do not all fit, only every second
+    name is written, or every third, and so on."""
     fitting = max(1, _NAMED // most_lines(names))
     every = max(1, math.ceil(len(names) / fitting))
     panel.set_yticks(list(rows)[::every], names[::every])
@@ -116,7 +117,8 @@ def foot_name(node: str) -> str:
 def _draw_signals(
     panel: Axes, trajectory: xarray.Dataset, names: Sequence[str], unit: Units
 ) -> None:
-    """Draws signals one above the other. The last signal, of the front body, is on top."""
+    """Draws signals over time in one panel, one above the other, with `names` beside them. The last
+    signal, of the front body, is on top. All have the same scale."""
     signals, oscillators = trajectory.signal / unit.force, trajectory.oscillator.values
     largest = float(np.abs(signals.values).max())
     scale = 0.48 / largest if largest else 0.0  # signals do not touch each other
@@ -132,8 +134,12 @@ def _draw_signals(
 def _draw_stance(
     panel: Axes, stands: xarray.DataArray, heights: np.ndarray, named: pandas.Series
 ) -> None:
-    """Draws stance bars of the feet at their heights, and names at the heights of `named`. If feet
-    are named, they have their duty factors, too."""
+    """Draws stance bars of the feet in a panel, and names beside it.
+
+    `stands` (time, contact) is True where a foot bears load. `heights` (contact,) are the y values
+    of the bars. `named` has the y values of the names, by name: of the feet, which then also get
+    their duty factors, or of the bodies if there are many feet.
+    """
     name, times = "stance", stands.time.values
     for foot, height in zip(stands.contact.values, heights, strict=True):
         stance = stands.sel(contact=foot)

@@ -60,7 +60,7 @@ _HEADING: Any = {"color": OKABE_ITO["vermillion"], "zorder": 2.5, "width": 0.004
 @figure_function
 def relative_distances(result: SimulationResult, *, time: Span | None = None) -> Drawn:
     """Distance along x of each body from the first body, over time. Distances are between centres
-    of mass. Grey lines: the distances at the start."""
+    of mass, positive ahead. Grey lines: the distances at the start of the time shown."""
     unit, x = result.scenario.units, shown_part(result.trajectory, time).p_WB.sel(axis="x")
     distances = (x - x.isel(body=0)) / unit.length
     first, *names = distances.body.values
@@ -82,8 +82,8 @@ def relative_distances(result: SimulationResult, *, time: Span | None = None) ->
 def before_and_after(
     initial: SimulationResult, best: SimulationResult, *, time: Span | None = None
 ) -> Drawn:
-    """Distance walked over time, before and after evolution: the best initial gait and the best
-    gait of the best trial."""
+    """Distance walked over time, before and after evolution: the best gait of the best trial's
+    initial population, and the best gait of this trial."""
     unit = best.scenario.units
     page = page_of(height_in=3.8)
     panel = page.subplots()
@@ -100,8 +100,9 @@ def before_and_after(
 
 @figure_function
 def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: int = 6) -> Drawn:
-    """Time lapse of the robot from above, to scale, with the distance walked. Forward is to the
-    right. The line is the path of the centre so far, with a dot at each full second."""
+    """Time lapse of the robot from above at equally spaced instants, to scale, with the distance
+    walked. Forward is to the right. The line is the path of the centre so far, with a dot at each
+    full second."""
     structure, unit = result.robot.structure, result.scenario.units
     trajectory = shown_part(_with_distance(result), time)
     first, last = trajectory.time.values[[0, -1]]
@@ -171,7 +172,8 @@ def path_of_the_centre(
 
 @figure_function
 def one_step(result: SimulationResult, *, time: Span | None = None, instants: int = 6) -> Drawn:
-    """One step to scale, from above and from the side. Bodies off the ground are red.
+    """The last step of the robot to scale, from above and from the side, at equally spaced
+    instants. Bodies off the ground are red.
 
     A body is off the ground if all its feet are higher than 2 % of the robot's height. The lower
     panels show the path of one bottom node per body, or of the centre. If no signal has two periods
@@ -237,8 +239,11 @@ def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[n
 def _draw_paths(
     page: Page, paths: np.ndarray, lifted: np.ndarray, result: SimulationResult
 ) -> None:
-    """Draws the paths (samples, paths, 3) of one node per body, or of the centre, enlarged. They
-    are red where the body, or all bodies, are `lifted` (samples, bodies)."""
+    """Draws, enlarged, the paths in the x-z plane of one node per body, or of the centre of mass.
+
+    `paths` (samples, paths, 3) are in the scenario's unit of length. A path is red where its body
+    is `lifted` (samples, bodies), off the ground; the centre's where all bodies are.
+    """
     names, length = result.robot.structure.bodies, result.scenario.units.length_name
     if not result.robot.structure.markers.size:
         names, lifted = (result.robot.structure.followed,), np.all(lifted, axis=1, keepdims=True)
@@ -262,38 +267,43 @@ def _draw_paths(
 
 
 def _with_distance(result: SimulationResult) -> xarray.Dataset:
-    """The trajectory with the distance `walked` since the start of the simulation (time,)."""
+    """The trajectory with one more variable: `walked` (time,), the distance since the start of the
+    simulation, in the scenario's unit of length."""
     walked = measures.distance_walked(result.trajectory, result.robot.structure)
     return result.trajectory.assign(walked=("time", walked / result.scenario.units.length))
 
 
 def _heights_below(points: np.ndarray, result: SimulationResult) -> np.ndarray:
-    """Heights of the ground (...) below points (..., 2 or 3); all in the unit of length."""
+    """Heights z of the ground (...) below points (..., 2 or 3), x and y first; all in the
+    scenario's unit of length."""
     length = result.scenario.units.length
     return ground_heights(points[..., :2] * length, result.robot.ground) / length
 
 
 def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
-    """Indices of the samples nearest to the given times (s)."""
+    """Indices (times,) of the samples of a trajectory that are nearest to the given times (s)."""
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
 def _margin(result: SimulationResult) -> float:
-    """Free space around the robot, in the unit of length."""
+    """Width of the free space that figures leave around the robot, in the scenario's unit of
+    length."""
     return _MARGIN * result.robot.structure.scale / result.scenario.units.length
 
 
 def _range(values: np.ndarray, result: SimulationResult) -> Span:
-    """Range of coordinates with a margin, in the unit of length."""
+    """Range (least, greatest) of coordinates with a margin on both sides. All are in the scenario's
+    unit of length."""
     margin = _margin(result)
     return float(values.min()) - margin, float(values.max()) + margin
 
 
 def _fit(count: int, wide: Span, high: Span, *, height_in: float) -> tuple[int, float]:
-    """Number of columns for which `count` pictures are largest, and the height (in) of all rows.
+    """Number of columns for which `count` equal pictures are largest, and the height (in) of all
+    rows together.
 
-    `wide` and `high` are the ranges that a picture shows. The pictures fill the caller's figure, or
-    a page of the height `height_in`.
+    `wide` and `high` are the ranges of x and y that each picture shows. The pictures fill the
+    caller's figure, or a page of the height `height_in`.
     """
     page, columns = GIVEN.get(), np.arange(1, count + 1)
     width, rows = page_width(), np.ceil(count / columns)
@@ -305,7 +315,8 @@ def _fit(count: int, wide: Span, high: Span, *, height_in: float) -> tuple[int, 
 
 
 def _to_scale(panel: Axes, wide: Span, high: Span) -> None:
-    """Sets the ranges of both axes, with the same scale and without numbers on the y axis."""
+    """Sets the ranges of the x axis (`wide`) and the y axis (`high`), with the same scale and
+    without numbers on the y axis."""
     panel.set(xlim=wide, ylim=high, aspect="equal", yticks=[])
     panel.tick_params(axis="y", length=0.0)
     panel.grid(visible=False, axis="y")
@@ -315,7 +326,8 @@ def _to_scale(panel: Axes, wide: Span, high: Span) -> None:
 def _draw_struts(
     panel: Axes, points: np.ndarray, structure: Structure, colours: Sequence[str]
 ) -> None:
-    """Draws the struts between points (nodes, 2); each body has its colour."""
+    """Draws the struts of a robot whose nodes are at `points` (nodes, 2) of the panel. `colours`
+    has a colour per body."""
     of_struts = [colours[body] for body in structure.carriers[structure.struts[:, 0]]]
     lines = LineCollection(list(points[structure.struts]), colors=of_struts, linewidths=1.2)
     panel.add_collection(lines, autolim=False)

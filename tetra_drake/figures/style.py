@@ -94,7 +94,7 @@ FILE_KINDS = ("svg", "png")
 
 @dataclass(frozen=True)
 class Print:
-    """Settings for the files of figures: the look, and the file types of save_figure()."""
+    """Settings for the files of figures: their look, and their file types (svg, png, pdf)."""
 
     look: Look = USUAL
     kinds: Sequence[str] = FILE_KINDS
@@ -128,7 +128,7 @@ def shown_part(trajectory: xarray.Dataset, time: Span | None) -> xarray.Dataset:
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Colour and dashes of the series with this index."""
+    """Colour and dashes of the line with this index in a panel, as keywords of Axes.plot()."""
     dashes = DASHES[index % len(DASHES)]
     return {"color": LINE_COLOURS[index % len(LINE_COLOURS)], "linestyle": dashes}
 
@@ -157,9 +157,9 @@ _SIZES = (
 def figure_function(draw: Callable[..., Drawn]) -> Callable[..., Drawn]:
     """Decorator of a function that draws a figure and returns it.
 
-    The figure gets the common style. The function also takes the keywords of Look, and `units`: a
-    name in units.SYSTEMS in place of the scenario's units. With the keyword `figure`, the function
-    draws on it and returns None.
+    The figure gets the common style. The function also takes the keywords of Look (width, letters,
+    title), and `units`: a name in units.SYSTEMS in place of the scenario's units. With the keyword
+    `figure`, a Figure or SubFigure of the caller, the function draws on it and returns None.
     """
 
     @functools.wraps(draw)
@@ -200,8 +200,9 @@ class ShownFigure(Figure):
 
 
 def page_of(*, height_in: float) -> Page:
-    """The figure to draw on: the caller's, or a new one, `height_in` inches high with letters of
-    the usual size. It gets the constrained layout, unless the caller has set another layout."""
+    """The figure to draw on, inside a figure_function(): the caller's, from the keyword `figure`,
+    or a new one, `height_in` inches high with letters of the usual size. It gets the constrained
+    layout, unless the caller has set another layout."""
     figure = GIVEN.get()
     if figure is None:
         height = height_in * rcParams["font.size"] / Look.font_size
@@ -249,8 +250,8 @@ def own_words(names: Sequence[str]) -> list[str]:
 def panels_in_columns(
     page: Page, count: int, columns: int, *, x_label: str, **shared: Any
 ) -> list[Axes]:
-    """Panels in columns with one common label of the x axes. `shared` is passed to
-    Figure.subplots()."""
+    """Makes `count` panels on a page in so many columns, with one common label of the x axes.
+    `shared` is passed to Figure.subplots(), such as sharex=True."""
     inner = page.subfigures(squeeze=False)[0, 0]  # puts the label above a legend of the page
     inner.supxlabel(x_label)
     grid = inner.subplots(math.ceil(count / columns), columns, squeeze=False, **shared).ravel()
@@ -264,8 +265,8 @@ def panels_in_columns(
 
 
 def titled(page: Page, title: str, *, share: float = 1.0) -> Page:
-    """Writes a title at the upper left of a figure and returns the figure. A line of the title has
-    at most a share of the width."""
+    """Writes a title at the upper left of a figure and returns the figure. The title is folded into
+    lines of at most `share` of the figure's width."""
     text = folded(title, share * page_width(page), size=rcParams["figure.titlesize"])
     page.suptitle(text, x=0.01, ha="left")
     return page
@@ -277,14 +278,15 @@ def name_panel(panel: Axes, name: str) -> None:
 
 
 def write_beside(panel: Axes, height: float, text: str) -> None:
-    """Writes a text to the right of a panel. `height` is a value of the y axis."""
+    """Writes a text to the right of a panel, at the value `height` of its y axis."""
     size, transform = rcParams["ytick.labelsize"], panel.get_yaxis_transform()
     panel.text(1.01, height, text, transform=transform, va="center", fontsize=size)
 
 
 def legend_below(page: Page, lines: Mapping[str, Any], *others: Any) -> None:
-    """Adds a legend below all panels: line styles by label, and other artists. It has as many
-    columns as fit on the page, and is read row by row."""
+    """Adds a legend below all panels of a page: `lines` are line styles, as keywords of Line2D, by
+    label; `others` are artists with labels. It has as many columns as fit on the page, and is read
+    row by row."""
     width = page_width(page) - _HANDLE * rcParams["legend.fontsize"] / 72.0
     texts = {folded(text, width): style for text, style in lines.items()}
     handles = [*(Line2D([], [], label=text, **style) for text, style in texts.items()), *others]

@@ -26,20 +26,21 @@ _UNEVEN = 0.05
 
 
 def command_columns(robot: Robot) -> list[str]:
-    """Columns of a robot's command file without the time, such as "T1-T2 outer top tension_N"."""
+    """Names of the columns of a robot's command file without the time, one per driven cable: the
+    cable, the commanded quantity and its unit, such as "T1-T2 outer top tension_N"."""
     quantity, names = robot.scenario.actuation.commanded, robot.structure.cable_names
     return [f"{names[cable]} {quantity}" for cable in robot.driven]
 
 
 def command_text(robot: Robot, command: Command) -> str:
-    """CSV text of a command, as load_command() reads it."""
+    """CSV text of a command, setpoints of the actuators over time, as load_command() reads it."""
     times = command.period * np.arange(len(command.samples))
     values = command.samples / robot.scenario.actuation.command_unit
     return table_text(command_columns(robot), times, values)
 
 
 def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) -> str:
-    """CSV with a row for each time (s) and its values."""
+    """CSV text with a row per time: `times` (rows,) in s, then `values` (rows, columns)."""
     table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME_S))
     return table.reset_index().to_csv(index=False, float_format="%.6f")
 
@@ -51,14 +52,15 @@ def scenario_beside(path: Path) -> Path | None:
 
 
 def load_command(path: str | Path, scenario: GivenScenario) -> Command:
-    """Reads a command file for a scenario's robot.
+    """Reads a command file, setpoints of the actuators over time, for a scenario's robot.
 
         >>> scenario = td.load_scenario("quick")
         >>> command = td.load_command("lab/command.csv", scenario)
         >>> result = td.simulate(scenario, command=command)
 
     Args:
-        path: the CSV file. Its columns may be in any order.
+        path: the CSV file: a column time_s and one per driven cable, as export() writes. Columns
+            may be in any order; times are evenly spaced.
         scenario: the scenario of the robot, its name or file, or a run.
 
     Raises:
@@ -86,8 +88,11 @@ def load_command(path: str | Path, scenario: GivenScenario) -> Command:
 def table_cells(
     text: str, path: str | Path, *, wanted: Sequence[str] | None = None
 ) -> pandas.DataFrame:
-    """Cells of a CSV table as texts, so that messages can show them. Raises InputError if it is no
-    table, a column is given twice, or the columns are not the `wanted` ones."""
+    """Cells of a CSV table as texts, so that messages can show them.
+
+    `text` is the content, `path` names the file in messages. Raises InputError if it is no table, a
+    column is given twice, or the columns are not the `wanted` ones, in any order.
+    """
     try:
         heading, *rows = csv.reader(io.StringIO(text.rstrip()), strict=True)
     except (csv.Error, ValueError) as error:  # an empty file, too

@@ -53,8 +53,8 @@ class Loads(NamedTuple):
 def export(
     scenario: GivenScenario, gait: GivenGait, out: str | Path, *, rate: float = 100.0
 ) -> str:
-    """Simulates a gait and writes it as commands for the actuators of a prototype. Returns a
-    verdict.
+    """Simulates a gait and writes it as commands for the actuators of a prototype. Returns a text,
+    the verdict.
 
         >>> print(td.export(td.load_scenario("quick"), "gait.json", "prototype"))
 
@@ -115,7 +115,8 @@ def export(
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
-    """Loads on the actuators in a trajectory of a robot."""
+    """Loads on the actuators in a simulated motion: forces, speeds, travel and power of each driven
+    cable, and where a limit of the actuator binds."""
     kind, constants = robot.scenario.actuation, robot.model.actuator
     cables, limits = robot.structure.cables[robot.driven], actuator.Limits(*constants.limits)
     walk = trajectory.isel(cable=robot.driven)
@@ -160,7 +161,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
 
 
 def load_verdict(loads: Loads, result: SimulationResult) -> str:
-    """Text about the loads of a simulation: greatest loads, limits, and whether limits bind."""
+    """Text about the loads on the actuators in a simulation: greatest loads, limits, and whether
+    the actuators can play the gait without reaching a limit."""
     worst = loads.table.drop(columns="time_at_a_limit_percent").max()
     worst["least_length_mm"] = loads.table["least_length_mm"].min()
     table = worst.dropna().to_string(float_format=fixed)

@@ -51,7 +51,8 @@ _BESIDE = 5.5  # least width (in) of two panels side by side, with letters of th
 
 @dataclass(frozen=True)
 class Compared:
-    """Comparison of runs, as compare() returns it: tables of trials, curves and runs."""
+    """Comparison of evolution runs, as compare() returns it: tables of trials, of curves of the
+    best fitness over cost, and of runs. Cost is the number of simulations."""
 
     scenario: Scenario
     """Scenario of the first run."""
@@ -103,14 +104,14 @@ def compare(
     reach: float | None = None,
     labels: Sequence[str] | None = None,
 ) -> Compared:
-    """Compares runs with the same objective, finished or not.
+    """Compares how well evolution runs with the same objective search, finished or not.
 
         >>> compared = td.compare(["runs/demo", "runs/other"], reach=0.3)
         >>> compared.trials[["run", "fitness", "reached"]], compared.improvement, compared.notes
 
     Args:
         directories: folders of runs.
-        reach: a distance (m); the result says at which cost it was reached.
+        reach: a distance (m); the result says after how many simulations a gait walked it.
         labels: a name for each run; by default the names of the folders, or the paths if two
             folders have the same name.
 
@@ -164,9 +165,10 @@ def compare_scenarios(
     reach: float | None = None,
     labels: Sequence[str] | None = None,
 ) -> dict[str, Compared]:
-    """Compares the runs of each scenario, by the name of the scenario; see compare().
+    """Compares runs within each scenario: groups the folders by the name of their scenario and
+    returns compare() of each group, by that name.
 
-    Raises InputError also if no scenario has two of the runs.
+    Raises InputError like compare(), and if no scenario has two of the runs.
     """
     _check_lists(directories, labels)
     names = pandas.Series([read_manifest(Path(each)).scenario.name for each in directories])
@@ -185,7 +187,7 @@ def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.fl
     """Probability that a number of our sample exceeds a number of their sample.
 
     It is the share of such pairs among all pairs. Equal numbers count one half. Samples are along
-    the last axes, (..., n) and (..., m).
+    the last axes, (..., n) and (..., m); the result has the shape (...).
 
     From R. Agarwal et al., "Deep reinforcement learning at the edge of the statistical precipice",
     NeurIPS 2021 (rliable).
@@ -195,10 +197,12 @@ def improvement(ours: npt.ArrayLike, theirs: npt.ArrayLike) -> npt.NDArray[np.fl
 
 
 def improvement_over(scenarios: Iterable[pandas.DataFrame]) -> pandas.DataFrame:
-    """Mean probability of improvement over several scenarios, in the form of Compared.improvement.
+    """Mean, over several scenarios, of the probability that one run improves on another.
 
-    A pair of runs is averaged over the scenarios that have both. The bootstrap draws trials within
-    each scenario.
+    It is the probability that a trial of `run` ends fitter than a trial of `other`. A pair of runs
+    is averaged over the scenarios that have both. The bootstrap draws trials within each scenario.
+    Returns a row per ordered pair, index (run, other): probability, and its 95 % interval low,
+    high.
 
     Args:
         scenarios: a table of trials for each scenario, with at least the columns `run` and
@@ -235,8 +239,8 @@ def _check_lists(directories: Sequence[str | Path], labels: Sequence[str] | None
 
 def _progress(run: Run) -> pandas.DataFrame:
     """Progress of each trial, a row per evaluation: trial, ended (True if the trial is finished),
-    cost, fitness and distance (m) of the trial's fittest gait so far. Before the first success,
-    fitness is -inf and distance is NaN."""
+    cost (simulations so far), fitness and distance (m) of the trial's fittest gait so far. Before
+    the first gait that does not fail, fitness is -inf and distance is NaN."""
     run.fittest()  # raises InputError if there is none
     table = run.evaluations[["trial", "fitness", "distance"]].copy()
     trial = table["trial"]
@@ -249,14 +253,16 @@ def _progress(run: Run) -> pandas.DataFrame:
 
 
 def _end(progress: pandas.DataFrame) -> int:
-    """Cost at the end of a run's curve; see Compared.curves."""
+    """Cost (simulations) at which a run's curve ends: where the first unfinished trial stands now,
+    or the end of the longest trial if all are finished."""
     ends = progress.groupby("trial")[["cost", "ended"]].last()
     going_on = ends[~ends["ended"]]
     return int(ends["cost"].max() if going_on.empty else going_on["cost"].min())
 
 
 def _trials(progress: pandas.DataFrame, common: int, reach: float | None) -> pandas.DataFrame:
-    """The rows of Compared.trials for one run."""
+    """The rows of Compared.trials for one run, from the table of _progress(): one per trial, with
+    the best fitness at the cost `common` and the cost at which a gait walks `reach` (m)."""
     table = progress.drop_duplicates("trial", keep="last").set_index("trial")
     at_common = progress[progress["cost"] <= common].groupby("trial")["fitness"].last()
     far = progress[progress["distance"] >= (math.inf if reach is None else reach)]
@@ -267,8 +273,8 @@ def _trials(progress: pandas.DataFrame, common: int, reach: float | None) -> pan
 
 
 def _curve(progress: pandas.DataFrame, end: int) -> pandas.DataFrame:
-    """Quartiles of the best fitness over the trials, at each cost at which a trial improves, and at
-    the end."""
+    """Quartiles over the trials of the best fitness so far: a row (cost, low, median, high) for
+    each cost at which a trial improves, and for the cost `end`. Input: the table of _progress()."""
     best = progress.pivot(index="cost", columns="trial", values="fitness").ffill().loc[:end]
     rises = (best != best.shift()).any(axis=1)
     rises.iloc[-1] = True
@@ -278,8 +284,8 @@ def _curve(progress: pandas.DataFrame, end: int) -> pandas.DataFrame:
 
 
 def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
-    """Quartiles along the first axis, with linear interpolation. Unlike numpy's they are not NaN
-    if values are infinite."""
+    """Lower quartile, median and upper quartile along the first axis, with linear interpolation.
+    Unlike numpy's they are not NaN if values are infinite."""
     ordered = np.sort(values, axis=0)
     quartiles = []
     for share in (0.25, 0.5, 0.75):
@@ -292,7 +298,8 @@ def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
 
 
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
-    """Columns of Compared.runs for one run, computed from its trials."""
+    """The row of Compared.runs for one run, by column: medians, means and intervals of its
+    trials."""
     going_on, cost = int((~trials["ended"]).sum()), trials["cost"].median()
     row: dict[str, Any] = {"trials": len(trials), "going_on": going_on, "cost": cost}
     for name in ("at_common", "fitness", "distance"):
@@ -307,8 +314,8 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:
-    """Notes on scenarios that differ from the first run's outside the search. Raises InputError if
-    objectives differ."""
+    """Notes on runs whose scenario differs from the first run's in more than the settings of the
+    search (evolution, optimizer). Raises InputError if objectives differ."""
     notes, objectives = [], []
     (first, base), *_ = runs.items()
     for label, run in runs.items():
@@ -329,7 +336,7 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
 
 
 def comparison_text(compared: Compared) -> str:
-    """Tables of the fitnesses and distances of compared runs."""
+    """Text for the terminal: tables of the fitnesses and distances of compared runs."""
     units, reach = compared.scenario.units, compared.reach
     distance = f"Distance in {units.length_word} of the best gait of each trial, also as "
     distance += "interquartile mean."
@@ -405,7 +412,7 @@ def comparison(compared: Compared) -> Drawn:
     of each run.
 
     If a distance to reach was given, a second panel shows the share of trials that have reached it.
-    Finished trials keep their last values. A dot marks the end of a run."""
+    Finished trials keep their last values. A dot marks the end of a run's curve."""
     panel_count, unit = 1 if compared.reach is None else 2, compared.scenario.units
     counts = compared.runs["trials"].items()
     labels = [f"{label} ({count} {'trial' if count == 1 else 'trials'})" for label, count in counts]

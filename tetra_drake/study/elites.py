@@ -46,8 +46,9 @@ def elites(run: Run) -> pandas.DataFrame:
     first; the table is empty if the optimiser makes no map.
 
     A row is a row of Run.evaluations with more columns: cell_1 and cell_2 (numbers of the cell,
-    from 0), kept (share of draws that the gait keeps, see robustness.LOSS), mean_distance (m, on
-    disturbed robots). The last two are NaN if the gait was not simulated on disturbed robots.
+    from 0), kept (share of disturbance draws in which the gait loses at most 10 % of its distance
+    and meets the requirements), mean_distance (m, on disturbed robots). The last two are NaN if the
+    gait was not simulated on disturbed robots.
     """
     table, kind = run.with_parameters, run.scenario.optimizer
     lines = [line.content() for line in run.file(ELITES).read()]
@@ -66,9 +67,11 @@ def elites(run: Run) -> pandas.DataFrame:
 
 
 def judge_elites(directory: Path, *, workers: int | None = None) -> None:
-    """Simulates the elites of a run on disturbed robots and records the results; see robustness().
+    """Simulates the elites of a run on disturbed robots and records the results in the run's
+    folder; see robustness().
 
-    The scenario sets the number of draws. Elites with a recorded result are skipped.
+    An elite is the fittest gait of a cell of the map. The optimiser's settings in the scenario set
+    the number of draws of disturbances. Elites with a recorded result are skipped.
     """
     manifest = read_manifest(directory)
     kind, file = manifest.scenario.optimizer, RecordFile.of(directory, manifest.run, ELITES)
@@ -94,13 +97,14 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
 
 
 def kept_gaits(gaits: pandas.DataFrame) -> pandas.DataFrame:
-    """Elites that keep at least the share LUCKY of the draws, the fittest first."""
+    """Elites that are robust in at least half of the disturbance draws, the fittest first. Elites
+    not simulated on disturbed robots are kept. A row per elite, as elites() returns it."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 
 def notable_gaits(run: Run) -> dict[str, pandas.Series]:
-    """Notable gaits of the map, by name: the fittest robust elite, and the robust elites nearest to
-    the corners of the map."""
+    """Notable gaits of a run's quality-diversity map, by name: the fittest elite of kept_gaits(),
+    and those nearest to the four corners of the map. A value is a row of elites()."""
     gaits, kind = kept_gaits(elites(run)), run.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
@@ -114,7 +118,8 @@ def notable_gaits(run: Run) -> dict[str, pandas.Series]:
 
 
 def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
-    """Named gaits without repetitions: each gait with all of its names."""
+    """Gaits without repetitions: the same gait under several names becomes one item, its list of
+    names and its row of evaluations."""
     names: dict[Any, list[str]] = {}
     for name, gait in named.items():
         names.setdefault((gait["trial"], gait["index"]), []).append(name)
@@ -123,11 +128,12 @@ def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], 
 
 @figure_function
 def map_of_gaits(run: Run) -> Drawn:
-    """Map of gaits: the fittest gait in each cell. White cells have no gait.
+    """Map of gaits over two measures: the fitness of the fittest gait in each cell. White cells
+    have no gait.
 
-    If gaits were simulated on disturbed robots, the second panel shows the share of draws with
-    nearly the undisturbed distance. A cross marks gaits for which this share is below one half.
-    Numbers mark the fittest gait and the gaits nearest to the corners."""
+    If gaits were simulated on disturbed robots, the second panel shows the share of these draws in
+    which a gait loses at most 10 % of its undisturbed distance. A cross marks gaits for which this
+    share is below one half. Numbers mark the fittest gait and the gaits nearest to the corners."""
     kind, units = cast(QualityDiversity, run.scenario.optimizer), run.scenario.units
     edges, labels = [], []
     for (measure, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True):

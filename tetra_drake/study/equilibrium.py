@@ -53,7 +53,8 @@ _SURROUNDINGS = "prism"
 
 @dataclass(frozen=True)
 class EquilibriumStudy:
-    """Robot in equilibrium: statics, nodes, cables, natural frequencies and modes; SI units."""
+    """Results of study_equilibrium(): statics, nodes, cables, natural frequencies and mode shapes
+    of a robot at rest without actuation; SI units."""
 
     robot: Robot
     statics: Statics
@@ -68,8 +69,8 @@ class EquilibriumStudy:
 
     @functools.cached_property
     def modes(self) -> np.ndarray:
-        """Mode shapes (frequencies, nodes, 3): displacements of the nodes, 1 for the farthest
-        one."""
+        """Mode shapes (frequencies, nodes, 3): displacements of the nodes in the world frame,
+        scaled so that the node that moves farthest moves by 1. Order as in `frequencies`."""
         structure, unactuated = self.robot.structure, Unactuated(self.robot.model)
         squares, motions = linalg.eigh(*_vibration(self.robot, unactuated))
         motions = motions[:, squares > _LEAST_SQUARE]
@@ -137,7 +138,7 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
 
 def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness matrix K and mass matrix M of small motions M x'' = -K x about the equilibrium,
-    without damping. For x see displaced()."""
+    without damping. x has six coordinates per body, as displaced() takes them. Returns K and M."""
     state = robot.equilibrium.state
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
@@ -149,7 +150,8 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     MuJoCo can simulate it. A structure gets Coulomb friction.
 
     A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
-    for it. A file of NTRT needs a `unit` of length. Struts may overlap in the file, as they do in
+    for it. A file of the NASA Tensegrity Robotics Toolkit (NTRT) has bare numbers, so it needs a
+    `unit` of length, such as "dm". Struts may overlap in the file, as they do in
     some of NTRT's; in equilibrium they touch. Raises InputError that names file and key.
     """
     shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
@@ -184,7 +186,8 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
 
 
 def structure_text(study: EquilibriumStudy) -> str:
-    """Description of a robot and its equilibrium, with tables in g and the robot's units."""
+    """Text for the terminal about a robot and its equilibrium, with tables. Masses are in g,
+    lengths and forces in the units of the robot's scenario."""
     robot, statics, structure = study.robot, study.statics, study.robot.structure
     units = robot.scenario.units
     length, force = units.length_name, units.force_name

@@ -110,7 +110,8 @@ class Fit:
 
     @property
     def notes(self) -> list[str]:
-        """Warnings, and the offsets of the clocks of measurements, as sentences."""
+        """Warnings as sentences, and one for each measurement whose clock is ahead of the simulated
+        time."""
         offsets = {name: 1e3 * offset for name, offset in self.clock_offsets.items() if offset}
         clocks = [f"the clock of {name} is ahead by {ms:.2f} ms" for name, ms in offsets.items()]
         return [*self.warnings, *clocks]
@@ -141,14 +142,16 @@ def fit_values(
     say: Say = silent,
     source: object = "fit",
 ) -> Fit:
-    """Fit of a scenario's values to measurements, within bounds, by weighted least squares.
+    """Fits values of a scenario to measurements, within bounds, by weighted least squares.
 
     Args:
         scenario: the scenario whose values are the start.
-        measurements: the measurements.
-        parameters: the bounds, least and most, by key. Keys joined by commas get the same value.
+        measurements: the measurements, of the kinds MotionCapture and Rest.
+        parameters: the bounds, least and most, by scenario key of the value to fit. Keys joined by
+            commas get the same value.
         search: searches all values within the bounds for a better start, by CMA-ES.
-        folder: keeps each evaluation; another fit to the same data takes them from there.
+        folder: folder for the predictions of each simulated point. Another fit to the same data
+            reads them in place of a simulation.
         say: function that gets a line of text after each iteration.
         source: file with the parameters, for errors.
 
@@ -196,8 +199,9 @@ def fit_values(
 
 
 def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
-    """Best point (n,) of a global search by CMA-ES for the least sum of squares. The search ends
-    when it has converged roughly."""
+    """Best point (n,) of a global search within the bounds, by CMA-ES, for the least sum of squares
+    of residuals. `start` (n,) is where it begins. The search ends when it has converged roughly;
+    least squares refine its point."""
     low, high = problem.bounds
     origin = (start - low) / (high - low)
     search = Search(POPULATION, Box(start.size), np.random.default_rng(0), origin)
@@ -210,7 +214,8 @@ def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
 
 
 def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: float) -> Fit:
-    """The result of a fit from the point `start` (n,) to the point `x` (n,)."""
+    """The Fit that led from the point `start` (n,) to the solution `x` (n,), with intervals and
+    warnings. Points are in the dimensionless parameters of FitProblem; `wall_time` is in s."""
     first, last = problem.residuals(start), problem.residuals(x)
     misfit, jacobian = problem.misfit(last), problem.jacobian(x)
     half, correlation = _uncertainty(problem, jacobian, misfit)
@@ -245,11 +250,12 @@ def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: fl
 def _uncertainty(
     problem: FitProblem, jacobian: np.ndarray, misfit: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Half widths (n,) of the 95 % intervals in SI, infinite if an interval is wider than the
-    bounds; and correlations (n, n).
+    """Half widths (n,) of the 95 % intervals of the n fitted values in SI, infinite if an interval
+    is wider than the bounds; and correlations (n, n) of the values.
 
-    If the residuals are larger than the given uncertainties, the intervals are widened by the same
-    factor.
+    `jacobian` (numbers, n) is FitProblem.jacobian() at the fitted point, `misfit` the sum of
+    squared residuals per degree of freedom. Where it exceeds 1, the intervals are wider by its
+    root.
     """
     width = problem.bounds[1] - problem.bounds[0]
     _, singular, rows = np.linalg.svd(jacobian * width, full_matrices=False)
@@ -268,8 +274,11 @@ def _warnings(
     table: pandas.DataFrame, correlations: pandas.DataFrame, *, explained: bool
 ) -> list[str]:
     """Warnings about a fit: values that the data do not determine, that are at a bound, that cannot
-    be told apart, or whose predictions are not smooth. `explained` is True if the residuals are as
-    small as the uncertainties."""
+    be told apart, or whose predictions are not smooth.
+
+    `table` and `correlations` are Fit.parameters and Fit.correlations. `explained` is True if the
+    residuals are as small as the uncertainties of the measurements.
+    """
     warnings = []
     for key, row in table.iterrows():
         value, width = row["value"], row["most"] - row["least"]
@@ -334,7 +343,8 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
 
 @figure_function
 def residuals(fit: Fit) -> Drawn:
-    """Residuals of a fit over time, or by number, in standard deviations of the measurements.
+    """Residuals of a fit over time, or by the number of the measured value, in standard deviations
+    of the measurements.
 
     A panel shows a measurement: predictions minus measured numbers, with the start values and with
     the fitted ones. The grey band holds 95 % of the residuals of a right model.

@@ -38,7 +38,8 @@ Bounds = Sequence[str | float]
 
 
 class Parameter(NamedTuple):
-    """A number of a scenario that a fit adjusts, in SI."""
+    """A number of a scenario that a fit adjusts: key, unit, start value and bounds. All values are
+    in SI."""
 
     key: str
     """The key, or several joined by commas."""
@@ -55,7 +56,8 @@ class Parameter(NamedTuple):
         return min(abs(self.start) or width, width)
 
     def value(self, number: float) -> str | float:
-        """The number with its unit, as Scenario.with_changes() takes it."""
+        """A number in SI as Scenario.with_changes() takes it: a text with the parameter's unit, or
+        the number if it has none."""
         return f"{number!r} {self.unit}" if self.unit else number
 
 
@@ -97,8 +99,9 @@ def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -
 class FitProblem:
     """Weighted residuals of a fit, and their derivatives by dimensionless parameters.
 
-    A point is an array (n,) of parameters, each divided by its scale. All scenarios of an iteration
-    are simulated side by side.
+    A point `x` is an array (n,) of the parameters, each divided by its Parameter.scale. A weighted
+    residual is (predicted - measured) / uncertainty. All scenarios of an iteration are simulated in
+    parallel.
     """
 
     scenario: Scenario
@@ -125,18 +128,20 @@ class FitProblem:
 
     @property
     def evaluations(self) -> int:
-        """Number of scenarios that were predicted so far."""
+        """Number of points, each a changed scenario, whose predictions are known so far: simulated,
+        or read from the folder."""
         return len(self._known)
 
     def scenario_at(self, x: np.ndarray) -> Scenario:
-        """The scenario with the values of a point."""
+        """The scenario with its fitted keys set to the values of the point `x`."""
         pairs = zip(self.parameters, (x * self.scale).tolist(), strict=True)
         changes = {parameter.key: parameter.value(number) for parameter, number in pairs}
         return with_joined_changes(self.scenario, changes)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
-        """Weighted residuals (numbers,) at a point. The neighbours of the point, which the
-        derivatives need, are simulated at the same time."""
+        """Weighted residuals (numbers,) at the point `x`: (predicted - measured) / uncertainty for
+        each measured number. The neighbours of the point, which the derivatives need, are simulated
+        at the same time."""
         before = self.evaluations
         self._evaluate([x, *self._neighbours(x, STEP)])
         residuals = self.residuals_at(x)
@@ -145,27 +150,28 @@ class FitProblem:
         return residuals
 
     def residuals_at(self, x: np.ndarray) -> np.ndarray:
-        """Weighted residuals (numbers,) at a point that was evaluated."""
+        """Weighted residuals (numbers,) at a point that was evaluated before; simulates nothing."""
         predicted = np.delete(self._known[self._name(x)], self._clocks)
         residuals: np.ndarray = (predicted - self.values) / self.uncertainty
         return residuals
 
     def clock_offsets(self, x: np.ndarray) -> dict[str, float]:
-        """Time (s) by which the clock of each measurement is ahead of the simulated time, at an
-        evaluated point."""
+        """Time (s) by which the clock of each measurement is ahead of the simulated time, by the
+        name of the measurement, at a point `x` that was evaluated before."""
         offsets = self._known[self._name(x)][self._clocks].tolist()
         return dict(zip([each.name for each in self.measured], offsets, strict=True))
 
     def sums_of_squares(self, points: np.ndarray) -> np.ndarray:
-        """Sums (k,) of the squares of the weighted residuals at points (k, n), which are simulated
-        side by side; a huge number where that fails."""
+        """Sums (k,) of the squares of the weighted residuals at k points (k, n), which are
+        simulated in parallel; a huge number where a simulation fails."""
         self._evaluate(list(points))
         residuals = np.array([self.residuals_at(point) for point in points])
         return np.nan_to_num((residuals**2).sum(axis=1), nan=HUGE)
 
     def jacobian(self, x: np.ndarray, step: float = STEP) -> np.ndarray:
-        """Derivatives (numbers, n) of the residuals by central differences; one-sided where a
-        neighbour cannot be simulated. Raises InputError where none can."""
+        """Derivatives (numbers, n) of the weighted residuals by the n parameters at the point `x`,
+        by central differences of `step` in the dimensionless parameter; one-sided where a neighbour
+        cannot be simulated. Raises InputError where none can."""
         points = self._neighbours(x, step)
         self._evaluate([x, *points])
         columns = []
@@ -181,20 +187,24 @@ class FitProblem:
         return np.column_stack(columns)
 
     def misfit(self, residuals: np.ndarray) -> float:
-        """Sum of the squared residuals per degree of freedom."""
+        """Sum of the squared weighted residuals per degree of freedom, about 1 for a right
+        model."""
         return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
 
     def tell(self, residuals: np.ndarray) -> None:
-        """Reports an iteration that ended with these residuals to the user."""
+        """Passes a line about an iteration to `say`: the number of evaluations so far, and the
+        misfit of these weighted residuals (numbers,)."""
         self.say(f"{self.evaluations} evaluations, misfit {self.misfit(residuals):.3g}")
 
     def _neighbours(self, x: np.ndarray, step: float) -> list[np.ndarray]:
-        """Two neighbours of a point for each parameter, within the bounds."""
+        """Two neighbours of a point for each of the n parameters, for differences: a list of 2 n
+        points, lower and upper in turn, `step` away in one parameter and clipped to the bounds."""
         moves = step * np.kron(np.eye(x.size), [[-1.0], [1.0]])
         return list(np.clip(x + moves, *self.bounds))
 
     def _evaluate(self, points: Sequence[np.ndarray]) -> None:
-        """Predicts all measurements at new points, or takes the predictions from the folder."""
+        """Makes the predictions of all measurements known at these points (n,): reads them from the
+        folder, or simulates. Known points are skipped."""
         unknown = {self._name(point): point for point in points}
         unknown = {name: each for name, each in unknown.items() if name not in self._known}
         files = {name: self._kept / f"{name}.bin" for name in unknown} if self._kept else {}
@@ -215,12 +225,14 @@ class FitProblem:
                 write_whole(files[name], _seal(name, numbers.tobytes()) + numbers.tobytes())
 
     def _name(self, x: np.ndarray) -> str:
-        """Name of an evaluation: a digest of the data, keys and values."""
+        """Name of the evaluation of a point, and of its file: a digest of the data, keys and
+        values."""
         keys = [parameter.key for parameter in self.parameters]
         text = f"{self.digest} {keys} {(x * self.scale).tolist()}"
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
 def _seal(name: str, content: bytes) -> bytes:
-    """Digest (SEAL bytes) of the name and the content of an evaluation."""
+    """Digest (SEAL bytes) of the name and the content of an evaluation's file, by which a damaged
+    file is found."""
     return hashlib.sha256(name.encode() + content).digest()

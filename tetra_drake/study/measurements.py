@@ -54,7 +54,7 @@ _SIZE, _UNCERTAINTY = Field(ge=-MOST, le=MOST), Field(ge=LEAST, le=MOST)
 
 
 class Prediction(NamedTuple):
-    """Numbers that a scenario predicts for a measurement."""
+    """Numbers that one scenario predicts for one measurement, to compare with the measured ones."""
 
     values: np.ndarray
     """Numbers (numbers,) in SI; NaN if there is none."""
@@ -64,7 +64,7 @@ class Prediction(NamedTuple):
 
 @dataclass(frozen=True)
 class Measured:
-    """Numbers of one measurement, and the function that predicts them."""
+    """Measured numbers of one measurement, and the function that predicts them for scenarios."""
 
     name: str
     numbers: pandas.DataFrame
@@ -75,7 +75,8 @@ class Measured:
 
 
 class MotionCapture(Section):
-    """Positions of nodes over time, as a motion capture records them in the world frame.
+    """Measurement of a robot in motion, for a fit: a log of node positions over time in the world
+    frame, as a motion capture records them.
 
         >>> td.MotionCapture(log="lab/log.csv", command="lab/command.csv", uncertainty=2e-4)
 
@@ -95,8 +96,9 @@ class MotionCapture(Section):
     """Largest offset between the clocks of log and command. A fit finds the offset; 0 for none."""
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """Reads the log: the measured coordinates, and a function that predicts them. Raises
-        InputError, naming file and line or column, if the log is wrong."""
+        """Reads the log: the measured coordinates, and a function that predicts them. `name` is the
+        measurement's name in texts. Raises InputError, naming file and line or column, if the log
+        is wrong."""
         if (self.command is None) == (self.gait is None):
             problem = f"found {'neither' if self.gait is None else 'both'}, expected one of them"
             raise InputError(name, "command", f"{problem}, a command or a gait")
@@ -131,7 +133,12 @@ class MotionCapture(Section):
     def predict(
         self, scenarios: Sequence[Scenario], *, driver: Driver, log: pandas.DataFrame
     ) -> list[Prediction]:
-        """Simulated coordinates at the times of a log, a table of coordinates in m by time in s."""
+        """Predictions of the coordinates in a log, one Prediction per scenario, by simulation.
+
+        `log` is the table of measured coordinates (m), with times (s) as index. `driver` is the
+        command or the gait that moves the robot. If `clock` allows it, the offset of the log's
+        clock is the one that fits the log best.
+        """
         often = {"simulation.sample_period": SAMPLE_PERIOD}
         finely = [each.with_numbers(often) for each in scenarios]
         outcomes = simulate_many(finely, [driver] * len(finely), record=True)
@@ -169,12 +176,14 @@ class MotionCapture(Section):
 
 
 class Rest(Section):
-    """Shape, tensions and frequencies of the robot in equilibrium.
+    """Measurement of a robot at rest, for a fit: node coordinates, cable tensions and natural
+    frequencies.
 
         >>> pulled = {"robot.loads.n3": ["0 N", "0 N", "-0.5 N"]}
         >>> td.Rest(changes=pulled, positions={"n3 z": 0.17}, position_uncertainty=5e-4)
 
-    Numbers are SI; changes are as in Scenario.with_changes().
+    The robot rests in equilibrium without actuation. Numbers are SI. `changes` are settings of the
+    scenario in this case only, such as a load that pulls at a node, as in Scenario.with_changes().
     """
 
     changes: Keyed[str, Any] = Field(default={})
@@ -193,8 +202,8 @@ class Rest(Section):
     """Standard deviation of a frequency."""
 
     def read(self, scenario: Scenario, name: str) -> Measured:
-        """The measured numbers, and a function that predicts them. Raises InputError for an unknown
-        node or cable."""
+        """The measured numbers, and a function that predicts them. `name` is the measurement's name
+        in texts and errors. Raises InputError for an unknown node or cable."""
         structure = Robot.of(scenario.with_changes(self.changes)).structure
         places = _coordinates(structure.node_names)
         for key, known in {"positions": places, "tensions": structure.cable_names}.items():
@@ -213,7 +222,8 @@ class Rest(Section):
         return Measured(name, pandas.DataFrame(numbers), self.predict)
 
     def predict(self, scenarios: Sequence[Scenario]) -> list[Prediction]:
-        """Predictions of the measured numbers by scenarios: positions, tensions, frequencies."""
+        """Predictions of the measured numbers, one Prediction per scenario, from its equilibrium.
+        The order is positions, tensions, frequencies; all NaN if there is no equilibrium."""
         modes = len(self.frequencies)
         nothing = np.full(len(self.positions) + len(self.tensions) + modes, np.nan)
         predictions = []
@@ -241,7 +251,7 @@ Measurement = Annotated[MotionCapture | Rest, Kinds()]
 
 
 class FitFile(Section):
-    """File of a fit: parameters with their bounds, and measurements."""
+    """Content of the YAML file of a fit: bounds of the scenario values to fit, and measurements."""
 
     parameters: Annotated[Keyed[str, _Pair], Field(min_length=1), AfterValidator(different_keys)]
     """Bounds, least and most, by scenario key. Keys joined by commas get the same value."""
@@ -249,14 +259,14 @@ class FitFile(Section):
 
 
 def files_of(measurement: Measurement) -> dict[str, str]:
-    """Paths of a measurement's files by key."""
+    """Paths of the files that a measurement names, by key: log, command, gait. A Rest has none."""
     paths = measurement.model_dump(include={"log", "command", "gait"})
     return {key: path for key, path in paths.items() if path is not None}
 
 
 def load_fit_file(path: str | Path) -> FitFile:
-    """Reads the file of a fit. Paths in the file are relative to its folder. Raises InputError,
-    naming file and key, if the content is wrong."""
+    """Reads the YAML file of a fit: parameters to fit, and measurements. Paths in the file are
+    relative to its folder. Raises InputError, naming file and key, if the content is wrong."""
     path = Path(path)
     tree = read_mapping(path, "file of a fit", keys=keys_of(FitFile))
     given = FitFile.from_tree(tree, path)
@@ -268,13 +278,14 @@ def load_fit_file(path: str | Path) -> FitFile:
 
 
 def _coordinates(nodes: Sequence[str]) -> list[str]:
-    """Names of the coordinates of nodes, such as "n3 z"."""
+    """Names of the x, y and z coordinates of each node, such as "n3 z"."""
     return [f"{node} {axis}" for node in nodes for axis in "xyz"]
 
 
 def _log(path: str, nodes: Sequence[str]) -> pandas.DataFrame:
-    """Coordinates in m of a log by time in s, NaN in gaps, with a column such as "n3 z" for each.
-    Raises InputError, naming line or column, if the log is wrong."""
+    """Reads a log file (CSV or Parquet): a table of coordinates (m) with times (s) as index and
+    columns such as "n3 z"; NaN in gaps. `nodes` are the names that it may use. Raises InputError,
+    naming line or column, if the log is wrong."""
     if path.endswith(".parquet"):
         try:
             stored = pandas.read_parquet(io.BytesIO(read_bytes(path, "log")))

@@ -76,7 +76,8 @@ _NAMES = 0.3  # largest width of the names, as a share of the page's width
 
 @dataclass(frozen=True)
 class Judgement:
-    """Simulations of gaits on disturbed robots: tables with one row per simulation.
+    """Results of robustness(), simulations of gaits on disturbed robots: tables with one row per
+    simulation.
 
     All tables have the columns gait (its key), failure (reason, or missing), missed (requirements
     of the scenario that are not met), fitness, and the metrics in SI. Fitness and metrics are NaN
@@ -96,8 +97,9 @@ class Judgement:
     relative change of the key), draw (the draw that start or terrain seed are taken from)."""
 
     def compared(self, table: pandas.DataFrame) -> pandas.DataFrame:
-        """A table of simulations with three more columns: undisturbed (distance without
-        disturbances), change (difference of the distance to it), kept (see LOSS)."""
+        """A table of this Judgement with three more columns: undisturbed (distance of the same gait
+        without disturbances, m), change (distance minus undisturbed), kept (True if the gait loses
+        at most 10 % of the undisturbed distance and meets the requirements)."""
         before = table["gait"].map(self.undisturbed.set_index("gait")["distance"])
         change = table["distance"] - before
         kept = (change >= -LOSS * before.abs()) & (table["missed"] == "")  # False where NaN
@@ -106,7 +108,8 @@ class Judgement:
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
     """Default disturbances: a spread of `percent` for all uncertain numbers of a scenario, and for
-    the initial positions. Uncertain numbers are marked as Varied in their settings."""
+    the initial positions. A number is uncertain if its setting is declared as Varied in the
+    code."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):
@@ -132,17 +135,18 @@ def robustness(
         >>> distances = judgement.draws.distance
         >>> kept = judgement.compared(judgement.draws).kept.mean()
 
-    Each gait is simulated undisturbed and in all draws; the draws are the same for all gaits. No
-    evolution uses these draws, whatever its seed.
+    A draw is one random change of the robot's numbers, initial positions and terrain. Each gait is
+    simulated undisturbed and in all draws; the draws are the same for all gaits. No evolution uses
+    these draws, whatever its seed.
 
     Args:
         scenario: a scenario, its name or file, or a run. Its disturbances are used, if it has any
             and `percent` is None.
-        gaits: gaits, files or runs, by any key.
-        percent: size of the default disturbances.
+        gaits: gaits, files or runs (their best gait), by any key; the tables name gaits by it.
+        percent: size of the default disturbances in percent, used in place of the scenario's.
         draws: number of draws.
         seed: seed of the draws.
-        alone: also simulates each change alone.
+        alone: also simulates each disturbance alone.
         workers: number of threads, see simulate_many().
 
     Raises:
@@ -190,8 +194,10 @@ def robustness(
 def _simulated(
     scenario: Scenario, plan: Sequence[_Planned], gaits: Mapping[Any, Gait], workers: int | None
 ) -> list[dict[str, Any]]:
-    """Simulates each gait in each draw of the plan. A row has the labels of the draw and the common
-    columns of Judgement.
+    """Simulates each gait in each draw of the plan. Returns a row per simulation: the labels that
+    the plan gives to the draw, and the columns that all tables of Judgement have.
+
+    `gaits` are by the key that the column `gait` gets; `workers` is the number of threads.
 
     A robot that cannot start is a failure; it may have been displaced into a step of the terrain.
     """
@@ -233,7 +239,8 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
     - undisturbed: distance (m) without disturbances
     - 5 %, 25 %, 50 %, 75 %, 95 % (quantiles) and mean of the distance (m) over the draws that did
       not fail
-    - kept: share of all draws that the gait keeps
+    - kept: share of all draws that the gait keeps, so that it loses at most 10 % of the undisturbed
+      distance and meets the requirements
     - mean_low, mean_high, kept_low, kept_high: 95 % confidence intervals
     - failed, missed: numbers of draws that failed, and that miss a requirement
     """
@@ -252,8 +259,8 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
 
 
 def by_change(judgement: Judgement) -> pandas.DataFrame:
-    """Effect of each disturbance: a table with a row per changed key, start or terrain, the most
-    harmful one first. Columns:
+    """Effect of each disturbance on the distance: a table with a row per disturbed scenario key,
+    and for the initial positions (start) and the terrain, the most harmful one first. Columns:
 
     - median: absolute change of the distance (m) by this change alone, median over the simulations
     - worst: most negative change of the distance; failed: number of failures
@@ -279,14 +286,14 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
 
 
 def chance(draws: int) -> float:
-    """Largest rank correlation that is likely by chance: 95 % of the correlations of unrelated
-    numbers are smaller in absolute value."""
+    """Largest absolute rank correlation that is likely by chance with this number of draws: 95 % of
+    the correlations of as many unrelated numbers are smaller in absolute value."""
     return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
 
 
 def robustness_text(judgement: Judgement) -> str:
-    """Tables of the distances of gaits on disturbed robots, and of the most harmful
-    disturbances."""
+    """Text for the terminal: tables of the distances of gaits on disturbed robots, and of the most
+    harmful disturbances."""
     units, count = judgement.scenario.units, judgement.draws["draw"].nunique()
     shown, counts, misses = ["undisturbed", "5 %", "50 %", "95 %"], ["failed"], ""
     if judgement.scenario.require:
@@ -323,7 +330,7 @@ def robustness_text(judgement: Judgement) -> str:
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
     """Writes draws.csv and alone.csv (all simulations, SI), summary.json and the figure to a
-    folder. The summary has the tables of gaits and of changes, in SI, and their origin.
+    folder. The summary has the tables of by_gait() and by_change(), in SI, and how they were made.
 
     Returns the names of the files. Raises InputError if a file cannot be written.
     """

@@ -18,8 +18,9 @@ RESAMPLES = 2000
 
 
 def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> tuple[float, float]:
-    """95 % confidence interval of a statistic, by bootstrap with a fixed seed. NaN are left out.
-    If all values are equal, the width is 0."""
+    """Ends (low, high) of the 95 % confidence interval of a statistic of the values, by bootstrap
+    with a fixed seed. `statistic` takes an array and `axis`. NaN are left out; without values both
+    ends are NaN. If all values are equal, the width is 0."""
     numbers = np.asarray(values, dtype=float)
     numbers = numbers[~np.isnan(numbers)]
     if not len(numbers):
@@ -28,12 +29,14 @@ def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> 
 
 
 def resampled(values: np.ndarray, generator: np.random.Generator) -> np.ndarray:
-    """Resamples (RESAMPLES, n): each has n of the n values, drawn with replacement."""
+    """Bootstrap resamples (RESAMPLES, n) of n values: each row has n of them, drawn with
+    replacement."""
     return values[generator.integers(len(values), size=(RESAMPLES, len(values)))]
 
 
 def interval_of_resamples(resamples: np.ndarray) -> tuple[float, float]:
-    """Ends of the middle 95 % of resampled statistics: the bootstrap confidence interval."""
+    """Ends (low, high) of the middle 95 % of the statistics of bootstrap resamples: the confidence
+    interval."""
     low, high = np.quantile(resamples, [0.025, 0.975])
     return float(low), float(high)
 

@@ -35,7 +35,8 @@ def sweep(
     *,
     workers: int | None = None,
 ) -> xarray.Dataset:
-    """Fitness and metrics of gaits on a scenario with every combination of changed values.
+    """Simulates gaits on a scenario with every combination of changed values. Returns their fitness
+    and metrics.
 
         >>> scenario, run = td.load_scenario("quick"), td.load_run("runs/demo")
         >>> stiffness = {"robot.cables.outer_stiffness": ["25 N/m", "35 N/m", "45 N/m"]}
@@ -105,7 +106,8 @@ def sweep(
 
 
 def _values(key: str, given: Any) -> Collection[Any]:
-    """The values of a key, from a collection or a single value."""
+    """The values of a swept key as a collection; a single value becomes a list of one. Raises
+    InputError, naming the key, if there is none."""
     if hasattr(given, "tolist"):
         given = given.tolist()
     is_one = isinstance(given, (str, bytes, Mapping, Section)) or not isinstance(given, Collection)
@@ -119,8 +121,8 @@ def with_joined_changes(scenario: Scenario, by_joined: Mapping[str, Any]) -> Sce
     """The scenario with changed values by key; keys joined by commas get the same value. See
     Scenario.with_changes().
 
-    Raises InputError, naming the key. It advises to join a changed key and another one of its
-    section if that helps, because a limit depends on both.
+    Raises InputError, naming the key. If a limit makes two keys of a section depend on each other,
+    the message advises to join them, such as "friction.static, friction.kinetic".
     """
     changes = {key: value for joined, value in by_joined.items() for key in separate(joined)}
     try:
