@@ -296,7 +296,7 @@ class _StepAimer:
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the length of the next step. Call it after each step, with the bodies' velocities
-        (6 bodies,) at its end."""
+        (6*bodies,) at its end."""
         longest = self._settings.max_step
         if self._struts is not None:
             here = self._struts.GetMyContextFromRoot(context)

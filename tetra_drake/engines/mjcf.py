@@ -69,7 +69,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
 
     Args:
         robot: the robot at its start.
-        rest: state (13 bodies,) of a key frame with the name `rest`; None for no key frame.
+        rest: state (13*bodies,) of a key frame with the name `rest`; None for no key frame.
         own_laws: True for an engine that computes contacts of struts by its own law, and tensions
             where is_pulled() is true. The model then leaves these to the engine.
 

@@ -195,7 +195,7 @@ class Trial:
 
     def _complete(self) -> None:
         """Ends an iteration: tells the optimiser its evaluations, and records it. Raises InputError
-        if an optimiser from Python reports what cannot be recorded."""
+        if the report of a user's own optimiser cannot be written as JSON."""
         results, status = [self._results[index] for index in sorted(self._results)], self.status
         outcome = self._optimizer.tell([evaluation for _, evaluation in results])
         for task, evaluation in results:

@@ -85,7 +85,8 @@ class StrutSearch(NamedTuple):
 
 
 class StrutContactLaw(NamedTuple):
-    """Law of the contact between struts, with its constants as tables."""
+    """Arguments of the law of contact between struts, for the kernels: whether it acts, and its
+    constants as arrays."""
 
     acts: bool
     """False if struts pass through each other."""
@@ -136,7 +137,7 @@ def find_near_struts(
     (each lane is a robot). Also stores the positions of the nodes there.
 
     `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
-    laws.kinematics for a `state` [q; v] (13 bodies,).
+    laws.kinematics for a `state` [q; v] (13*bodies,).
     """
     limit, count = named(StrutSearch, contact.search).near, 0
     for first in range(radius.size):

@@ -69,7 +69,7 @@ Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
 
 @inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
-    """Writes motions of nodes and feet, ground frames and inertia for a state [q; v] (13 bodies,)
+    """Writes motions of nodes and feet, ground frames and inertia for a state [q; v] (13*bodies,)
     to `forces`. Sets the forces on the nodes to zero."""
     move_contacts(robot, state, forces)
     if not robot.isotropic:
@@ -78,7 +78,7 @@ def move_robot(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
-    """Writes motions of nodes and feet, and ground frames, for a state [q; v] (13 bodies,) to
+    """Writes motions of nodes and feet, and ground frames, for a state [q; v] (13*bodies,) to
     `forces`. Sets the forces on them to zero."""
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     contact.meet_ground(robot.ground, state, forces.nodes, forces.frames)
@@ -91,10 +91,10 @@ def pull_of_cable(
     """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the next row of
     `drives`.
 
-    `drives` is the table of the actuators' states. If the cable's actuator has a state, `drive` is
-    its row, and the other columns of this row are written. The next row is `drive` + 1 then,
-    otherwise `drive`. The length is in m, its rate in m/s, `signals` (signals,) in N. An actuation
-    force also acts on a cable that is slack.
+    `drives` has a row for each actuator with a state, such as a winch: its state, then what is
+    computed here, such as the state's derivative. `drive` is the row of this cable's actuator. The
+    next row is `drive` + 1 if the actuator has a state, otherwise `drive`.
+    The length is in m, its rate in m/s, `signals` (signals,) in N. An actuation force also acts on a cable that is slack.
     """
     driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:
@@ -154,7 +154,7 @@ def add_ground_forces(
 ) -> None:
     """Adds the forces of the ground to the forces on nodes and round feet, in `forces.nodes`.
 
-    `state` is [q; v] (13 bodies,). `modes` says which nodes touch and stick, and is only read; see
+    `state` is [q; v] (13*bodies,). `modes` says which nodes touch and stick, and is only read; see
     laws.contact. With `write_parts`, also writes friction and normal force of each contact to
     `forces.ground_forces`.
     """
@@ -184,7 +184,7 @@ def compute_forces(
     forces: Forces,
     generalized: Table,
 ) -> None:
-    """Writes the generalized force (6 bodies,) of cables, ground, touching struts, anchors, loads,
+    """Writes the generalized force (6*bodies,) of cables, ground, touching struts, anchors, loads,
     gravity and gyroscopic torques to `generalized`.
 
     move_robot() must have been called for the same `state`. `modes` are the contact and friction
@@ -209,7 +209,7 @@ def compute_forces(
 
 @inlined
 def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
-    """Sums the forces on nodes and round feet to `generalized` (6 bodies,): torque and force [t_W;
+    """Sums the forces on nodes and round feet to `generalized` (6*bodies,): torque and force [t_W;
     f_W] at each body's origin."""
     kinematics.gather_forces(nodes, robot.first_node, generalized)
     ground = robot.ground
@@ -250,10 +250,10 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
 
 @compiled
 def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> float:
-    """Writes the generalized force of all cables to `generalized` (6 bodies,): [t_W; f_W] at each
+    """Writes the generalized force of all cables to `generalized` (6*bodies,): [t_W; f_W] at each
     body's origin.
 
-    `state` is [q; v] (13 bodies,), `signals` are in N. Also writes nodes, `cable_forces` and the
+    `state` is [q; v] (13*bodies,), `signals` are in N. Also writes nodes, `cable_forces` and the
     rates of the actuators' states to the Forces of `parts`. Returns the sum of `generalized`, which
     is finite only if all forces are.
     """
@@ -269,10 +269,10 @@ def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized
 
 @compiled
 def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
-    """Writes the generalized force of the ground to `generalized` (6 bodies,): torque and force
+    """Writes the generalized force of the ground to `generalized` (6*bodies,): torque and force
     [t_W; f_W] at each body's origin.
 
-    `state` is [q; v] (13 bodies,). `modes` (contacts, 12) says which nodes touch the ground and
+    `state` is [q; v] (13*bodies,). `modes` (contacts, 12) says which nodes touch the ground and
     stick; it is only read. Also writes nodes, ground frames and `ground_forces` to the Forces of
     `parts`.
     """
@@ -287,7 +287,7 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
     """Writes the generalized force of touching struts, anchors and loads to `generalized` (6
     bodies,): [t_W; f_W] at each body's origin.
 
-    `state` is [q; v] (13 bodies,). Also writes nodes to the Forces of `parts`.
+    `state` is [q; v] (13*bodies,). Also writes nodes to the Forces of `parts`.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
@@ -297,7 +297,7 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
 
 @compiled
 def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized: Table) -> float:
-    """Writes the generalized force of touching struts to `generalized` (6 bodies,): [t_W; f_W] at
+    """Writes the generalized force of touching struts to `generalized` (6*bodies,): [t_W; f_W] at
     each body's origin.
 
     Returns the longest step (s), at most `horizon`, that cannot carry a strut through another; see
@@ -359,7 +359,7 @@ def forces_along(
 def compute_forces_at(
     robot: Model, state: Table, modes: Table, signals: Table, drives: Table, forces: Forces
 ) -> None:
-    """Computes all tables of `forces` for a state (13 bodies,), contact and friction modes, signals
+    """Computes all tables of `forces` for a state (13*bodies,), contact and friction modes, signals
     (N) and actuator states `drives` (drives,)."""
     generalized = np.empty(6 * robot.bodies.mass.size)
     move_robot(robot, state, forces)

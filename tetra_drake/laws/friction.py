@@ -319,10 +319,10 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
     """Mode of the reset integrator along one tangent after a step: 0 sticks, otherwise the sign of
     slip.
 
-    If the node `breaks` free along this tangent, it slips in the direction of its velocity. `share`
-    is for a node that breaks free along the other tangent and may slip along this one: the
-    deflection divided by the stiction range, otherwise 0. It is the mode then. The node sticks
-    again when its velocity changes sign.
+    If the node `breaks` free along this tangent, it slips in the direction of its velocity. If it
+    breaks free along the other tangent only, its mode here is `share`, a fraction of slip: the
+    deflection along this tangent divided by the stiction range. `share` is 0 if the node holds. A
+    slipping node sticks again when its velocity changes sign.
     """
     from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
     mode = select(slide.mode == STICK, from_stick, slide.mode)
@@ -443,7 +443,8 @@ class Coulomb(FrictionKind):
 
 
 class CoulombConstants(NamedTuple):
-    """Constants of Coulomb friction; SI units. The last three are 1 / directional factor."""
+    """Constants of Coulomb friction; SI units. `per_forward`, `per_backward` and `per_lateral` are
+    the inverse factors on friction against slip in these directions of the robot."""
 
     static: Real
     kinetic: Real

@@ -18,7 +18,7 @@ XX, YY, ZZ, XY, XZ, YZ, INERTIA_COLUMNS = range(7)
 @inlined
 def turn_inertia(state: Table, inertia_B: Table, inertia_W: Table) -> None:
     """Writes the inertia of the bodies along the world's axes to `inertia_W`, from `inertia_B`
-    along their own axes, both (bodies, 6), for a state [q; v] (13 bodies,)."""
+    along their own axes, both (bodies, 6), for a state [q; v] (13*bodies,)."""
     for body in range(inertia_B.shape[0]):
         x, y, z = rotation(state, body)
         # R I, row by row, then (R I) Rᵀ.

@@ -102,7 +102,7 @@ def pitch_rate(nodes: Table, moving: int) -> Real:
 
 @inlined
 def rotation(state: Table, body: int) -> tuple[Vector3, Vector3, Vector3]:
-    """Rotation matrix R_WB of a body, as its rows. `state` is [q; v] of all bodies (13 bodies,)."""
+    """Rotation matrix R_WB of a body, as its rows. `state` is [q; v] of all bodies (13*bodies,)."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
@@ -115,9 +115,9 @@ def rotation(state: Table, body: int) -> tuple[Vector3, Vector3, Vector3]:
 
 @inlined
 def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
-    """Writes the positions and quaternions of the bodies after a time (s) to `moved` (13 bodies,).
+    """Writes the positions and quaternions of the bodies after a time (s) to `moved` (13*bodies,).
 
-    The bodies move from `state` with constant `velocities` (6 bodies,), which are not written to
+    The bodies move from `state` with constant `velocities` (6*bodies,), which are not written to
     `moved`. Quaternions get the length 1.
     """
     half = 0.5 * time
@@ -195,7 +195,7 @@ def node_acceleration(
 @inlined
 def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> None:
     """Sums the forces on the nodes, and writes torque and force [t_W; f_W] at each body's origin to
-    `generalized_force` (6 bodies,), as in Drake's applied_generalized_force."""
+    `generalized_force` (6*bodies,), as in Drake's applied_generalized_force."""
     for body in range(generalized_force.size // 6):
         torque = total = (0.0, 0.0, 0.0)
         for node in range(first_node[body], first_node[body + 1]):
@@ -209,7 +209,7 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
 
 @compiled
 def interpolate_state(before: Table, after: Table, step: float, part: float) -> Table:
-    """State (13 bodies,) between the states at the beginning and end of a step of `step` seconds.
+    """State (13*bodies,) between the states at the beginning and end of a step of `step` seconds.
 
     `part` (0 to 1) is the time since the beginning, divided by `step`. Positions are cubic
     polynomials that fit positions and velocities at both ends. Velocities are linear. If `part` is

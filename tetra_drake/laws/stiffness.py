@@ -32,7 +32,7 @@ class Springs(NamedTuple):
 
 
 def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
-    """Stiffness matrix (6 bodies, 6 bodies) of a robot on flat ground: N m, N and N/m.
+    """Stiffness matrix (6*bodies, 6 bodies) of a robot on flat ground: N m, N and N/m.
 
     The displacement of a body is a rotation vector in rad, then a translation in m, in the world
     frame. `forces` are the forces of a state without motion, with all tables computed.

@@ -139,7 +139,7 @@ def least_strut_distance(
     """Least distance (m) between the axes of struts of different bodies, or `least` (m) if that is
     smaller.
 
-    `radius` (bodies,) are radii of spheres around the bodies. `state` is [q; v] (13 bodies,),
+    `radius` (bodies,) are radii of spheres around the bodies. `state` is [q; v] (13*bodies,),
     `nodes` the table of laws.kinematics for this state. `first_node` is the index of each body's
     first node.
     """

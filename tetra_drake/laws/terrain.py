@@ -345,8 +345,8 @@ class Obstacles(Relief):
     Where bumps overlap, the highest counts.
 
     Each square of side `spacing` has one bump, at a random position. No bump reaches before
-    `start`. The surface is smooth between grid points, which lowers a bump's top by about an
-    eighth.
+    `start`. The ground is interpolated smoothly between the heights of a grid, so a bump's top is
+    about an eighth lower.
     """
 
     place = "over obstacles"

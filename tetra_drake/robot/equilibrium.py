@@ -74,7 +74,7 @@ class Equilibrium(NamedTuple):
     """Equilibrium of a robot on flat ground."""
 
     state: np.ndarray
-    """State [q; v] of the bodies (13 n,)."""
+    """State [q; v] of the bodies (13*n,)."""
     lengths: np.ndarray
     """Lengths of the cables (cables,), in m, rounded to nm."""
     feet: int
@@ -102,7 +102,7 @@ def find_equilibrium(
 ) -> Equilibrium:
     """Finds the equilibrium of a robot on flat ground without actuation.
 
-    The search goes downhill in potential energy from the state `start` (13 n,) of the n bodies to
+    The search goes downhill in potential energy from the state `start` (13*n,) of the n bodies to
     a minimum. Friction bears no load there. `bodies` are the names of the bodies. Raises
     InputError, naming `source` (the scenario) and a body, if no equilibrium is found.
     """
@@ -163,7 +163,7 @@ class _Descent:
         self._arrive(start, force_at_rest(robot, start))
 
     def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
-        """Makes `state` (13 n,) the current one, with its generalized `force` (6 n,). No forces of
+        """Makes `state` (13*n,) the current one, with its generalized `force` (6*n,). No forces of
         another state may have been computed in between."""
         self.state, self.force = state, force
         if not np.isfinite(force).all():
@@ -209,7 +209,7 @@ class _Descent:
         return False
 
     def _longest_step(self) -> tuple[np.ndarray, float]:
-        """Next step (6 n,) in m within reach, and twice the energy (J) that it should release.
+        """Next step (6*n,) in m within reach, and twice the energy (J) that it should release.
 
         It is Newton's step with the smallest shift that keeps it within reach. In an equilibrium
         that is not stable, it is a step along the least stable motion. For the components of a
@@ -244,7 +244,7 @@ class _Descent:
         class.
 
         `step` and `expected` (J) are from _longest_step(). Returns the state after the corrected
-        step, the force there, the corrected step (6 n,), and its gain: the released energy divided
+        step, the force there, the corrected step (6*n,), and its gain: the released energy divided
         by the expected one.
         """
         longest = 0.5 * np.abs(step).max()
@@ -271,14 +271,14 @@ class _Descent:
         return factor if factorise(factor, 0.5 * self._least) else None
 
     def _solved(self, factor: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Displacements (6 n,) under a force (6 n,), from the `factor` of _factor(). Motions of the
+        """Displacements (6*n,) under a force (6*n,), from the `factor` of _factor(). Motions of the
         whole robot that nothing resists are projected out."""
         step = solve(factor, force)
         return step - self._held @ (self._held.T @ step)
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Orthonormal basis (6 n, motions) of rigid displacements of the whole robot that change no
+    """Orthonormal basis (6*n, motions) of rigid displacements of the whole robot that change no
     energy: along x, along y and about z; for a robot without weight and contacts all six. Motions
     that anchors, cables from fixed nodes, or loads resist are left out. The forces of the state
     must have been computed."""
@@ -335,7 +335,7 @@ def solve(factor: Table, right: Table) -> Table:
 
 
 def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Generalized force (6 n,) in N on the bodies at rest in a state (13 n,).
+    """Generalized force (6*n,) in N on the bodies at rest in a state (13*n,).
 
     It is [t_W / radius; f_W] at each body's origin: torques are divided by `robot.radius`. Contact
     nodes stick where they are, so friction exerts no force."""
@@ -348,7 +348,7 @@ def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 @compiled
 def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
-    """Writes the forces on a robot at rest in `state` (13 n,) to `generalized` (6 n,): [t_W; f_W]
+    """Writes the forces on a robot at rest in `state` (13*n,) to `generalized` (6*n,): [t_W; f_W]
     at each body's origin, in N m and N.
 
     `modes` (contacts, 12) must be 0, which means nodes in the air. The kernel replaces them: nodes
@@ -360,7 +360,7 @@ def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized
 
 
 def displaced(robot: Unactuated, state: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """A copy of a state (13 n,), displaced by `step` (6 n,) in m. For each body the step has a
+    """A copy of a state (13*n,), displaced by `step` (6*n,) in m. For each body the step has a
     rotation vector times `robot.radius`, then a translation, in the world frame."""
     moved, motion = state.copy(), step.copy()
     motion.reshape(-1, 6)[:, :3] /= robot.radius
@@ -370,14 +370,14 @@ def displaced(robot: Unactuated, state: np.ndarray, step: np.ndarray) -> np.ndar
 
 @compiled
 def displace(state: Table, motion: Table, moved: Table) -> None:
-    """Writes the poses of `state` (13 n,), displaced by `motion` (6 n,), to `moved` (13 n,).
+    """Writes the poses of `state` (13*n,), displaced by `motion` (6*n,), to `moved` (13*n,).
 
     For each body, `motion` has a rotation vector (rad), then a translation (m)."""
     move_bodies(state, motion, 1.0, moved)
 
 
 def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
-    """Stiffness matrix (6 n, 6 n) in N/m of the robot without actuation, for displacements as
+    """Stiffness matrix (6*n, 6 n) in N/m of the robot without actuation, for displacements as
     in displaced(). The state is the one of the last call of force_at_rest()."""
     matrix = stiffness_matrix(robot.model, robot.forces)
     per_radius = np.tile(np.repeat([1.0 / robot.radius, 1.0], 3), len(matrix) // 6)
@@ -385,7 +385,7 @@ def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
 
 
 def mass_matrix(robot: Unactuated) -> np.ndarray:
-    """Mass matrix (6 n, 6 n) in kg, for displacements as in displaced(). The state is the one of
+    """Mass matrix (6*n, 6 n) in kg, for displacements as in displaced(). The state is the one of
     the last call of force_at_rest()."""
     bodies = robot.model.bodies
     inertia_W = bodies.inertia if robot.model.isotropic else robot.forces.inertia

@@ -65,7 +65,7 @@ class Readings(NamedTuple):
     ) -> Self:
         """The readings of one robot at a time (s), as copies.
 
-        They are from the state [q; v] (13 n,) of its bodies and the tables `cable_forces` (cables,
+        They are from the state [q; v] (13*n,) of its bodies and the tables `cable_forces` (cables,
         7) of laws.cable and `ground_forces` (contacts, 3) of laws.contact at that time."""
         nodes, bodies = moved_nodes(structure, state), len(structure.bodies)
         return cls(
@@ -121,7 +121,7 @@ def readings_at(
     """The readings of one robot, computed from its full state at a time (s).
 
     Args:
-        state: state [q; v] (13 n,) of the bodies.
+        state: state [q; v] (13*n,) of the bodies.
         modes: table `modes` (contacts, 12) of the contact nodes; see laws.contact.
         signals: signals (m,) in N.
         drives: states of the actuators (drives,); see laws.actuator.

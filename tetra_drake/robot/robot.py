@@ -273,7 +273,7 @@ def equilibrium_of(
 ) -> Equilibrium:
     """Equilibrium of a structure without actuation, on flat ground if it has contact nodes.
 
-    The search begins at the state `start` (13 bodies,), by default the structure's initial state.
+    The search begins at the state `start` (13*bodies,), by default the structure's initial state.
     Raises InputError if there is no equilibrium.
     """
     model = make_model(scenario.with_sections(terrain=Flat()), structure)

@@ -23,7 +23,7 @@ FIXED = "fixed nodes"
 
 def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
     """SDFormat text of a model called `name`: the bodies of a structure at the poses of a state
-    (13 bodies,), with a frame for each node. Cables are left out."""
+    (13*bodies,), with a frame for each node. Cables are left out."""
     root = Element("sdf", version="1.9")
     model = add_element(root, "model", name=name)
     shapes = [*shapes_of(structure)]

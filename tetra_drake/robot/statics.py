@@ -81,7 +81,7 @@ def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
 def cable_wrenches(
     *, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray
 ) -> np.ndarray:
-    """Wrenches (6 B, cables) of cables with unit tension on B bodies.
+    """Wrenches (6*B, cables) of cables with unit tension on B bodies.
 
     The six rows of a body are the torque about the world's origin (N m per N), then the force, both
     in the world frame.

@@ -180,7 +180,7 @@ class Structure(Blueprint):
 
     @property
     def initial_state(self) -> np.ndarray:
-        """State [q; v] (13 bodies,) at t = 0. Velocities are zero."""
+        """State [q; v] (13*bodies,) at t = 0. Velocities are zero."""
         poses = np.hstack([self.q_WB, self.p_WB]).ravel()
         return np.concatenate([poses, np.zeros(6 * len(self.bodies))])
 
@@ -200,12 +200,12 @@ def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Positions p_WN (nodes, 3) of the nodes in m, for a state (13 n,) of the bodies."""
+    """Positions p_WN (nodes, 3) of the nodes in m, for a state (13*n,) of the bodies."""
     return moved_nodes(structure, state)[:, kinematics.P_WN : kinematics.P_WN + 3]
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Table `nodes` of laws.kinematics (nodes, NODE_COLUMNS) for a state (13 n,) of the bodies:
+    """Table `nodes` of laws.kinematics (nodes, NODE_COLUMNS) for a state (13*n,) of the bodies:
     positions and velocities. The forces are 0."""
     nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
     kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)

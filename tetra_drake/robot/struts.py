@@ -73,7 +73,7 @@ def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool =
 def overlaps(
     scenario: Scenario, structure: Structure, state: np.ndarray
 ) -> dict[tuple[str, str], tuple[float, float]]:
-    """Overlaps of struts of different bodies in a state (13 bodies,).
+    """Overlaps of struts of different bodies in a state (13*bodies,).
 
     Key: the names of the two struts. Value: depth of the overlap and distance of the axes, in m.
     Depths by which the robot's weight presses touching struts into each other are left out.
@@ -100,7 +100,7 @@ def elastic_struts(blueprint: Blueprint) -> np.ndarray:
 
 
 def axial_forces(structure: Structure, unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Axial forces (struts,) in N on the struts at rest in a state (13 bodies,); negative in
+    """Axial forces (struts,) in N on the struts at rest in a state (13*bodies,); negative in
     compression.
 
     The forces on the two ends are weighted by the distances of the ends from the body's centre of
@@ -134,11 +134,11 @@ def elongated(structure: Structure, elongation: np.ndarray) -> np.ndarray:
 def condensed(
     stiffness: np.ndarray, structure: Structure, unactuated: Unactuated, state: np.ndarray
 ) -> np.ndarray:
-    """Stiffness matrix (6 n, 6 n) in N/m with the compliance of the elastic struts (static
+    """Stiffness matrix (6*n, 6 n) in N/m with the compliance of the elastic struts (static
     condensation).
 
     `stiffness` is the matrix of the n bodies as if rigid, from stiffness_at_rest(), in the
-    equilibrium `state` (13 n,). The elongations of the struts have no inertia: they follow the
+    equilibrium `state` (13*n,). The elongations of the struts have no inertia: they follow the
     displacements of the bodies at once.
     """
     elastic = elastic_struts(structure)

@@ -354,8 +354,8 @@ def robustness_figure(judgement: Judgement) -> Drawn:
     """Robustness of gaits on disturbed robots.
 
     Above: the distance in each draw divided by the undisturbed distance. Boxes are quartiles,
-    whiskers 5 to 95 %. A gait keeps the draws to the right of the dashed line. Their share is at
-    the right; the gait with the largest share is on top.
+    whiskers 5 to 95 %. The dashed line is the least distance that counts as kept. The share
+    of draws beyond it is at the right; the gait with the largest share is on top.
 
     Below left: one change alone. Bars are the median change of distance, lines the greatest loss.
     Below right: all changes together. Bars are the rank correlation of each change with the

@@ -104,7 +104,7 @@ class BodyStates(LeafSystem):
     |--------------------|---------|------|----------------------------------------------|
     | body_poses         |         | SI   | list of the poses X_WB, from the plant       |
     | spatial_velocities |         | SI   | list of the velocities V_WB, from the plant  |
-    | state              | (13 n,) | SI   | [q; v] of the n bodies other than the world  |
+    | state              | (13*n,) | SI   | [q; v] of the n bodies other than the world  |
     """
 
     def __init__(self, plant: MultibodyPlant) -> None:
@@ -129,7 +129,7 @@ class BodyForces(LeafSystem):
 
     | port              | shape  | unit   | meaning                                           |
     |-------------------|--------|--------|---------------------------------------------------|
-    | generalized_force | (6 n,) | N m, N | [t_W; f_W] at the origins of the n bodies other   |
+    | generalized_force | (6*n,) | N m, N | [t_W; f_W] at the origins of the n bodies other   |
     |                   |        |        | than the world                                    |
     | spatial_forces    |        | N m, N | list of ExternallyAppliedSpatialForce             |
     """

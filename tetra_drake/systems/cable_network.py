@@ -45,10 +45,10 @@ class CableNetwork(LeafSystem):
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
-    | state             | (13 n,)        | SI     | [q; v] of n bodies, as if free           |
+    | state             | (13*n,)        | SI     | [q; v] of n bodies, as if free           |
     | signals           | (m,)           | N      | actuation, one per group of cables       |
     | drives            | (drives,)      | m or N | states of the actuators                  |
-    | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
+    | generalized_force | (6*n,)         | N m, N | [t_W; f_W] at each body's origin         |
     | tensions          | (cables,)      | N      | tension of each cable                    |
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (cables,)      | m/s    | rate of each cable's length              |
@@ -103,7 +103,7 @@ class CableNetwork(LeafSystem):
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
     ) -> np.ndarray:
-        """The table `cable_forces` (cables, 7). Writes the generalized force to `force` (6 n,), if
+        """The table `cable_forces` (cables, 7). Writes the generalized force to `force` (6*n,), if
         given.
 
         With `moves_only`, the inputs other than the state are not read: only lengths and rates are

@@ -21,7 +21,7 @@ class Feedback(LeafSystem):
 
     | port       | shape          | unit   | meaning                                           |
     |------------|----------------|--------|---------------------------------------------------|
-    | state      | (13 n,)        | SI     | [q; v] of n free bodies, from the plant           |
+    | state      | (13*n,)        | SI     | [q; v] of n free bodies, from the plant           |
     | signals    | (m,)           | N      | signals of the cables                             |
     | drives     | (drives,)      | m or N | states of the actuators                           |
     | mode_table | (12 contacts,) | SI     | port of GroundContact, with the state of contacts |

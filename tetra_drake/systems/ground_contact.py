@@ -42,8 +42,8 @@ class GroundContact(LeafSystem):
 
     | port              | shape   | unit   | meaning                                           |
     |-------------------|---------|--------|---------------------------------------------------|
-    | state             | (13 n,) | SI     | [q; v] of n bodies, as if free                    |
-    | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin                  |
+    | state             | (13*n,) | SI     | [q; v] of n bodies, as if free                    |
+    | generalized_force | (6*n,)  | N m, N | [t_W; f_W] at each body's origin                  |
     | normal_forces     | (m,)    | N      | along the normal of the surface, by contact node  |
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
@@ -109,7 +109,7 @@ class GroundContact(LeafSystem):
         """Predicts changes of the modes. Returns whether one changes if a step ends now, and the
         time (s) from now to the next change, at most `horizon` (s).
 
-        `acceleration` (6 n,) is dv/dt of the bodies. The prediction assumes that the acceleration
+        `acceleration` (6*n,) is dv/dt of the bodies. The prediction assumes that the acceleration
         of each node is constant.
         """
         state, modes = self._state.Eval(context), self._modes(context).copy()
@@ -137,7 +137,7 @@ class GroundContact(LeafSystem):
 
     def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
         """The table `ground_forces` (contacts, 3) in N. Writes the generalized force to `force`
-        (6 n,), if given."""
+        (6*n,), if given."""
         state, modes = self._state.Eval(context), self._modes(context)
         self._compute_forces(self._parts, state, modes, self._force if force is None else force)
         return self._forces.ground_forces

@@ -62,7 +62,7 @@ class SampledController(HeldSignals):
 
     | port          | shape         | unit | meaning                                               |
     |---------------|---------------|------|-------------------------------------------------------|
-    | state         | (13 n,)       | SI   | [q; v] of n free bodies, from the plant               |
+    | state         | (13*n,)       | SI   | [q; v] of n free bodies, from the plant               |
     | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables      |
     | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground    |
     | signals       | (m,)          | N    | signals of the cables; see HeldSignals                |

@@ -16,8 +16,8 @@ class StateForces(LeafSystem):
 
     | port              | shape   | unit   | meaning                                 |
     |-------------------|---------|--------|-----------------------------------------|
-    | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant |
-    | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin        |
+    | state             | (13*n,) | SI     | [q; v] of n free bodies, from the plant |
+    | generalized_force | (6*n,)  | N m, N | [t_W; f_W] at each body's origin        |
 
     See `laws.capsules` and `laws.forces`. The forces are continuous, so no step has to
     end where struts begin to touch. But long steps could carry struts through each other.

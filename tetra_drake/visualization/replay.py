@@ -225,8 +225,8 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
 
 
 def _steps(values: np.ndarray) -> list[list[int]]:
-    """Differences between frames of values (frames, ...), in units of RESOLUTION; a row per
-    number of a frame."""
+    """Differences between frames of values (frames, ...), in whole units of
+    RESOLUTION. Row i has the differences of number i of the frames, from 0 on."""
     rows = np.rint(values.reshape(len(values), -1).T / RESOLUTION).astype(int)
     steps: list[list[int]] = np.diff(rows, prepend=0).tolist()
     return steps

@@ -56,7 +56,7 @@ class Solver(NamedTuple):
 
 @inlined
 def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table) -> None:
-    """Writes the accelerations of bodies under forces `force` (6 bodies,) to `acceleration` (6
+    """Writes the accelerations of bodies under forces `force` (6*bodies,) to `acceleration` (6
     bodies,).
 
     Each body has 6 numbers, rotation before translation, in the world frame. `inertia_W` is

@@ -322,7 +322,7 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
 @inlined
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
     """Writes the inputs of a live network to `lanes.inputs`: tonic input and feedback. They are for
-    the robot's `state` (13 bodies,) at a time (s)."""
+    the robot's `state` (13*bodies,) at a time (s)."""
     steer(constants, lanes, log, time / constants.period[0])
     sense(constants.senses, constants.gains, state, lanes.modes, lanes.forces, lanes.inputs)
     for i in range(lanes.inputs.size):

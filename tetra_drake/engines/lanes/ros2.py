@@ -56,7 +56,7 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 class StepMemory(NamedTuple):
-    """Memory of a step from `state` to `end` (13 bodies,)."""
+    """Memory of a step from `state` to `end` (13*bodies,)."""
 
     state: Annotated[Table, "13 * bodies"]
     end: Annotated[Table, "13 * bodies"]
@@ -169,7 +169,7 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
     """Largest component of k1 + k2, as the acceleration (m/s²) of a body or, for rotations, of its
     nodes and feet. NaN if a component is NaN.
 
-    With the stages k1 and k2 (6 bodies,) of ROS2, (k1 + k2) / 2 times the step is the difference to
+    With the stages k1 and k2 (6*bodies,) of ROS2, (k1 + k2) / 2 times the step is the difference to
     the first-order solution. The spin of a thin bar about its axis does not count, unless it moves
     a round foot.
     """

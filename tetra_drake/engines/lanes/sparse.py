@@ -144,7 +144,7 @@ def reduced(x: Real, column: tuple[Real, ...], blocks: Table, k: int, c: int) ->
 
 @inlined
 def solve(blocks: Table, schedule: Schedule, x: Table) -> None:
-    """Solves a system that factorise() has factorised. `x` (6 bodies,) is the right-hand side, and
+    """Solves a system that factorise() has factorised. `x` (6*bodies,) is the right-hand side, and
     is overwritten by the solution.
 
     The numbers of a body are in variables. In a loop over x, each operation would wait for memory.

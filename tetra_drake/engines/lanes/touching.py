@@ -120,7 +120,7 @@ def product(vectors: Table, k: int, x: Table) -> Real:
 
 @inlined
 def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Table) -> None:
-    """Solves the factorised system with the contacts of `touching`. `x` (6 bodies,) is the
+    """Solves the factorised system with the contacts of `touching`. `x` (6*bodies,) is the
     right-hand side, and is overwritten by the solution."""
     solve(blocks, schedule, x)
     for k in range(touching.count[0]):
@@ -132,7 +132,7 @@ def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Tab
 @inlined
 def subtract_springs(touching: Touching, factor: Real, k1: Table, k2: Table) -> None:
     """Subtracts factor * K * k1 from k2, where K is time² * the stiffness matrix of the contacts.
-    k1 and k2 (6 bodies,) are the stages of the step."""
+    k1 and k2 (6*bodies,) are the stages of the step."""
     for k in range(touching.count[0]):
         scale = factor * touching.spring[k] * product(touching.along, k, k1)
         for n in range(k2.size):
