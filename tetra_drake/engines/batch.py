@@ -82,8 +82,8 @@ class Batch:
             until: simulated times (s), for each place (N,) or for all. A robot that has reached its
                 time pauses.
             signals: m actuator signals (N, m) of each robot, which are forces in newtons. They
-                change linearly from the old ones within one network step, `cpg.listing_step`, and are then
-                constant. A robot that pauses, or has a gait or a command, ignores them.
+                change linearly from the old ones within one network step, `cpg.listing_step`, and
+                are then constant. A robot that pauses, or has a gait or a command, ignores them.
             briefly: returns as soon as a robot has ended, or after some 30 ms of wall time. Engines
                 that simulate one robot after another ignore it.
 

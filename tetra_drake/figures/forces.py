@@ -54,7 +54,7 @@ def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) 
 
     A panel shows one signal and the tension of one cable, whose name is its title. If a signal
     drives several cables, the first is shown. Both are forces; a positive signal shortens the
-    cable. The start-up, in which signals are 0, is shaded if the time span contains a part of
+    cable. The start-up, while signals are 0, is shaded if the time span contains a part of
     it."""
     unit, trajectory = result.scenario.units, _shown(result, time)
     forces = trajectory[["signal", "tension"]] / unit.force

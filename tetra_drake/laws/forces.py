@@ -94,7 +94,8 @@ def pull_of_cable(
     `drives` has a row for each actuator with a state, such as a winch: its state, then what is
     computed here, such as the state's derivative. `drive` is the row of this cable's actuator. The
     next row is `drive` + 1 if the actuator has a state, otherwise `drive`.
-    The length is in m, its rate in m/s, `signals` (signals,) in N. An actuation force also acts on a cable that is slack.
+    The length is in m, its rate in m/s, `signals` (signals,) in N. An actuation force
+    also acts on a cable that is slack.
     """
     driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:

@@ -46,7 +46,7 @@ def elites(run: Run) -> pandas.DataFrame:
     first; the table is empty if the optimiser makes no map.
 
     A row is a row of Run.evaluations with more columns: cell_1 and cell_2 (numbers of the cell,
-    from 0), kept (share of disturbance draws in which the gait loses at most 10 % of its distance
+    from 0), kept (share of disturbance draws where the gait loses at most 10 % of its distance
     and meets the requirements), mean_distance (m, on disturbed robots). The last two are NaN if the
     gait was not simulated on disturbed robots.
     """
@@ -131,8 +131,8 @@ def map_of_gaits(run: Run) -> Drawn:
     """Map of gaits over two measures: the fitness of the fittest gait in each cell. White cells
     have no gait.
 
-    If gaits were simulated on disturbed robots, the second panel shows the share of these draws in
-    which a gait loses at most 10 % of its undisturbed distance. A cross marks gaits for which this
+    If gaits were simulated on disturbed robots, the second panel shows the share of these draws
+    where a gait loses at most 10 % of its undisturbed distance. A cross marks gaits for which this
     share is below one half. Numbers mark the fittest gait and the gaits nearest to the corners."""
     kind, units = cast(QualityDiversity, run.scenario.optimizer), run.scenario.units
     edges, labels = [], []
