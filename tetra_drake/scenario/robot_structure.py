@@ -390,13 +390,13 @@ class StructureFile(Section):
             if max(map(abs, place)) > LONGEST:
                 expected = f"expected coordinates of at most {LONGEST:g} m"
                 refuse(f"nodes.{node}", f"found {place}, {expected}")
-        self.blueprint().check()
+        blueprint = self.blueprint()
+        blueprint.check()
+        self._check_actuated(blueprint.cable_names)
         return self
 
-    @pydantic.model_validator(mode="after")
-    def _check_actuated(self) -> StructureFile:
+    def _check_actuated(self, cable_names: Sequence[str]) -> None:
         """Refuses an unknown cable, or one that has an oscillator already."""
-        cable_names = self.blueprint().cable_names
         numbers, drivers = _cable_numbers(cable_names), dict[int, str]()
         for oscillator, names in self.actuated.items():
             for i, name in enumerate(names):
@@ -408,7 +408,6 @@ class StructureFile(Section):
                     found = f"found '{cable_names[cable]}', which '{drivers[cable]}' drives"
                     refuse(key, f"{found}, expected it once")
                 drivers[cable] = oscillator
-        return self
 
 
 RobotKind = Annotated[Tetrahedra | StructureFile, Kinds()]

@@ -259,10 +259,11 @@ class Scenario(Section):
                     problem = f"does not have this metric; give `{key}` without it"
                     refuse(f"{key}.{name}", f"!{section.tag} {problem}")
 
+        blueprint, bounds = self.robot.blueprint(), self.gait_bounds
         is_drake = isinstance(self.engine, Drake)
         most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
-        least_step = simulation.duration * self.oscillators / most_signals
-        least_sample = simulation.duration * self.robot.body_count / MOST_SAMPLES
+        least_step = simulation.duration * blueprint.signals / most_signals
+        least_sample = simulation.duration * len(blueprint.bodies) / MOST_SAMPLES
         for key, period, least in (
             ("cpg.listing_step", step, least_step),
             ("simulation.sample_period", simulation.sample_period, least_sample),
@@ -272,7 +273,6 @@ class Scenario(Section):
                 problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
                 refuse(key, f"{problem}, for this duration and robot")
 
-        blueprint, bounds = self.robot.blueprint(), self.gait_bounds
         if bounds.turn != 0.0 and not blueprint.sides.any():
             expected = "expected 0, as no group is on one side"
             refuse("gait_bounds.turn", f"found {bounds.turn}, {expected}")
