@@ -12,6 +12,7 @@ damper is weaker than the spring, this is Eq. 6.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -61,6 +62,16 @@ CABLE = np.dtype(
 """NumPy record type of a cable: indices of its two nodes and its signal, and constants in SI."""
 
 
+class Routes(NamedTuple):
+    """Paths of the cables that run over rings at nodes. A straight cable has no path."""
+
+    nodes: Table
+    """Indices of the nodes of all paths, with both ends, one path after the other (path nodes,)."""
+    first: Table
+    """Index in `nodes` of the first node of each cable's path (cables + 1,). The last number is the
+    number of path nodes."""
+
+
 class Cables(NamedTuple):
     """Cables of a robot for the kernels: nodes, signals and constants, as arrays (cables,)."""
 
@@ -69,12 +80,22 @@ class Cables(NamedTuple):
     signal: Table
     law: Any
     """Constants of all cables: a CableLaw of tables (cables,)."""
+    routes: Routes
 
     @classmethod
-    def of(cls, cables: Table) -> Self:
-        """Cables from an array of dtype CABLE."""
+    def of(cls, cables: Table, rings: Mapping[int, Sequence[int]] | None = None) -> Self:
+        """Cables from an array of dtype CABLE. `rings` has the inner nodes of each routed cable, by
+        the cable's index."""
         node_a, node_b, signal = (cables[name].copy() for name in ("node_a", "node_b", "signal"))
-        return cls(node_a, node_b, signal, CableLaw.of(cables))
+        paths = [
+            [node_a[i], *rings[i], node_b[i]] if rings and i in rings else []
+            for i in range(len(cables))
+        ]
+        routes = Routes(
+            nodes=np.array([node for path in paths for node in path], dtype=np.int64),
+            first=np.cumsum([0, *map(len, paths)]),
+        )
+        return cls(node_a, node_b, signal, CableLaw.of(cables), routes)
 
 
 @inlined
@@ -86,8 +107,8 @@ def law_of(cables: Cables, i: int) -> CableLaw:
 
 DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6, 7
 """Columns of the table `cable_forces` (cables, 7), and their number: direction from node a to node
-b in the world frame, length l (m), tension T (N), the derivative dT/d(dl/dt) (N s/m), and the rate
-dl/dt (m/s)."""
+b, or to the first ring, in the world frame, length l (m), tension T (N), the derivative
+dT/d(dl/dt) (N s/m), and the rate dl/dt (m/s)."""
 
 
 @inlined

@@ -41,6 +41,7 @@ from tetra_drake.laws.contact import NormalForce, normal_force
 from tetra_drake.laws.struts import (
     Axes,
     Struts,
+    are_joined,
     axes_of,
     may_be_nearer,
     midpoint,
@@ -134,7 +135,8 @@ def find_near_struts(
     near: NearStruts,
 ) -> None:
     """Lists in `near` the pairs of struts of different bodies that are near each other in any lane
-    (each lane is a robot). Also stores the positions of the nodes there.
+    (each lane is a robot), except struts with a common joint. Also stores the positions of the
+    nodes there.
 
     `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
     laws.kinematics for a `state` [q; v] (13*bodies,).
@@ -151,6 +153,8 @@ def find_near_struts(
                     if not may_be_nearer(
                         offset, 0.5 * (struts.length[i] + struts.length[j]), limit
                     ):
+                        continue
+                    if are_joined(struts, i, j):
                         continue
                     if any_lane(strut_distance(struts, nodes, i, j) <= limit):
                         near.pairs[count, 0], near.pairs[count, 1] = i, j

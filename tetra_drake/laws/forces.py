@@ -14,12 +14,14 @@ from tetra_drake.laws.friction import friction_force
 from tetra_drake.laws.inertia import INERTIA_COLUMNS, times_inertia, turn_inertia
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.vectors import (
+    Vector3,
     add_vector,
     cross,
     difference,
     dot,
     put_vector,
     scaled,
+    sum_of,
     vector_at,
 )
 
@@ -31,6 +33,8 @@ class Forces(NamedTuple):
     frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]
     """Tangent frames of the ground at the contact nodes; see laws.terrain."""
     cable_forces: Annotated[Table, "cables", cable.CABLE_FORCE_COLUMNS]
+    route_slopes: Annotated[Table, "route_nodes", 3]
+    """Derivative of a routed cable's length by the position of each node of its path."""
     ground_forces: Annotated[Table, "contacts", contact.GROUND_FORCE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Inertia of the bodies along the world's axes; unused if they are isotropic."""
@@ -59,6 +63,7 @@ def sizes_of(robot: Model) -> dict[str, int]:
         "nodes": len(robot.p_BN) + int(np.count_nonzero(robot.ground.radius)),
         "contacts": robot.ground.contacts.size,
         "cables": drivers.size,
+        "route_nodes": robot.cables.routes.nodes.size,
         "drives": int(np.count_nonzero(drivers != cable.PASSIVE)) if has_drive else 0,
     }
 
@@ -125,19 +130,13 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
     `write_parts` the table `forces.cable_forces`.
     """
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
-    drive = 0
+    routes, drive = robot.cables.routes, 0
     for i in range(parts.shape[0]):
+        if routes.first[i] < routes.first[i + 1]:
+            drive = add_routed_cable(robot, i, drive, signals, write_parts, forces)
+            continue
         a, b = robot.cables.node_a[i], robot.cables.node_b[i]
-        p_AB = difference(
-            vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN)
-        )
-        v_AB = difference(
-            vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN)
-        )
-        square = dot(p_AB, p_AB)
-        per_length = inverse_sqrt(square)
-        length, direction = square * per_length, scaled(per_length, p_AB)
-        rate = dot(v_AB, direction)
+        direction, length, rate = span(nodes, a, b)
         tension, tension_per_rate, drive = pull_of_cable(
             robot, i, drive, length, rate, signals, drives
         )
@@ -147,6 +146,49 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
             put_vector(direction, i, cable.DIRECTION, parts)
             parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
             parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
+
+
+@inlined
+def span(nodes: Table, a: int, b: int) -> tuple[Vector3, Real, Real]:
+    """Direction from node a to node b, their distance (m) and its rate (m/s). `nodes` is the table
+    of laws.kinematics."""
+    p_AB = difference(vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN))
+    v_AB = difference(vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN))
+    square = dot(p_AB, p_AB)
+    per_length = inverse_sqrt(square)
+    direction = scaled(per_length, p_AB)
+    return direction, square * per_length, dot(v_AB, direction)
+
+
+@inlined
+def add_routed_cable(
+    robot: Model, i: int, drive: int, signals: Table, write_parts: bool, forces: Forces
+) -> int:
+    """Adds the forces of cable i, which runs over frictionless rings, to the forces on the nodes of
+    its path, in `forces.nodes`. Also writes `forces.route_slopes`. Returns the next row of
+    `drives`; see pull_of_cable()."""
+    nodes, routes, slopes = forces.nodes, robot.cables.routes, forces.route_slopes
+    first, last = routes.first[i], routes.first[i + 1] - 1
+    length = rate = 0.0
+    put_vector((0.0, 0.0, 0.0), first, 0, slopes)
+    for k in range(first, last):
+        direction, part, part_rate = span(nodes, routes.nodes[k], routes.nodes[k + 1])
+        length += part
+        rate += part_rate
+        add_vector(scaled(-1.0, direction), k, 0, slopes)
+        put_vector(direction, k + 1, 0, slopes)
+    tension, tension_per_rate, drive = pull_of_cable(
+        robot, i, drive, length, rate, signals, forces.drives
+    )
+    for k in range(first, last + 1):
+        pull = scaled(-tension, vector_at(slopes, k, 0))
+        add_vector(pull, routes.nodes[k], kinematics.FORCE, nodes)
+    if write_parts:
+        parts = forces.cable_forces
+        put_vector(scaled(-1.0, vector_at(slopes, first, 0)), i, cable.DIRECTION, parts)
+        parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
+        parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
+    return drive
 
 
 @inlined
@@ -229,9 +271,9 @@ def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
 
 @inlined
 def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
-    """Adds the forces of touching struts, anchors and loads to the forces on the nodes, in
+    """Adds the forces of touching struts, anchors, joints and loads to the forces on the nodes, in
     `forces.nodes`. They need neither signals nor modes."""
-    nodes, anchors, loads = forces.nodes, robot.anchors, robot.loads
+    nodes, anchors, joints, loads = forces.nodes, robot.anchors, robot.joints, robot.loads
     radius, law, near = robot.bodies.radius, robot.strut_contact, forces.near_struts
     capsules.add_strut_forces(robot.struts, law, radius, state, nodes, near)
 
@@ -244,6 +286,18 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
         c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
         force = -k_x * p_x - c_x * v_x, -k_y * p_y - c_y * v_y, -k_z * p_z - c_z * v_z
         add_vector(force, node, kinematics.FORCE, nodes)
+
+    for i in range(joints.node_a.size):
+        a, b = joints.node_a[i], joints.node_b[i]
+        apart = difference(
+            vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN)
+        )
+        parts = difference(
+            vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN)
+        )
+        force = sum_of(scaled(joints.stiffness[i], apart), scaled(joints.damping[i], parts))
+        add_vector(force, a, kinematics.FORCE, nodes)
+        add_vector(scaled(-1.0, force), b, kinematics.FORCE, nodes)
 
     for i in range(loads.nodes.size):
         add_vector(vector_at(loads.forces, i, 0), loads.nodes[i], kinematics.FORCE, nodes)
@@ -285,8 +339,8 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
 
 @compiled
 def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None:
-    """Writes the generalized force of touching struts, anchors and loads to `generalized` (6
-    bodies,): [t_W; f_W] at each body's origin.
+    """Writes the generalized force of touching struts, anchors, joints and loads to `generalized`
+    (6*bodies,): [t_W; f_W] at each body's origin.
 
     `state` is [q; v] (13*bodies,). Also writes nodes to the Forces of `parts`.
     """

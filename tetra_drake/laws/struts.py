@@ -26,6 +26,10 @@ class Struts(NamedTuple):
     """Index of the node at one end (struts,)."""
     node_b: Table
     """Index of the node at the other end (struts,)."""
+    place_a: Table
+    """Number of the place of node a (struts,). Nodes that joints hold together have one place."""
+    place_b: Table
+    """Number of the place of node b (struts,)."""
     first_strut: Table
     """Index of each body's first strut (bodies + 1,); the last number is the number of struts."""
     length: Table
@@ -101,6 +105,17 @@ def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
 
 
 @inlined
+def are_joined(struts: Struts, i: int, j: int) -> bool:
+    """True if a joint holds ends of struts i and j together, so that they cannot be apart."""
+    a, b = struts.place_a[i], struts.place_b[i]
+    return (
+        a == struts.place_a[j]
+        or a == struts.place_b[j]
+        or (b == struts.place_a[j] or b == struts.place_b[j])
+    )
+
+
+@inlined
 def share(x: Real) -> Real:
     """Clamps a number to the range from 0 to 1."""
     return minimum(maximum(x, 0.0), 1.0)
@@ -137,7 +152,7 @@ def least_strut_distance(
     struts: Struts, radius: Table, first_node: Table, state: Table, nodes: Table, least: Real
 ) -> Real:
     """Least distance (m) between the axes of struts of different bodies, or `least` (m) if that is
-    smaller.
+    smaller. Struts with a common joint do not count.
 
     `radius` (bodies,) are radii of spheres around the bodies. `state` is [q; v] (13*bodies,),
     `nodes` the table of laws.kinematics for this state. `first_node` is the index of each body's
@@ -162,6 +177,6 @@ def least_strut_distance(
                 for b in range(struts.first_strut[second], struts.first_strut[second + 1]):
                     apart = difference(midpoint_a, midpoint(struts, nodes, b))
                     reach = 0.5 * (struts.length[a] + struts.length[b])
-                    if may_be_nearer(apart, reach, least):
+                    if may_be_nearer(apart, reach, least) and not are_joined(struts, a, b):
                         least = minimum(least, strut_distance(struts, nodes, a, b))
     return least

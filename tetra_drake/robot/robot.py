@@ -106,7 +106,8 @@ class Robot:
             oscillators=tuple(names[number] for number in self.driven),
             groups=tuple((int(number),) for number in self.driven),
         )
-        model = self.model._replace(cables=cable.Cables.of(structure.cables))
+        cables = cable.Cables.of(structure.cables, structure.cable_rings)
+        model = self.model._replace(cables=cables)
         still = np.zeros(structure.signals)
         return Robot(self.scenario, structure, model, first_signals=still, has_network=False)
 
@@ -287,11 +288,12 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,
-        cables=cable.Cables.of(structure.cables),
+        cables=cable.Cables.of(structure.cables, structure.cable_rings),
         actuator=scenario.actuation.actuator(),
         couplings=structure.couplings,
         ground=make_ground(scenario, structure),
         anchors=structure.anchors,
+        joints=structure.joint_springs,
         loads=structure.loads,
         bodies=Bodies(
             mass=structure.mass,

@@ -23,7 +23,7 @@ from pydrake.multibody.tree import (
 )
 
 from tetra_drake.laws import cable, kinematics
-from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, NodeLoads
+from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, Joints, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
 from tetra_drake.robot.equilibrium import Equilibrium
@@ -102,9 +102,15 @@ class Structure(Blueprint):
     def strut_table(self) -> Struts:
         """Struts as arrays for the kernels."""
         node_a, node_b = self.struts.T
-        first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
-        length = np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1)
-        return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
+        return Struts(
+            node_a.copy(),
+            node_b.copy(),
+            place_a=self.places[node_a],
+            place_b=self.places[node_b],
+            first_strut=np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1)),
+            length=np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1),
+            radius=self.strut_radius,
+        )
 
     @property
     def least_radius(self) -> float:
@@ -126,14 +132,16 @@ class Structure(Blueprint):
 
     @property
     def couplings(self) -> Couplings:
-        """Pairs of bodies that cables join, in the order of the cables, for kernels that go through
-        the cables pair by pair. Raises ValueError if the cables of a pair are not next to each
-        other, or cables from fixed nodes are not first."""
-        pairs = self.carriers[self.cable_ends]
+        """Pairs of bodies that straight cables join, in the order of the cables, for kernels that
+        go through the cables pair by pair. Raises ValueError if the cables of a pair are not next
+        to each other, cables from fixed nodes are not first, or routed cables are not last."""
+        straight = len(self.cable_ends) - len(self.cable_rings)
+        pairs = self.carriers[self.cable_ends[:straight]]
         held = int(np.count_nonzero(pairs[:, 0] == WORLD))
         begins = held + np.flatnonzero(np.any(np.diff(pairs[held:], axis=0, prepend=-1), axis=1))
         first, second = pairs[begins].T
         is_ordered = (pairs[:held, 0] == WORLD).all() and (first < second).all()
+        is_ordered &= min(self.cable_rings, default=straight) >= straight
         if not is_ordered or len(np.unique(pairs[held:], axis=0)) < len(begins):
             raise ValueError("the cables are not in the order of the bodies that they join")
         first_cable, held_bodies = np.append(begins, len(pairs)), pairs[:held, 1].copy()
@@ -150,6 +158,16 @@ class Structure(Blueprint):
             places=self.p_WN[nodes],
             stiffness=self.anchor_stiffness[nodes],
             damping=self.anchor_damping[nodes],
+        )
+
+    @property
+    def joint_springs(self) -> Joints:
+        """Springs that hold the nodes of ball joints together, for kernels."""
+        return Joints(
+            *self.joints.T.copy(),
+            *self.carriers[self.joints].T.copy(),
+            stiffness=self.joint_stiffness,
+            damping=self.joint_damping,
         )
 
     @property
@@ -187,8 +205,9 @@ class Structure(Blueprint):
     @property
     def initial_lengths(self) -> np.ndarray:
         """Lengths of the cables (cables,) in m at t = 0."""
-        node_a, node_b = node_positions(self, self.initial_state)[self.cable_ends.T]
-        return np.asarray(np.linalg.norm(node_b - node_a, axis=1))
+        node_a, node_b = node_positions(self, self.initial_state)[self.segments.ends.T]
+        pieces = np.linalg.norm(node_b - node_a, axis=1)
+        return np.bincount(self.segments.cable, pieces, minlength=len(self.cable_names))
 
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:

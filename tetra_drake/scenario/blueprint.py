@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,26 @@ LIGHTEST = 1e-12
 
 LEAST_DISTANCE = 1e-3
 """Least distance between two nodes, as a share of the shortest strut."""
+
+
+class Segments(NamedTuple):
+    """Straight pieces of the cables. A straight cable has one, a routed cable several."""
+
+    ends: np.ndarray
+    """Indices of the two nodes of each piece (pieces, 2)."""
+    cable: np.ndarray
+    """Index of the cable of each piece (pieces,), ascending."""
+
+
+class GivenInertia(NamedTuple):
+    """Mass, centre of mass and inertia of a body that are given in place of what follows from its
+    parts; SI units. What is not given is None."""
+
+    mass: float | None
+    centre: np.ndarray | None
+    """Position (3,) of the centre of mass in the blueprint's frame F of the body."""
+    inertia: np.ndarray | None
+    """Moments and products of inertia (6,) about the centre of mass: xx, yy, zz, xy, xz, yz."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +115,8 @@ class Blueprint:
     cable_keys: tuple[str, ...]
     """Keys of the cables in the settings, such as "cables.side.pairs[0]", for error messages."""
     cable_ends: np.ndarray
-    """Indices of the two nodes of each cable (cables, 2). The node of the body with the lower index
-    comes first."""
+    """Indices of the two end nodes of each cable (cables, 2). The node of the body with the lower
+    index comes first."""
     cable_laws: tuple[Mapping[str, float], ...]
     """Constants of each cable's force law, by the names of laws.cable.CableLaw."""
     slack: bool
@@ -106,6 +127,20 @@ class Blueprint:
     """Names of the m oscillators, such as "T1-T2"."""
     groups: tuple[tuple[int, ...], ...] = ()
     """Indices of the cables that each oscillator drives (m)."""
+    cable_rings: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    """Inner nodes of each cable that runs over rings, from its first end to its second, by the
+    index of the cable. Such cables come after all straight ones."""
+    joints: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=int))
+    """Indices of the two nodes of each ball joint (joints, 2), nodes of two bodies at one place.
+    The node of the body with the lower index comes first."""
+    joint_keys: tuple[str, ...] = ()
+    """Keys of the joints in the settings, such as "joints.knee", for error messages."""
+    joint_stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """Stiffness of the springs that hold the nodes of a joint together (joints,)."""
+    joint_damping: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """Damping of the springs that hold the nodes of a joint together (joints,)."""
+    given_inertia: Mapping[int, GivenInertia] = field(default_factory=dict)
+    """Given mass, centre and inertia, by the index of the body."""
     markers: np.ndarray = field(default_factory=lambda: np.array([], dtype=int))
     """Indices of the nodes whose motion is shown (markers,), in the order of the bodies. Empty if
     the motion of the centre of mass is shown."""
@@ -124,6 +159,28 @@ class Blueprint:
         of_bodies = np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
         fixed = len(self.node_names) - len(of_bodies)
         return np.pad(of_bodies, (0, fixed), constant_values=WORLD)
+
+    @functools.cached_property
+    def segments(self) -> Segments:
+        """Straight pieces of the cables, in the order of the cables."""
+        paths = [
+            [first, *self.cable_rings.get(cable, ()), last]
+            for cable, (first, last) in enumerate(self.cable_ends.tolist())
+        ]
+        ends = [pair for path in paths for pair in itertools.pairwise(path)]
+        pieces = [len(path) - 1 for path in paths]
+        return Segments(
+            np.array(ends, dtype=int).reshape(-1, 2), np.repeat(range(len(paths)), pieces)
+        )
+
+    @functools.cached_property
+    def places(self) -> np.ndarray:
+        """Number of the place of each node (nodes,). Nodes that joints hold together have the same
+        number; otherwise it is the node's index."""
+        places = np.arange(len(self.node_names))
+        for first, second in self.joints:
+            places[places == places[second]] = places[first]
+        return places
 
     @property
     def body_of_node(self) -> tuple[str, ...]:
@@ -188,6 +245,8 @@ class Blueprint:
         self._check_cables()
 
         sizes = np.diff(self.first_node)
+        self._check_joints()
+
         is_bent = sizes[self.carriers[self.struts[:, 0]]] > 2
         for strut in np.flatnonzero(is_bent & np.isfinite(self.strut_stiffness)):
             _, group, _ = self.strut_keys[strut].split(".")
@@ -241,6 +300,11 @@ class Blueprint:
         of_nodes[:moving] += np.where(np.repeat(sizes, sizes) == 1, self.node_mass[:moving], 0.0)
         mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
         np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
+        for body, given in self.given_inertia.items():
+            if mass[body] < LIGHTEST and given.inertia is None:
+                problem = "is missing, and no part of the body has mass and inertia"
+                refuse(f"bodies.{self.bodies[body]}.inertia", problem)
+            mass[body] = mass[body] if given.mass is None else given.mass
         if mass.min() < LIGHTEST:
             node = self.first_node[mass.argmin()]
             without = "" if self.node_mass[node] else "without point masses "
@@ -251,6 +315,7 @@ class Blueprint:
         p_WN, least = self.p_WN, LEAST_DISTANCE * self.shortest
         for node in range(1, len(p_WN)):
             distances = np.linalg.norm(p_WN[:node] - p_WN[node], axis=1)
+            distances[self.places[:node] == self.places[node]] = np.inf
             if distances.min() < least:
                 problem = f"found the place of '{self.node_names[distances.argmin()]}'"
                 expected = f"expected nodes {least:.3g} m apart"
@@ -259,17 +324,19 @@ class Blueprint:
     def _check_cables(self) -> None:
         """Refuses cables that join no two bodies, bodies that no cables join to the others, and
         tensions so high that the free length of a cable would be negative."""
-        pairs = self.carriers[self.cable_ends]
-        for key, (first, second) in zip(self.cable_keys, pairs.tolist(), strict=True):
-            if first == second == WORLD:
+        pairs = self.carriers[self.segments.ends]
+        for cable, key in enumerate(self.cable_keys):
+            first, *others = {*pairs[self.segments.cable == cable].ravel().tolist()}
+            if first == WORLD and not others:
                 refuse(key, "joins two fixed nodes, expected a node of a strut")
-            if first == second:
+            if not others:
                 problem = f"joins the body '{self.bodies[first]}' to itself"
                 refuse(key, f"{problem}, expected nodes of two bodies")
 
         joined = np.arange(len(self.bodies) + 1)  # equal numbers if joined; the last: the world
         anchored = self.carriers[self.held.any(axis=1)]
-        for first, second in [*pairs, *((WORLD, body) for body in anchored)]:
+        joints = self.carriers[self.joints]
+        for first, second in [*pairs, *joints, *((WORLD, body) for body in anchored)]:
             joined[joined == joined[first]] = joined[second]
         apart = np.flatnonzero(joined[:WORLD] != joined[0])
         if apart.size:
@@ -278,7 +345,9 @@ class Blueprint:
             )
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
-        for cable, length in enumerate(self._distances(self.cable_ends)):
+        pieces = self._distances(self.segments.ends)
+        lengths = np.bincount(self.segments.cable, pieces, minlength=len(self.cable_names))
+        for cable, length in enumerate(lengths):
             law = CableLaw(**self.cable_laws[cable])
             if law.free_length < 0.0:
                 tension = round(elastic_tension(length - law.free_length, law), 12)
@@ -286,6 +355,22 @@ class Blueprint:
                 expected = f"expected at most {most:.4g} N for '{self.cable_names[cable]}'"
                 problem = f"found {tension} N, {expected}, where its free length is 0"
                 refuse(f"cables.{self.cable_groups[cable]}.tension", problem)
+
+    def _check_joints(self) -> None:
+        """Refuses joints of a body with itself or with the world, and nodes that are apart."""
+        apart = self._distances(self.joints)
+        joints = zip(self.joint_keys, self.joints, apart, strict=True)
+        for key, nodes, distance in joints:
+            names = " and ".join(f"'{self.node_names[node]}'" for node in nodes)
+            first, second = self.carriers[nodes]
+            if WORLD in (first, second):
+                refuse(key, f"found {names}, one of them fixed; expected an anchor for it instead")
+            if first == second:
+                problem = f"found {names} of the body '{self.bodies[first]}'"
+                refuse(key, f"{problem}, expected nodes of two bodies")
+            if distance > self._least_distance:
+                problem = f"found {names} {distance:.3g} m apart"
+                refuse(key, f"{problem}, expected two nodes at one place")
 
     @property
     def shortest(self) -> float:

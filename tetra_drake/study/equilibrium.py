@@ -127,8 +127,9 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         statics=find_statics(
             p_WN=node_positions(lifted, alone.state),
             body_of_node=structure.carriers,
-            cable_ends=structure.cable_ends,
+            segments=structure.segments,
             held=structure.held,
+            joints=structure.joints,
         ),
         nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),

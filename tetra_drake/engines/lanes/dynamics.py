@@ -6,7 +6,8 @@ A vector over bodies has 6 numbers per body, rotation before translation, in the
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple, Self
+import itertools
+from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 
@@ -18,9 +19,9 @@ from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
-from tetra_drake.laws.model import Model
+from tetra_drake.laws.model import WORLD, Model
 from tetra_drake.laws.terrain import to_world
-from tetra_drake.laws.vectors import cross, put_vector, vector_at
+from tetra_drake.laws.vectors import cross, dot, put_vector, vector_at
 
 CABLES_AT_ONCE = 6
 """Number of cables of a pair of bodies whose damping is summed at once."""
@@ -30,6 +31,9 @@ U, W, D, WEIGHT, LINE_COLUMNS = 0, 3, 6, 9, 10
 add_cables()), the damping times the time, and the number of columns."""
 
 
+Pairs: TypeAlias = tuple[tuple[int, int], ...]
+
+
 class Solver(NamedTuple):
     """Block layout and elimination order of the implicit matrix; see implicit_matrix()."""
 
@@ -37,21 +41,42 @@ class Solver(NamedTuple):
     coupled: Table
     """Index of the block of each pair of coupled bodies (pairs,)."""
     fill: Table
-    """Indices of the blocks of fill-in, which only the elimination fills."""
+    """Indices of all other blocks of two bodies: of joints, routed cables and fill-in."""
+    jointed: Table
+    """Index of the block of each joint (joints,)."""
+    routed: Table
+    """Index of the block of each ordered pair of nodes on the path of a routed cable, one cable
+    after the other (pairs of path nodes,). -1 if a node is fixed, or if the pair in the other order
+    has the block."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
         """The solver for the coupled bodies of a robot."""
-        first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
-        return cls._of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
+        couplings, joints, routes = robot.couplings, robot.joints, robot.cables.routes
+        body_of = np.full(len(robot.p_BN), WORLD)
+        sizes = np.diff(robot.first_node)
+        body_of[: robot.first_node[-1]] = np.repeat(np.arange(len(sizes)), sizes)
+        paths = np.split(body_of[routes.nodes], routes.first[1:-1])
+        on_paths = [pair for path in paths for pair in itertools.product(path.tolist(), repeat=2)]
+        return cls._of(
+            len(robot.bodies.mass),
+            tuple(zip(couplings.first.tolist(), couplings.second.tolist(), strict=True)),
+            tuple(zip(joints.body_a.tolist(), joints.body_b.tolist(), strict=True)),
+            tuple(on_paths),
+        )
 
     @classmethod
     @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
-    def _of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
-        schedule = Schedule.of(bodies, pairs)
-        blocks = schedule.blocks
-        coupled = np.array([blocks.pop(pair) for pair in pairs], dtype=np.int64)
-        return cls(schedule, coupled, fill=np.array(list(blocks.values()), dtype=np.int64))
+    def _of(cls, bodies: int, coupled: Pairs, jointed: Pairs, on_paths: Pairs) -> Self:
+        """The solver for the pairs of bodies that straight cables, joints and paths join."""
+        schedule = Schedule.of(bodies, [*coupled, *jointed, *(p for p in on_paths if p[0] < p[1])])
+        blocks = schedule.blocks | {(body, body): body for body in range(bodies)}
+        of_pairs = [
+            np.array([blocks.get(pair, -1) for pair in pairs], dtype=np.int64)
+            for pairs in (coupled, jointed, on_paths)
+        ]
+        fill = np.setdiff1d(np.arange(bodies, len(schedule.later)), of_pairs[0])
+        return cls(schedule, of_pairs[0], fill, jointed=of_pairs[1], routed=of_pairs[2])
 
 
 @inlined
@@ -116,7 +141,7 @@ def implicit_matrix(
         for r in range(BLOCK):
             for c in range(r, BLOCK):
                 blocks[body, r, c] = 0.0
-    for i in range(solver.fill.size):
+    for i in range(solver.fill.size):  # the others are written by add_cables()
         for r in range(BLOCK):
             for c in range(BLOCK):
                 blocks[solver.fill[i], r, c] = 0.0
@@ -133,6 +158,13 @@ def implicit_matrix(
         add_diagonal(forces.nodes, node, body, diagonal, blocks)
         across = damping * x * y, damping * x * z, damping * y * z
         add_off_diagonal(forces.nodes, node, body, across, blocks)
+    add_routed_cables(robot, solver, forces, time, blocks)
+    joints = robot.joints
+    for i in range(joints.node_a.size):
+        k = time * (joints.damping[i] + time * joints.stiffness[i])
+        add_diagonal(forces.nodes, joints.node_a[i], joints.body_a[i], (k, k, k), blocks)
+        add_diagonal(forces.nodes, joints.node_b[i], joints.body_b[i], (k, k, k), blocks)
+        add_joint(forces.nodes, joints.node_a[i], joints.node_b[i], solver.jointed[i], k, blocks)
     for body in range(robot.bodies.mass.size):
         mass, inertia_W = robot.bodies.mass[body], forces.inertia
         if robot.isotropic:
@@ -220,6 +252,58 @@ def add_cables(
             wd = product(w, column(lines, D + c))
             blocks[front, r, 3 + c] += wd
             put(-wd, adds, block, 3 + c, r, blocks)
+
+
+@inlined
+def add_routed_cables(
+    robot: Model, solver: Solver, forces: Forces, time: Real, blocks: Table
+) -> None:
+    """Adds the damping of the routed cables to the implicit matrix `blocks`, as time * damping * l
+    lᵀ. `time` is in s.
+
+    A body's part of l is the sum of (p x s, s) over its nodes on the path, at p from its origin,
+    with the derivative s of the cable's length by the node's position.
+    """
+    routes, couplings, pair = robot.cables.routes, robot.couplings, 0
+    for i in range(couplings.first_cable[solver.coupled.size], robot.cables.signal.size):
+        damping = time * forces.cable_forces[i, TENSION_PER_RATE]
+        for a in range(routes.first[i], routes.first[i + 1]):
+            for b in range(routes.first[i], routes.first[i + 1]):
+                block = solver.routed[pair]
+                pair += 1
+                if block < 0:
+                    continue
+                l_a, l_b = of_path(forces, routes.nodes[a], a), of_path(forces, routes.nodes[b], b)
+                is_own = block < robot.bodies.mass.size
+                for r in range(BLOCK):
+                    for c in range(r if is_own else 0, BLOCK):
+                        blocks[block, r, c] += damping * l_a[r] * l_b[c]
+
+
+@inlined
+def of_path(forces: Forces, node: int, k: int) -> tuple[Real, ...]:
+    """Part of a node in the rate of a routed cable's length: its product with the velocity of the
+    node's body. `k` is the row of the node in `forces.route_slopes`."""
+    slope = vector_at(forces.route_slopes, k, 0)
+    return *cross(vector_at(forces.nodes, node, P_BN_W), slope), *slope
+
+
+@inlined
+def add_joint(nodes: Table, a: int, b: int, block: int, k: Real, blocks: Table) -> None:
+    """Adds -J_aᵀ k J_b of two nodes a and b to the block of their bodies in the implicit matrix.
+    For J see add_diagonal()."""
+    p_a, p_b = vector_at(nodes, a, P_BN_W), vector_at(nodes, b, P_BN_W)
+    across = dot(p_a, p_b)
+    for r in range(3):
+        for c in range(3):
+            blocks[block, r, c] += k * p_b[r] * p_a[c]
+        blocks[block, r, r] -= k * across
+        blocks[block, 3 + r, 3 + r] -= k
+    for r, c, after in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        blocks[block, r, 3 + c] += k * p_a[after]
+        blocks[block, c, 3 + r] -= k * p_a[after]
+        blocks[block, 3 + r, c] -= k * p_b[after]
+        blocks[block, 3 + c, r] += k * p_b[after]
 
 
 @inlined
