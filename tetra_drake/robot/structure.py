@@ -163,12 +163,9 @@ class Structure(Blueprint):
     @property
     def joint_springs(self) -> Joints:
         """Springs that hold the nodes of ball joints together, for kernels."""
-        return Joints(
-            *self.joints.T.copy(),
-            *self.carriers[self.joints].T.copy(),
-            stiffness=self.joint_stiffness,
-            damping=self.joint_damping,
-        )
+        node_a, node_b = self.joints.T.copy()
+        body_a, body_b = self.carriers[node_a], self.carriers[node_b]
+        return Joints(node_a, node_b, body_a, body_b, self.joint_stiffness, self.joint_damping)
 
     @property
     def loads(self) -> NodeLoads:
