@@ -71,8 +71,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
         robot: the robot at its start.
         rest: state (13*bodies,) of a key frame with the name `rest`; None for no key frame.
         own_laws: True for an engine that computes contacts of struts by its own law, and tensions
-            where is_pulled() is true. The model then leaves these to the engine, and its joints are
-            springs, not rigid constraints.
+            where is_pulled() is true. The model then leaves these to the engine.
 
     Raises:
         InputError: if MuJoCo does not know the terrain or the friction.
@@ -106,10 +105,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     if robot.model.strut_contact.acts and not own_laws:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
-    if own_laws:
-        _add_joint_springs(model, structure)
-    else:
-        _add_connections(model, structure)
+    _add_joints(model, structure, step=step)
     _add_pushes(model, world, structure)
     return xml_text(model)
 
@@ -150,7 +146,6 @@ def integrator_of(robot: Robot, *, pulled: bool) -> str:
     fixed: in steps of 0.125 ms, the mast would fall with 0.76 g.
     """
     has_dampers = robot.structure.cables["damping"].any() and not pulled
-    has_dampers |= len(robot.structure.joints) > 0
     return "Euler" if has_dampers else "implicitfast"
 
 
@@ -281,21 +276,30 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
         _add_push(actuators, f"load {name}", of_axes, site=name, refsite=f"load {name}")
 
 
-def _add_joint_springs(model: Element, structure: Structure) -> None:
-    """Adds MuJoCo actuators that hold the nodes of joints together, by the law of this package."""
-    actuators, joints = add_element(model, "actuator"), structure.joint_springs
-    for first, second, _, _, stiffness, damping in zip(*joints, strict=True):
-        site, refsite = structure.node_names[first], structure.node_names[second]
-        laws = np.tile([0.0, -stiffness, -damping], (3, 1))
-        _add_push(actuators, f"joint {site} {refsite}", laws, site=site, refsite=refsite)
+def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
+    """Adds a constraint for each joint that holds its nodes together with the joint's stiffness K
+    and damping C.
 
-
-def _add_connections(model: Element, structure: Structure) -> None:
-    """Adds MuJoCo's constraints that hold the nodes of joints together."""
-    constraints = add_element(model, "equality")
-    for first, second in structure.joints:
-        site1, site2 = structure.node_names[first], structure.node_names[second]
-        add_element(constraints, "connect", site1=site1, site2=site2)
+    MuJoCo's constraint with the constants k and b, the impedance d and the inverse mass A of both
+    bodies exerts the force -d / ((1 - d) A) (k x + b v + a), with the displacement x of the nodes,
+    its rate v and its acceleration a, which hardly acts in a stiff joint. Here k is a quarter of
+    the largest one that is stable in explicit steps.
+    """
+    constraints, joints = add_element(model, "equality"), structure.joint_springs
+    for first, second, body_a, body_b, stiffness, damping in zip(*joints, strict=True):
+        time_constant = damping / stiffness
+        k = 1.0 / (step * (step + 2.0 * time_constant))
+        per_mass = 1.0 / structure.mass[body_a] + 1.0 / structure.mass[body_b]
+        impedance = stiffness * per_mass / (k + stiffness * per_mass)
+        names = structure.node_names
+        add_element(
+            constraints,
+            "connect",
+            site1=names[first],
+            site2=names[second],
+            solref=[-k * impedance, -k * time_constant * impedance],
+            solimp=[impedance, impedance, 1, 0.5, 1],
+        )
 
 
 def _add_push(actuators: Element, name: str, laws: np.ndarray, *, site: str, refsite: str) -> None:

@@ -203,8 +203,7 @@ class Structure(Blueprint):
     def initial_lengths(self) -> np.ndarray:
         """Lengths of the cables (cables,) in m at t = 0."""
         node_a, node_b = node_positions(self, self.initial_state)[self.segments.ends.T]
-        pieces = np.linalg.norm(node_b - node_a, axis=1)
-        return np.bincount(self.segments.cable, pieces, minlength=len(self.cable_names))
+        return self.along_cables(np.linalg.norm(node_b - node_a, axis=1))
 
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:

@@ -168,10 +168,12 @@ class Blueprint:
             for cable, (first, last) in enumerate(self.cable_ends.tolist())
         ]
         ends = [pair for path in paths for pair in itertools.pairwise(path)]
-        pieces = [len(path) - 1 for path in paths]
-        return Segments(
-            np.array(ends, dtype=int).reshape(-1, 2), np.repeat(range(len(paths)), pieces)
-        )
+        cables = [cable for cable, path in enumerate(paths) for _ in path[1:]]
+        return Segments(np.array(ends, dtype=int).reshape(-1, 2), np.array(cables, dtype=int))
+
+    def along_cables(self, of_pieces: np.ndarray) -> np.ndarray:
+        """Sums (cables,) of numbers of the straight pieces (pieces,) along each cable."""
+        return np.bincount(self.segments.cable, of_pieces, minlength=len(self.cable_names))
 
     def bodies_at(self, cables: Sequence[int]) -> set[int]:
         """Indices of the bodies that some cables join, also at rings; WORLD for fixed nodes."""
@@ -356,8 +358,7 @@ class Blueprint:
             )
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
-        pieces = self._distances(self.segments.ends)
-        lengths = np.bincount(self.segments.cable, pieces, minlength=len(self.cable_names))
+        lengths = self.along_cables(self._distances(self.segments.ends))
         for cable, length in enumerate(lengths):
             law = CableLaw(**self.cable_laws[cable])
             if law.free_length < 0.0:
