@@ -228,6 +228,17 @@ def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
     return nodes
 
 
+def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
+    """Rates (times, cables) of the cables' lengths in m/s, from positions and velocities of the
+    nodes (times, nodes, 3) in m and m/s."""
+    ends = structure.segments.ends
+    p_AB, v_AB = (x[:, ends[:, 1]] - x[:, ends[:, 0]] for x in (p_WN, v_WN))
+    rates = np.zeros((len(structure.cable_names), len(p_WN)))
+    of_pieces = (p_AB * v_AB).sum(axis=2) / np.linalg.norm(p_AB, axis=2)
+    np.add.at(rates, structure.segments.cable, of_pieces.T)
+    return rates.T
+
+
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
     """Adds the bodies of a structure, as free bodies, to a plant that is not finalized. If the
     plant has a SceneGraph, struts and spheres are shown."""
