@@ -314,9 +314,10 @@ class Blueprint:
         mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
         np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
         for body, given in self.given_inertia.items():
-            if mass[body] < LIGHTEST and given.inertia is None:
-                problem = "is missing, and no part of the body has mass and inertia"
-                refuse(f"bodies.{self.bodies[body]}.inertia", problem)
+            for key, value in (("centre", given.centre), ("inertia", given.inertia)):
+                if mass[body] < LIGHTEST and value is None:
+                    problem = "is missing, and no part of the body has mass and inertia"
+                    refuse(f"bodies.{self.bodies[body]}.{key}", problem)
             mass[body] = mass[body] if given.mass is None else given.mass
         if mass.min() < LIGHTEST:
             node = self.first_node[mass.argmin()]
