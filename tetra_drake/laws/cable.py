@@ -33,13 +33,15 @@ class CableConstants(Section):
     """Damping coefficient of a cable: tension divided by the rate of its length."""
 
     def constants(self, *, stiffness: float, free_length: float) -> dict[str, float]:
-        """Constants of one cable as keyword arguments of CableLaw, in SI units."""
+        """Constants of one cable as keyword arguments of CableLaw, in SI units. `stiffness` is in
+        N/m, `free_length` in m."""
         own = {name: getattr(self, name) for name in CableConstants.model_fields}
         return own | {"stiffness": stiffness, "free_length": free_length}
 
 
 class CableLaw(NamedTuple):
-    """Constants of a cable, or tables (cables,) of the constants of all cables; SI units."""
+    """Constants of a cable, or tables (cables,) of the constants of all cables: stiffness (N/m),
+    damping (N s/m) and free length (m)."""
 
     stiffness: Real
     damping: Real
@@ -113,7 +115,8 @@ def elastic_energy(stretch: Real, law: CableLaw) -> Real:
 
 @inlined
 def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
-    """Tension (N) of a cable by Eq. 6 of the thesis: spring plus damper plus actuation force.
+    """Tension (N) of a cable by Eq. 6 of the thesis: spring plus damper plus actuation force. A
+    negative tension pushes.
 
     `length` is in m, `rate` (m/s) is the rate of the length, `signal` (N) is the actuation force.
     """
@@ -131,7 +134,7 @@ def most_tension(elastic: Real) -> Real:
 def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]:
     """Tension (N) of a cable that goes slack, and its derivative by the rate (N s/m).
 
-    It is elastic + damping rate, limited to 0 ... 2 max(0, elastic). `elastic` (N) is
+    The tension is elastic + damping rate, limited to 0 ... 2 max(0, elastic). `elastic` (N) is
     elastic_tension(), `rate` (m/s) the rate of the length.
     """
     linear = elastic + law.damping * rate
@@ -140,7 +143,8 @@ def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]
 
 
 def tendon_faults(cables: Table, *, slack: bool) -> dict[str, Table]:
-    """Cables that MuJoCo's tendons cannot imitate: a mask (cables,) for each reason.
+    """Cables that MuJoCo's tendons cannot imitate: for each reason a mask (cables,), True where it
+    holds.
 
     The keys are the reasons as sentences. `cables` is an array of dtype CABLE. `slack` is true if
     cables go slack.

@@ -83,8 +83,8 @@ MUJOCO_FRICTION = 0.5
 
 @dataclass(frozen=True)
 class Cone:
-    """Constants of MuJoCo's friction: against the velocity, and at most `coefficient` times the
-    load."""
+    """Constants of MuJoCo's friction: a force against the velocity of a node, whose size is at most
+    `coefficient` times the normal force."""
 
     coefficient: float
     damping: float
@@ -105,7 +105,7 @@ class FrictionKind(Section):
         raise NotImplementedError
 
     def without_bristles(self) -> FrictionKind:
-        """This law without stiffness of bristles, for MuJoCo: nodes that stick creep."""
+        """This law with a bristle stiffness of 0, for MuJoCo: nodes that stick creep."""
         return self
 
     @property
@@ -114,8 +114,8 @@ class FrictionKind(Section):
         raise NotImplementedError
 
     def cone(self, source: object) -> Cone:
-        """MuJoCo's friction for this law. Raises InputError, naming `source` and key, if there is
-        none."""
+        """MuJoCo's friction in place of this law. Raises InputError, naming `source` (the scenario)
+        and the key, if MuJoCo cannot simulate it."""
         problem = f"found !{type(self).__name__}, which mujoco cannot simulate"
         raise InputError(source, "friction", problem)
 
@@ -130,7 +130,8 @@ class FrictionLaw(NamedTuple):
 
 
 class TangentSlide(NamedTuple):
-    """Motion of a node along one tangent of the ground."""
+    """Motion of a node along one tangent of the ground, and its friction mode along it: 0 if it
+    sticks, otherwise the direction of slip."""
 
     velocity: Real
     """Velocity in m/s."""
@@ -165,7 +166,8 @@ class NextMode(NamedTuple):
 def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
     """First time t (s) in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero.
 
-    Returns the horizon if there is no such time, or if `value` is not positive.
+    `value` has any unit; `rate` and `rate_rate` are its first and second derivative by time.
+    Returns the horizon (s) if there is no such time, or if `value` is not positive.
     """
     reach = horizon * (abs(rate) + 0.5 * horizon * abs(rate_rate))
     if not any_lane((value > 0.0) & (value <= reach)):
@@ -183,8 +185,9 @@ def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
 class ResetIntegrator(FrictionKind):
     """Friction of the thesis (Table 2, Eq. 3-5), independent of the load.
 
-    A bristle holds a node until it is bent by `stiction_range`. See laws.friction. The keys from
-    `stiffness` on are other readings of the thesis's text.
+    A bristle holds a node until it is bent by `stiction_range`. See laws.friction. The thesis's
+    text can be read in other ways: the settings `stiffness`, `reset`, `breaks_free` and `load`
+    choose them.
     """
 
     modes = "0 sticks, +1 or -1 slips in that direction along the tangent"
@@ -250,7 +253,8 @@ class ResetConstants(NamedTuple):
 
 @inlined
 def reset_force(slide: Slide, law: ResetConstants) -> Vector2:
-    """Friction (N) along both tangents by the reset integrator (Eq. 3-5 of the thesis)."""
+    """Friction (N) along both tangents by the reset integrator (Eq. 3-5 of the thesis). `slide` is
+    the node's motion and normal force."""
     force_1, force_2 = tangent_force(slide.t1, law), tangent_force(slide.t2, law)
     if not any_lane(law.per_load > 0.0):
         return force_1, force_2
@@ -271,10 +275,12 @@ def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
 
 @inlined
 def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, Real, Real]:
-    """Damping matrix (kg) of the friction F for an implicit step of length `time` (s).
+    """Damping matrix of the friction F for an implicit step of length `time` (s): time times a
+    damping, so in kg.
 
     Returns the components 11, 12 and 22, along t1 and t2, of the stiff part of -(time dF/dv + time²
-    dF/dx). For the reset integrator this part is the damping and stiffness in stick.
+    dF/dx), with the velocity v and the deflection x. For the reset integrator this part is the
+    damping and stiffness in stick.
     """
     stiffness = time * law.stiffness * (1.0 + law.stiction_switch)
     by_load = select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
@@ -287,7 +293,8 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
 @inlined
 def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
     """Mode of the reset integrator along each tangent after a step: 0 sticks, otherwise the
-    direction of slip."""
+    direction of slip. `slide` is the node's motion at the end of the step, with the modes of the
+    step."""
     slips = law.restarts == 0.0
     ends_1, ends_2 = at_range(slide.t1, law), at_range(slide.t2, law)
     breaks_1, breaks_2 = ends_1 & slips, ends_2 & slips
@@ -319,10 +326,10 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
     """Mode of the reset integrator along one tangent after a step: 0 sticks, otherwise the sign of
     slip.
 
-    If the node `breaks` free along this tangent, it slips in the direction of its velocity. If it
-    breaks free along the other tangent only, its mode here is `share`, a fraction of slip: the
-    deflection along this tangent divided by the stiction range. `share` is 0 if the node holds. A
-    slipping node sticks again when its velocity changes sign.
+    `breaks` is true if the node breaks free along this tangent: it then slips in the direction of
+    its velocity. If it breaks free along the other tangent only, its mode here is `share`, a
+    fraction of slip: the deflection along this tangent divided by the stiction range. `share` is 0
+    otherwise. A slipping node sticks again when its velocity changes sign.
     """
     from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
     mode = select(slide.mode == STICK, from_stick, slide.mode)
@@ -333,8 +340,8 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
 def reset_margin(slide: Slide, law: ResetConstants) -> float:
     """Mode margin of the reset integrator: positive until the mode changes along a tangent.
 
-    It is the smaller margin of the two tangents. A node that sticks may be at the stiction range as
-    long as it moves inward.
+    It is the smaller margin of the two tangents, in m in stick and in m/s in slip; only the sign
+    has a meaning. A node that sticks may be at the stiction range as long as it moves inward.
     """
     margin = math.inf
     for tangent in (slide.t1, slide.t2):
@@ -352,10 +359,10 @@ def time_to_reset_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: ResetConstants
 ) -> Real:
     """Time (s) to the next mode change of the reset integrator along either tangent, at most
-    `horizon`.
+    `horizon` (s).
 
-    `acceleration` (m/s²) along the tangents is taken as constant. `normal_rate` is not used: the
-    other law needs it.
+    `acceleration` (m/s²) along t1 and t2 is taken as constant. `normal_rate` is not used: it is an
+    argument because the Coulomb law needs it.
     """
     return minimum(
         time_to_tangent_change(slide.t1, acceleration[0], law, horizon),
@@ -383,7 +390,8 @@ def time_to_tangent_change(
 
 
 class Coulomb(FrictionKind):
-    """Friction that grows with the load, and may depend on the direction of travel.
+    """Friction that grows with the load, and may depend on the direction of slip relative to the
+    heading of the node's body.
 
     A bristle holds a node until its force exceeds `static` times the load. See laws.friction.
     """
@@ -486,12 +494,12 @@ def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
 
 @inlined
 def coulomb_size(u_1: Real, u_2: Real, heading: Vector2, law: CoulombConstants) -> Real:
-    """Size (N) of a force (u_1, u_2) along the tangents, for friction that depends on the
-    direction.
+    """Size (N) of a force (u_1, u_2) along the tangents, weighted by direction. A node slips if it
+    exceeds the coefficient of friction times the normal force.
 
-    Forces of the same size lie on an ellipse. Its half-axes are the directional factors: `forward`
-    or `backward` along the heading, depending on the sign, and `lateral` across it. `heading` is a
-    unit vector.
+    Forces of the same size lie on an ellipse. Its half-axes are proportional to the directional
+    factors: `forward` or `backward` along the heading, depending on the sign, and `lateral` across
+    it. `heading` is a unit vector along t1 and t2.
     """
     along = u_1 * heading[0] + u_2 * heading[1]
     across = u_2 * heading[0] - u_1 * heading[1]
@@ -511,11 +519,12 @@ def coulomb_force(slide: Slide, law: CoulombConstants) -> Vector2:
 
 @inlined
 def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Real, Real, Real]:
-    """Damping matrix (kg) of the friction F for an implicit step of length `time` (s).
+    """Damping matrix of the friction F for an implicit step of length `time` (s): time times a
+    damping, so in kg.
 
     Returns the components 11, 12 and 22, along t1 and t2, of the stiff part of -(time dF/dv + time²
-    dF/dx). Beyond the limit only the direction of the force changes. This is exact without
-    directional factors.
+    dF/dx), with the velocity v and the deflection x. Where friction is at its limit, only the
+    direction of the force changes. This is exact without directional factors.
     """
     bristle = bristle_force(slide, law)
     stiffness = select(bristle.stuck, time * law.stiffness, 0.0)
@@ -551,8 +560,9 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
 def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
     """Mode margin (N) of Coulomb friction: positive until the mode changes.
 
-    In slip it is the size of the bristle's force less its limit. In stick it is the limit less the
-    size, but stays positive beyond the limit while the node moves inward.
+    If the node slips, it is the size of the bristle's force less its limit. If the node sticks, it
+    is the limit less the size. It stays positive beyond the limit while the node moves inward, so
+    that u . v < 0 with the bristle's force u and the velocity v.
     """
     bristle = bristle_force(slide, law)
     if not bristle.stuck:
@@ -565,8 +575,8 @@ def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
 def time_to_coulomb_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: CoulombConstants
 ) -> Real:
-    """Time (s) until the bristle's force crosses its limit, at most `horizon`. Both are taken to
-    change at their present rates.
+    """Time (s) until the size of the bristle's force crosses its limit, at most `horizon` (s). Both
+    are taken to change at their present rates.
 
     `acceleration` (m/s²) is along the tangents, `normal_rate` (N/s) is the rate of the normal
     force.
@@ -588,8 +598,12 @@ def time_to_coulomb_change(
 
 
 def by_law(reset: F, coulomb: F) -> F:
-    """Combines a function of each friction law into one whose first argument is a FrictionLaw. It
-    calls the function of this law with the other arguments and the law's constants."""
+    """Combines the functions of the two friction laws into one function whose first argument is a
+    FrictionLaw.
+
+    It calls the function of this law with the remaining arguments, then the law's constants.
+    `reset` is for the reset integrator, `coulomb` for Coulomb friction.
+    """
 
     @inlined
     def call(friction: FrictionLaw, *more: Any) -> Any:
