@@ -80,7 +80,8 @@ class ActuatorForce(NamedTuple):
 
 
 class Exertion(NamedTuple):
-    """Forces of an actuator and length of its cable at an instant, to compute work and power."""
+    """Forces of an actuator and length of its cable at an instant. Work and power are computed from
+    them."""
 
     load: Real
     """Force (N) that the actuator bears. An ideal actuator counts as bearing the whole tension."""
@@ -213,7 +214,8 @@ def motor_force(
 
 
 class DrivenCables(NamedTuple):
-    """Properties of the driven cables: arrays (..., driven cables), in SI units."""
+    """Properties of the driven cables at one or several instants: arrays (..., driven cables), in
+    SI units."""
 
     law: CableLaw
     signal: Any

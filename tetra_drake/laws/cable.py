@@ -49,7 +49,8 @@ class CableLaw(NamedTuple):
 
     @classmethod
     def of(cls, cables: Table) -> Self:
-        """Constants of the cables in an array of dtype CABLE."""
+        """Constants of all cables as tables (cables,), from an array (cables,) of the NumPy record
+        type CABLE."""
         tables: Any = (cables[name].copy() for name in cls._fields)
         return cls(*tables)
 
@@ -74,14 +75,14 @@ class Cables(NamedTuple):
 
     @classmethod
     def of(cls, cables: Table) -> Self:
-        """Cables from an array of dtype CABLE."""
+        """Cables from an array (cables,) of the NumPy record type CABLE."""
         node_a, node_b, signal = (cables[name].copy() for name in ("node_a", "node_b", "signal"))
         return cls(node_a, node_b, signal, CableLaw.of(cables))
 
 
 @inlined
 def law_of(cables: Cables, i: int) -> CableLaw:
-    """Constants of cable i."""
+    """Constants of cable i, from the tables of the constants of all cables."""
     law = cables.law
     return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i])
 
@@ -94,7 +95,9 @@ dl/dt (m/s)."""
 
 @inlined
 def elastic_tension(stretch: Real, law: CableLaw) -> Real:
-    """Tension (N) of a cable at rest. `stretch` (m) is its length minus its free length."""
+    """Tension (N) of a cable at rest: the force of its spring. `stretch` (m) is its length minus
+    its free length. If it is negative, the tension is, although a cable that goes slack has none
+    then."""
     return law.stiffness * stretch
 
 

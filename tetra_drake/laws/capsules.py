@@ -97,8 +97,8 @@ class StrutContactLaw(NamedTuple):
 
 
 class NearStruts(NamedTuple):
-    """List of the pairs of struts that are near each other; empty if struts pass through each
-    other."""
+    """List of the pairs of struts that are near each other, with the positions of the nodes when it
+    was made; empty if struts pass through each other."""
 
     p_WN: Annotated[Table, "strut_nodes", 3, math.inf]
     """Positions (nodes, 3) in m of the nodes at the latest search; infinite before the first."""
@@ -114,8 +114,9 @@ class NearStruts(NamedTuple):
 
 
 def near_sizes(struts: Struts) -> dict[str, int]:
-    """Numbers of nodes of struts and of pairs of struts, by name, for the tables of NearStruts.
-    There is room for all pairs of struts of different bodies."""
+    """Numbers of rows of the tables in NearStruts, by name, for allocate(), which makes the tables:
+    "strut_nodes", up to the last node of a strut, and "strut_pairs". There is room for all pairs of
+    struts of different bodies."""
     of_bodies = np.diff(struts.first_strut)
     pairs = (of_bodies.sum() ** 2 - (of_bodies**2).sum()) // 2
     return {
@@ -162,7 +163,8 @@ def find_near_struts(
 
 
 class Touch(NamedTuple):
-    """Geometry of a contact of two struts."""
+    """Geometry of a contact of two struts: its position on both axes, its depth, and how the depth
+    changes as the ends move."""
 
     s: Real
     """Position of the contact along the first axis: 0 at its start, 1 at its end."""
@@ -281,7 +283,7 @@ def add_strut_forces(
 @inlined
 def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j: int) -> None:
     """Adds the force between struts i and j, if they touch, to the forces on their nodes, in
-    `nodes`."""
+    `nodes`, which has the nodes' positions and velocities. `law` has the constants of the force."""
     touch = find_touch(struts, nodes, i, j)
     if not any_lane(touch.depth > 0.0):
         return

@@ -73,8 +73,8 @@ class NormalForce(NamedTuple):
 
 
 class Ground(NamedTuple):
-    """Ground for the kernels: its laws and surface, and the nodes that may touch it (contact
-    nodes)."""
+    """Ground as an argument of kernels: its laws and surface, and the nodes that may touch it
+    (contact nodes) with the spheres about them (feet)."""
 
     contacts: Table
     """Rows (contacts,) of the table `nodes` on which the ground acts. The row of a foot without
@@ -270,11 +270,11 @@ def move_stick_point(
     modes: Table,
 ) -> None:
     """Moves the stick point of foot i, in `modes`, so that the deflection of its bristle becomes
-    `bend` (m along t1 and t2). `along` says, for t1 and t2, whether the deflection changes along
-    this tangent; otherwise it stays. `slide` is the foot's present motion.
+    `bend` (m, along t1 and t2), but only along the tangents for which `along` is true. Along the
+    others the deflection stays. `slide` is the foot's present motion.
 
-    With round feet, also stores the body's orientation in `modes`: the deflection counts how far
-    the foot has turned since then.
+    With round feet, also stores the body's orientation in `modes`, from which the foot's later turn
+    counts in the deflection.
     """
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     if ground.is_round:

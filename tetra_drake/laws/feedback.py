@@ -81,7 +81,7 @@ def sense(
     senses: Senses, gains: Table, state: Table, modes: Table, forces: Forces, feedback: Table
 ) -> None:
     """Writes the feedback f of each neuron to `feedback` (2m,), for m oscillators: extensor and
-    flexor in turn.
+    flexor in turn. The unit is the unit of the tonic input u0.
 
     It is computed from the `state` [q; v] (13*bodies,) and from `forces`, which must hold the cable
     and ground forces. `gains` are in the order of PATHWAYS. `modes` (contacts, 12) are the contact

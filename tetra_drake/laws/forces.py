@@ -97,14 +97,15 @@ def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
 def pull_of_cable(
     robot: Model, i: int, drive: int, length: Real, rate: Real, signals: Table, drives: Table
 ) -> tuple[Real, Real, int]:
-    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the next row of
-    `drives`.
+    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the row of
+    `drives` for the next cable.
 
-    `drives` has a row for each actuator with a state, such as a winch: its state, then what is
-    computed here, such as the state's derivative. `drive` is the row of this cable's actuator. The
-    next row is `drive` + 1 if the actuator has a state, otherwise `drive`.
-    The length is in m, its rate in m/s, `signals` (signals,) in N. An actuation force
-    also acts on a cable that is slack.
+    `length` is in m, `rate`, the rate of the length, in m/s, `signals` (signals,) in N. An
+    actuation force also acts on a cable that is slack.
+
+    `drives` has a row for each actuator with a state, such as a winch. Its state is read; the
+    state's rate and the other columns are written. `drive` is the row of this cable's actuator. The
+    returned row is `drive` + 1 if the cable has such an actuator, otherwise `drive`.
     """
     driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:

@@ -92,7 +92,7 @@ class Cone:
 
 
 class FrictionKind(Section):
-    """Base class for the settings of friction."""
+    """Base class for the settings of friction between the nodes and the ground."""
 
     modes: ClassVar[str]
     """Meaning of the signs of friction modes in recorded trajectories."""
@@ -101,7 +101,7 @@ class FrictionKind(Section):
     same."""
 
     def law(self) -> FrictionLaw:
-        """The law of friction for the kernels."""
+        """The law of friction with these settings as constants, as an argument of kernels."""
         raise NotImplementedError
 
     def without_bristles(self) -> FrictionKind:
@@ -110,7 +110,8 @@ class FrictionKind(Section):
 
     @property
     def text(self) -> str:
-        """Description of the law for pages."""
+        """Description of the law for pages that show a robot or its results, such as "the thesis's
+        friction"."""
         raise NotImplementedError
 
     def cone(self, source: object) -> Cone:
@@ -121,7 +122,8 @@ class FrictionKind(Section):
 
 
 class FrictionLaw(NamedTuple):
-    """Kind and constants of a friction law for the kernels."""
+    """Kind and constants of the law of friction between the nodes and the ground, for the
+    kernels."""
 
     kind: int
     """RESET_INTEGRATOR or COULOMB."""
@@ -141,7 +143,8 @@ class TangentSlide(NamedTuple):
 
 
 class Slide(NamedTuple):
-    """Motion of a node along the ground's tangents t1 and t2, and the normal force on it."""
+    """Motion of a node along the ground's tangents t1 and t2, the normal force on it, and the
+    heading of its body."""
 
     t1: TangentSlide
     t2: TangentSlide
@@ -233,7 +236,8 @@ class ResetIntegrator(FrictionKind):
 
 
 class ResetConstants(NamedTuple):
-    """Constants of the reset integrator (Table 2 of the thesis); SI units."""
+    """Constants of the reset integrator (Table 2 of the thesis), the law with which friction comes
+    from a bristle; SI units."""
 
     stiction_range: Real
     stiction_damping: Real
@@ -314,8 +318,8 @@ def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
 
 @inlined
 def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
-    """True if a node sticks, its bristle is bent by the stiction range or more, and it moves
-    outward: it breaks free."""
+    """True if a node that sticks breaks free along this tangent: its bristle is bent by the
+    stiction range or more, and it moves outward, so that the bend grows."""
     forward = (slide.deflection >= law.stiction_range) & (slide.velocity > 0.0)
     backward = (slide.deflection <= -law.stiction_range) & (slide.velocity < 0.0)
     return (slide.mode == STICK) & (forward | backward)
@@ -374,8 +378,8 @@ def time_to_reset_change(
 def time_to_tangent_change(
     slide: TangentSlide, acceleration: Real, law: ResetConstants, horizon: Real
 ) -> Real:
-    """Time (s) to the next mode change of the reset integrator along one tangent, at most
-    `horizon`, with a constant acceleration (m/s²)."""
+    """Time (s) to the next mode change of the reset integrator along one tangent, at most `horizon`
+    (s). The acceleration (m/s²) along the tangent is taken as constant."""
     velocity, stuck = slide.velocity, slide.mode == STICK
     # first_zero() ignores a value of 0, so 0 stands for no mode change.
     to_front = select(stuck, law.stiction_range - slide.deflection, 0.0)
@@ -537,10 +541,11 @@ def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Re
 
 @inlined
 def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
-    """Mode of Coulomb friction after a step: (0, 0) sticks, otherwise the direction of slip.
+    """Mode of Coulomb friction after a step: (0, 0) sticks, otherwise the direction of slip, a unit
+    vector along t1 and t2.
 
-    A node breaks free beyond the static limit if it moves outward. It sticks again when the
-    bristle's damping alone can hold it.
+    A node breaks free if its bristle's force is beyond the static limit and it moves outward, along
+    this force. It sticks again when the bristle's damping alone can hold it.
     """
     bristle = bristle_force(slide, law)
     u_1, u_2 = bristle.u_1, bristle.u_2

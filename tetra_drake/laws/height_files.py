@@ -41,9 +41,9 @@ class HeightFile(str):
     def read(cls, path: Any) -> HeightFile:
         """Reads the height file of a setting, which is its path; a HeightFile is returned as it is.
 
-        Raises InputError for what is not a path, for a file without heights or with too few, too
-        many or too large ones, and for a file of a record whose heights do not fit the digest in
-        its name.
+        Raises InputError for what is not a path, for a file without heights, for fewer than 3 x 3
+        or more than 4 million heights, for heights above 1e6 m, and for a file of a record whose
+        heights do not fit the digest in its name.
         """
         if isinstance(path, HeightFile):
             return path

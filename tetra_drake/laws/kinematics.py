@@ -181,8 +181,8 @@ def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int, body: int
 ) -> Vector3:
     """Acceleration (m/s²) in the world frame of a node that is fixed to `body`. `state` is [q; v]
-    (13*bodies,), `acceleration` is dv/dt of all bodies, 6 numbers per body. `nodes` has the node's
-    place on the body."""
+    (13*bodies,), `acceleration` is dv/dt of all bodies, 6 numbers per body. `nodes` has the vector
+    from the body's origin to the node."""
     a = 6 * body
     w_x, w_y, w_z = angular_velocity(state, body)
     p_x, p_y, p_z = vector_at(nodes, node, P_BN_W)
@@ -213,11 +213,11 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
 
 @compiled
 def interpolate_state(before: Table, after: Table, step: float, part: float) -> Table:
-    """State (13*bodies,) between the states at the beginning and end of a step of `step` seconds.
+    """State [q; v] (13*bodies,) between the states `before` and `after` a step of `step` seconds.
 
-    `part` (0 to 1) is the time since the beginning, divided by `step`. Positions are cubic
-    polynomials that fit positions and velocities at both ends. Velocities are linear. If `part` is
-    1, the state equals `after`.
+    `part` (0 to 1) is the time since the beginning of the step, divided by `step`. Positions and
+    quaternions are cubic polynomials that fit values and velocities at both ends; quaternions then
+    get the length 1. Velocities are linear. If `part` is 1, the state equals `after`.
     """
     bodies = before.size // 13
     between = after.copy()

@@ -62,7 +62,7 @@ class AnchorSprings(NamedTuple):
 
 
 class NodeLoads(NamedTuple):
-    """Constant forces on nodes."""
+    """Constant forces (N) on nodes, in the world frame."""
 
     nodes: Table
     """Indices of the loaded nodes (loads,)."""

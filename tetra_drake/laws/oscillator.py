@@ -66,7 +66,8 @@ class CpgSection(Section):
 
 
 class Network(NamedTuple):
-    """Constants of a Matsuoka network: tables with a row per neuron."""
+    """Constants of a Matsuoka network with n oscillators, as tables with a row for each of its 2n
+    neurons."""
 
     first: Table
     """Index of the first neuron that inhibits each neuron (2n,)."""

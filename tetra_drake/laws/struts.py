@@ -74,7 +74,8 @@ def nearest_on_line(axes: Axes) -> Real:
 
 @inlined
 def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
-    """Positions along both axes, 0 to 1, that are nearest to each other.
+    """Positions along both axes that are nearest to each other, first of the first axis, then of
+    the second: 0 at the start of an axis, 1 at its end.
 
     The argument `s` is the result of nearest_on_line(). If a position is beyond the end of its
     strut, the end is used, and the point of the other strut that is nearest to it.

@@ -165,7 +165,8 @@ def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> 
 
 @dataclass(frozen=True)
 class Metric:
-    """Declaration of a metric: its unit, its computation, and its use."""
+    """Declaration of a metric: its unit, the function that computes it from a simulation, and its
+    use."""
 
     unit: str
     """SI unit; "" for none."""
@@ -207,8 +208,8 @@ def mean(name: str) -> Callable[[Any], float]:
 
 
 def greatest(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
-    """Declares a metric that is a cost, as a field of a dataclass; see metric(). Of several
-    simulations its greatest value is recorded."""
+    """Declares a metric that is a cost, as a field of a dataclass. The arguments are the fields of
+    Metric; see metric(). Of several simulations its greatest value is recorded."""
     return metric(unit, note, compute, most=True, is_cost=True, **more)
 
 

@@ -222,18 +222,19 @@ class Relief(Section):
 
     @property
     def text(self) -> str:
-        """Description of the terrain, such as "incline (slope 5 deg)"."""
+        """Description of the terrain with its settings, such as "incline (slope 5 deg)"."""
         kind = type(self).__name__.lower() if self.is_ground else "no ground"
         return kind + settings_text(self)
 
     @property
     def paths(self) -> dict[str, str]:
-        """Paths of the height files that these settings name, by key."""
+        """Paths of the height files that these settings name; the keys are the names of the
+        settings."""
         return {key: file.path for key, file in self if isinstance(file, HeightFile)}
 
     def save(self, folder: Path) -> None:
-        """Copies the terrain's height files, if it has any, to the folder of a record. The name of
-        a copy is the HeightFile as a string."""
+        """Copies the terrain's height files, if it has any, to the folder of a record. A copy is
+        named heights-DIGEST.npy, by a digest of the heights."""
         for _, file in self:
             if isinstance(file, HeightFile):
                 file.save(folder)
