@@ -88,7 +88,8 @@ class Structure(Blueprint):
     @functools.cached_property
     def cables(self) -> np.ndarray:
         """Cables with their nodes, signals and constants: records (cables,) of dtype
-        laws.cable.CABLE. The signal of a cable without actuator is PASSIVE."""
+        laws.cable.CABLE. Their `signal` is the index of the oscillator that drives the cable, or
+        laws.cable.PASSIVE without actuator."""
         cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
         cables["signal"] = cable.PASSIVE

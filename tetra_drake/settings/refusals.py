@@ -106,9 +106,12 @@ def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, T
 
 
 def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
-    """Schemas of the types that an item of a value may have. `members` are the types of the value
-    itself. `part` is the key or index of the item. If `part` is the value's tag, the result is the
-    type with this tag; for any other name it is `members`."""
+    """JSON Schemas of the types that an item of a value may have, in a list.
+
+    `members` are the types that the value itself may have; `schema` is the whole JSON Schema.
+    `part` is the key or index of the item. If `part` is a tag, the result is the one of `members`
+    with this tag. If it is neither a tag, key nor index, the result is `members`.
+    """
     for member in members:
         if member.get("title") == f"!{part}":
             return [member]

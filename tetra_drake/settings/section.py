@@ -179,8 +179,9 @@ SI."""
 
 
 class Kinds:
-    """Annotation of a union of sections. In a file, a tag such as `!Coulomb` chooses the type of a
-    mapping; a mapping without a tag is of the first type."""
+    """Annotation of a union of sections, such as Annotated[Force | Winch, Kinds()]. In a file, a
+    tag such as `!Winch` chooses the type of a mapping; a mapping without a tag is of the first type
+    of the union."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
