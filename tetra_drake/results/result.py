@@ -41,7 +41,8 @@ if TYPE_CHECKING:
 
 
 class IntegratorWork(Section):
-    """Work of an integrator in one simulation: settings, and counts of steps and evaluations."""
+    """Computing work of an integrator in one simulation: its scheme and accuracy, and numbers of
+    steps and evaluations."""
 
     scheme: str
     accuracy: float
@@ -135,7 +136,8 @@ class SimulationResult:
 
 @dataclass(frozen=True)
 class ReplayFrame:
-    """Replay page in a notebook, shown by IPython's rich display."""
+    """Replay page (HTML text) in a notebook, shown by IPython's rich display in a frame of a height
+    in pixels."""
 
     page: str = field(repr=False)
     height: int
@@ -146,8 +148,9 @@ class ReplayFrame:
 
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
-    """Times (s), ascending, for which an engine must give the motion to make_result(): the points
-    of the path and, with `record`, the samples of the trajectory."""
+    """Times (s), ascending, for which an engine must give the motion to make_result(): the start,
+    `simulation.steady_from` and the end, the points of the path, and, with `record`, the samples of
+    the trajectory."""
     times = [np.array([0.0, simulation.settling_time, simulation.duration])]
     times.append(sample_times(simulation.duration, PERIOD))
     if record:
@@ -164,10 +167,15 @@ def make_result(
     wall_time: float,
     record: bool,
 ) -> SimulationResult:
-    """Result of a simulation, from its motion and tally. With `record`, it has a trajectory.
+    """Result of a simulation, from its motion and tally.
 
-    `motion` has the times of motion_times(). `totals`, the tally, has sums and extremes over all
-    steps; see laws.tally. `work` is the integrator's work, `wall_time` (s) its wall time.
+    Args:
+        driven: the robot with its gait or command.
+        motion: its motion at the times of motion_times().
+        totals: the tally, sums and extremes over all steps; see laws.tally.
+        work: counts of the integrator's steps and evaluations.
+        wall_time: wall time of the integration in s.
+        record: whether the result has a trajectory.
     """
     robot = driven.robot
     simulation, structure = robot.scenario.simulation, robot.structure
