@@ -116,7 +116,8 @@ class SimulationResult:
         return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
 
     def show(self, *, height: int = 480) -> ReplayFrame:
-        """Replay page for a notebook, which shows it in a frame `height` pixels high."""
+        """Page that plays the motion, for a notebook, which shows it in a frame `height` pixels
+        high. Raises InputError if no trajectory was recorded."""
         return ReplayFrame(self.replay_page(), height)
 
     def replay_page(self) -> str:
@@ -126,7 +127,8 @@ class SimulationResult:
         return replay_page(robot=self.robot, trajectory=self.trajectory, title=self.title)[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
-        """Writes a page that plays the motion; see visualization.replay.save_replay()."""
+        """Writes an HTML page that plays the motion to the file `path`. For `viewer`, see
+        visualization.replay.save_replay(). Raises InputError if no trajectory was recorded."""
         from tetra_drake.visualization.replay import save_replay
 
         save_replay(
@@ -251,8 +253,9 @@ def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) 
 
 
 def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
-    """Result of a gait in a few words, such as "walks 14.3 inches in 15 s". The scenario's
-    objective chooses what it tells. `metrics` has metrics by name, in SI units."""
+    """Result of a gait in a few words, such as "walks 14.3 inches in 15 s". It tells the metric
+    that the scenario's objective is about and, unless this is turning, the distance. `metrics` has
+    metrics by name, in SI units."""
     seconds = f"in {scenario.simulation.duration:g} s"
     units, distance = scenario.units, metrics["distance"]
     length = fixed(abs(distance) / units.length, units.decimals)

@@ -93,7 +93,7 @@ def fresh_draws(scenario: Scenario, seed: int, count: int) -> list[Draw]:
 def fresh_seed(seed: int, k: int) -> tuple[int, ...]:
     """Seed of draw k in fresh_draws(): six numbers, the last 1.
 
-    No evolution has such a seed. Its seeds have four numbers (five after numpy splits a large first
-    one), and numpy pads them with zeros.
+    No draw of an evolution has such a seed. Its seeds have four numbers (five after numpy splits a
+    large first one). Numpy pads them with zeros, so the sixth number is 0 there.
     """
     return seed, k, 0, 0, 0, 1

@@ -194,7 +194,8 @@ class Metrics(TalliedMetrics, WalkMetrics):
 
     @property
     def table(self) -> TextTable:
-        """Table of the metrics that apply to the robot, with units, in two pairs of columns."""
+        """Table of the metrics that apply to the robot, with units. Its four columns are metric and
+        value, twice side by side."""
         rows, units = [], current(self.units)
         for name, unit in UNITS.items():
             value = round(getattr(self, name), 9) + 0.0  # neither -0 nor rounding errors
@@ -238,8 +239,9 @@ UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
 
 def wrong_metric(metrics: Mapping[str, Any]) -> str:
-    """Name of the first metric whose value has a wrong type; "" if there is none. The values are in
-    the form of Metrics.to_json()."""
+    """Name of the first metric whose value has a wrong type; "" if there is none. The values, read
+    from JSON, are expected in the form of Metrics.to_json(): a float or None, for `lifted_shares` a
+    list of floats."""
     for name, value in metrics.items():
         numbers = value if name == "lifted_shares" else [value]
         kinds = float if name == "lifted_shares" else float | None

@@ -159,9 +159,9 @@ class Scenario(Section):
 
     @property
     def units(self) -> Units:
-        """Units of this scenario in texts, pages and figures: the units of units.shown_in(); mm if
-        its robot is given in mm; otherwise those that need the fewest digits for the long lengths
-        of its robot."""
+        """Units of this scenario in texts, pages and figures: the units that units.shown_in()
+        sets, if it is in use; otherwise mm if the robot is given in mm; otherwise the units that
+        need the fewest digits for the long lengths of the robot."""
         robot = self.robot
         return current(SYSTEMS[robot.unit] if robot.unit else fitting(robot.lengths))
 
@@ -183,7 +183,8 @@ class Scenario(Section):
 
     @property
     def lacking(self) -> tuple[str, ...]:
-        """Properties that some metrics need and this robot does not have; see scenario.metrics."""
+        """Properties that some metrics need and this scenario's robot or actuators do not have,
+        such as "row of tetrahedra". Such metrics are NaN."""
         return *self.robot.lacking, *self.actuation.lacking
 
     @property
@@ -223,8 +224,8 @@ class Scenario(Section):
         return self.from_tree(merged(tree, {"robot": implied}), source) if implied else changed
 
     def on_engine(self, name: str | None) -> Self:
-        """This scenario on the engine of this name, such as "compiled". It keeps its own settings
-        if it is on this engine or there is no name; otherwise the engine has default settings."""
+        """This scenario with the engine called `name`, such as "compiled", in its default settings.
+        If the scenario has this engine already, or `name` is None, nothing changes."""
         if name in (None, self.engine_name):
             return self
         return self.with_changes({"engine": {TAG: str(name).capitalize()}})
@@ -249,7 +250,8 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _check_combinations(self) -> Self:
-        """Refuses settings from different sections that do not go together."""
+        """Raises InputError, naming a key, for settings of different sections that do not go
+        together, such as a sample period too short for the memory."""
         simulation, step = self.simulation, self.cpg.listing_step
         if step > simulation.duration:
             expected = f"expected at most the duration, {simulation.duration} s"

@@ -81,7 +81,8 @@ def with_structure(tree: Tree, source: object) -> Tree:
 
 
 def _structure(content: Any, file: Path) -> StructureFile:
-    """Structure from the content of a file. Nodes that are left out are noted in the log."""
+    """Structure from the parsed content of a file. A warning in the log names the nodes that
+    nothing uses. Raises InputError that names `file` and key."""
     structure = StructureFile.from_tree(content, file)
     used = structure.blueprint().node_names
     if unused := [node for node in structure.nodes if node not in used]:

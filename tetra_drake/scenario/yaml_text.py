@@ -107,8 +107,9 @@ class _Loader(yamlcore.CoreLoader):
 
 
 def _expanded(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Number of values in a node, with the values of the nodes that its aliases name. `sizes` has
-    the numbers of the nodes that are counted already, by id."""
+    """Number of values in a YAML node: itself and all values in it. What an alias names counts at
+    every use. `sizes` has the numbers of the nodes counted already, by Python's id(), and gets the
+    new ones."""
     if id(node) not in sizes:
         sizes[id(node)] = 1  # for an alias of what holds it
         inner = node.value if isinstance(node, yaml.CollectionNode) else []
