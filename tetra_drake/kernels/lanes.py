@@ -434,8 +434,12 @@ def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
 
 
 def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> Any:
-    """Emits the address of field[index]. The flag nsw promises LLVM that the arithmetic does not
-    overflow."""
+    """Emits LLVM code for the address of the item field[index], and returns this pointer.
+
+    `kind` is the numba type of the field, `value` its LLVM value. `index` is an LLVM integer, or a
+    tuple of them for several dimensions, in C order. The flag nsw promises LLVM that the arithmetic
+    does not overflow.
+    """
     indices = [index] if len(kind.lengths) == 1 else cgutils.unpack_tuple(builder, index)
     lengths = _lengths(context, builder, kind, value)
     offset = indices[0]

@@ -63,9 +63,11 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
 
 @functools.cache
 def attribute_docstrings(owner: type) -> dict[str, str]:
-    """Docstrings of the attributes of a class and of its bases, by name.
+    """Docstrings of the attributes of a class and of its bases, by the attribute's name: the texts
+    below annotated attributes in the source. Empty for classes outside tetra_drake.
 
-    pydantic's own option reads them at every import, which takes 0.15 s.
+    The source is parsed only when this is called. pydantic's use_attribute_docstrings would parse
+    it at every import of the package, which takes 0.15 s.
     """
     if not owner.__module__.startswith("tetra_drake"):
         return {}

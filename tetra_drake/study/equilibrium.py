@@ -146,13 +146,21 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
-    """Robot of a structure file or of a scenario, on flat ground, with forces as actuators, so that
-    MuJoCo can simulate it. A structure gets Coulomb friction.
+    """Robot of a structure or of a scenario, in a form that MuJoCo can simulate; without the
+    offsets of its bodies at the start.
 
-    A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
-    for it. A file of the NASA Tensegrity Robotics Toolkit (NTRT) has bare numbers, so it needs a
-    `unit` of length, such as "dm". Struts may overlap in the file, as they do in
-    some of NTRT's; in equilibrium they touch. Raises InputError that names file and key.
+    A scenario's terrain is replaced by flat ground (if it has ground), its actuators by ideal
+    forces. A structure gets the other settings of the scenario `prism`, with Coulomb friction; if
+    it is too heavy for the ground there, a stiffer ground. Struts may overlap in a file, as in some
+    of NTRT; in equilibrium they touch.
+
+    Args:
+        name_or_file: name of a shipped structure or scenario, or path of a file.
+        unit: unit of length of bare coordinates in a structure file, such as "dm". Files of the
+            NASA Tensegrity Robotics Toolkit (NTRT) need it.
+
+    Raises:
+        InputError: names file and key.
     """
     shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
     if name_or_file not in shipped and not os.path.exists(name_or_file):
