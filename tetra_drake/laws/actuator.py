@@ -111,10 +111,11 @@ def wound(actuator: Actuator, drive: Any, otherwise: Any) -> Any:
 def exertion(
     actuator: Actuator, drives: Table, drive: int, tension: Real, length: Real, signal: Real
 ) -> Exertion:
-    """Forces of an actuator whose cable has a tension (N), a length (m) and a signal (N).
+    """Forces of one actuator, to compute its work, from tension (N) and length (m) of its cable.
 
-    `drives` is the table of the actuators' states. `drive` is the actuator's row in it; ideal
-    actuators have none.
+    `signal` is the commanded force (N): positive pulls the cable more. `drives` is the table of the
+    actuators' states, see Forces.drives in laws.forces. `drive` is the actuator's row in it; ideal
+    actuators have no state: neither is read.
     """
     if not has_drive(actuator):
         return Exertion(load=tension, pull=signal, left=length, limited=0.0 * length)

@@ -25,7 +25,8 @@ from tetra_drake.laws.vectors import (
 
 
 class Forces(NamedTuple):
-    """Arrays for the forces on a robot in one state. Kernels write to them."""
+    """Arrays that hold the forces on a robot in one state; most have a row per node, contact node,
+    cable, body or actuator. Compiled functions write their results to them."""
 
     nodes: Annotated[Table, "nodes", kinematics.NODE_COLUMNS]
     frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]

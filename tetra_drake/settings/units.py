@@ -95,8 +95,9 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def fitting(lengths: tuple[float, ...]) -> Units:
-    """Units that show lengths (m) with the fewest digits. Lengths below a quarter of the longest do
-    not count. If the lengths are round in no unit, as in a turned robot, the units are metric."""
+    """The units (m, cm, mm or inches) that write these lengths (m) with the fewest digits. Lengths
+    below a quarter of the longest do not count. If each unit needs six digits or more for every
+    length, for example after a rotation of the robot, the result is cm."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
     return min(
