@@ -203,7 +203,7 @@ def deaf_to_ctrl_c() -> Iterator[None]:
 def finished(
     running: dict[Future[Evaluation], Task], timeout: float | None = None
 ) -> list[tuple[Task, Evaluation]]:
-    """Removes finished tasks from `running`; returns them with their evaluations.
+    """Removes finished tasks from `running` (task by future); returns them with their evaluations.
 
     Returns when at least one is finished, or after `timeout` seconds. If a task raised an error,
     the first call that finds no other finished task raises it. Raises InputError if a worker has
@@ -225,8 +225,8 @@ def finished(
 
 
 def evaluate_all(submit: Submit, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:
-    """Evaluates all tasks at once; `submit` begins one and returns its future. Yields each task
-    with its evaluation as soon as it is finished."""
+    """Begins the evaluation of all tasks at once; `submit` begins one and returns its future.
+    Yields each task with its evaluation as soon as it is finished."""
     running = {submit(task): task for task in tasks}
     while running:
         yield from finished(running)

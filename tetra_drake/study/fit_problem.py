@@ -164,7 +164,7 @@ class FitProblem:
 
     def sums_of_squares(self, points: np.ndarray) -> np.ndarray:
         """Sums (k,) of the squares of the weighted residuals at k points (k, n), which are
-        simulated in parallel; a huge number where a simulation fails."""
+        simulated in parallel; 1e200 where a simulation fails."""
         self._evaluate(list(points))
         residuals = np.array([self.residuals_at(point) for point in points])
         return np.nan_to_num((residuals**2).sum(axis=1), nan=HUGE)

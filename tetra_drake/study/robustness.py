@@ -108,9 +108,9 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Default disturbances: a spread of `percent` for all uncertain numbers of a scenario, and for
-    the initial positions. A number is uncertain if its setting is declared as Varied in the
-    code."""
+    """Default disturbances: each uncertain number of a scenario gets a random factor within
+    1 ± percent / 100, and bodies start displaced by up to this share of the robot's size. A number
+    is uncertain if its setting is declared as Varied in the code."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):
