@@ -109,8 +109,8 @@ class Judgement:
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
     """Default disturbances: each uncertain number of a scenario gets a random factor within
-    1 ± percent / 100, and bodies start displaced by up to this share of the robot's size. A number
-    is uncertain if its setting is declared as Varied in the code."""
+    1 ± percent / 100. Each body starts displaced along each axis, by up to this share of the
+    shortest strut. A number is uncertain if its setting is declared as Varied in the code."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):
