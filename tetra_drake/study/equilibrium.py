@@ -138,7 +138,9 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
 
 def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness matrix K and mass matrix M of small motions M x'' = -K x about the equilibrium,
-    without damping. x has six coordinates per body, as displaced() takes them. Returns K and M."""
+    without damping. x has six coordinates per body in m, in the world frame: a rotation vector
+    times `unactuated.radius`, then a translation. Returns K and M. The forces of `unactuated` are
+    overwritten."""
     state = robot.equilibrium.state
     force_at_rest(unactuated, state)
     stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
@@ -146,21 +148,13 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
-    """Robot of a structure or of a scenario, in a form that MuJoCo can simulate; without the
-    offsets of its bodies at the start.
+    """Robot of a structure file or of a scenario, on flat ground, so that MuJoCo can simulate it:
+    each actuator is an ideal force. A structure gets Coulomb friction.
 
-    A scenario's terrain is replaced by flat ground (if it has ground), its actuators by ideal
-    forces. A structure gets the other settings of the scenario `prism`, with Coulomb friction; if
-    it is too heavy for the ground there, a stiffer ground. Struts may overlap in a file, as in some
-    of NTRT; in equilibrium they touch.
-
-    Args:
-        name_or_file: name of a shipped structure or scenario, or path of a file.
-        unit: unit of length of bare coordinates in a structure file, such as "dm". Files of the
-            NASA Tensegrity Robotics Toolkit (NTRT) need it.
-
-    Raises:
-        InputError: names file and key.
+    A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
+    for it. A file of the NASA Tensegrity Robotics Toolkit (NTRT) has bare numbers, so it needs a
+    `unit` of length, such as "dm". Struts may overlap in the file, as they do in
+    some of NTRT's; in equilibrium they touch. Raises InputError that names file and key.
     """
     shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
     if name_or_file not in shipped and not os.path.exists(name_or_file):
@@ -262,8 +256,8 @@ def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> st
 
 
 def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
-    """Writes a page that shows the robot in equilibrium. Raises InputError if the page cannot be
-    written."""
+    """Writes an HTML page that shows the robot in equilibrium in 3D. Raises InputError if the page
+    cannot be written."""
     robot = study.robot
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
     modes = np.zeros((2, len(loads), MODE_COLUMNS))
