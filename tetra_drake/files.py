@@ -84,8 +84,8 @@ def given_path(path: str | Path, source: str, what: str) -> Path:
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """Valid file names for any texts, by text. They are different even where upper and lower case
-    are the same."""
+    """Valid file names for any texts: a dict from each text to its file name. The names are
+    different even where upper and lower case are the same."""
     found: dict[str, str] = {}
     for name in names:
         taken = {other.casefold() for other in found.values()}
@@ -124,7 +124,7 @@ def _check_name(path: str | Path) -> None:
 
 
 def _check_no_other(path: str | Path) -> None:
-    """Raises InputError if `path` exists and is no file. Writing by rename would replace a
+    """Raises InputError if `path` exists and is no regular file. Writing by rename would replace a
     device."""
     if os.path.lexists(path) and not os.path.isfile(path):
         what = "directory" if os.path.isdir(path) else "device, a pipe or a broken link"
@@ -151,12 +151,13 @@ def _reason(error: Exception) -> str:
 
 
 def json_number(value: Any) -> Any:
-    """A value for JSON: None in place of a number that is not finite."""
+    """A value for JSON: None in place of a float that is not finite; any other value as it is."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def read_json(path: str | Path, what: str) -> Any:
-    """Content of a JSON file. Raises InputError like read_bytes(), and if a key is given twice."""
+    """Content of a JSON file. `what` names the expected content in errors. Raises InputError like
+    read_bytes(), if the file is not JSON, and if a key is given twice."""
     text = read_text(path, what)
     try:
         return json.loads(text, object_pairs_hook=_unique_keys)
@@ -172,7 +173,8 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
-    """Text of a UTF-8 file with at most `most` bytes. Raises InputError like read_bytes()."""
+    """Text of a UTF-8 file with at most `most` bytes. `what` names the expected content in errors.
+    Raises InputError like read_bytes(), and if the file is not UTF-8."""
     try:
         return read_bytes(path, what, most=most).decode("utf-8")
     except UnicodeDecodeError as error:
