@@ -50,7 +50,8 @@ class InputError(ValueError):
 
 
 def _one_line(text: str) -> str:
-    """The text on one line. Control characters are escaped, because a terminal would obey them."""
+    """The text on one line: runs of spaces and line feeds become one space. Control characters are
+    escaped, because a terminal would obey them."""
     line = " ".join(text.split())
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in line)
 

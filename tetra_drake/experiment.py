@@ -60,7 +60,7 @@ def evolve(
     Args:
         scenario: A scenario, its name or its file. May be None with `resume`.
         out: The new directory.
-        seed: 0 by default. The record depends only on scenario, method and seed.
+        seed: Random seed; 0 by default. The record depends only on scenario, method and seed.
         workers: Number of worker processes; one per core by default. A Dask cluster uses all of its
             workers.
         resume: Continues the run in `out`. Scenario, seed, optimiser and objective must be the same
@@ -79,10 +79,10 @@ def evolve(
         progress: True shows bars on a terminal, and lines in notebooks and files. A Progress (see
             evolution.progress) is a display of your own.
         reevaluate: After the evolution, evaluates the best gaits on the Drake diagram if the engine
-            is another, and simulates the gaits of a map on disturbed robots. By default a new run
-            does so, and a resumed run does what it was begun with.
-        report: After the evolution, writes report.html, replay.html, figures/ and, for a map,
-            elites/.
+            is another, and simulates the gaits of a quality-diversity map on disturbed robots. By
+            default a new run does so, and a resumed run does what it was begun with.
+        report: After the evolution, writes report.html, replay.html, figures/ and, for a
+            quality-diversity map, elites/.
 
     Raises:
         InputError: An argument cannot be used. Also if a worker process dies, for example because

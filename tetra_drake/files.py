@@ -67,8 +67,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def writing(path: str | Path) -> Iterator[None]:
-    """Context manager: errors of the system become InputError, which says that `path` cannot be
-    written."""
+    """Context manager: an OSError or ValueError in the block becomes an InputError, which says that
+    `path` cannot be written."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -98,8 +98,8 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def make_folder(folder: Path, *, source: Path | None = None) -> None:
-    """Makes a folder if it does not exist. Raises InputError if that fails; the error names
-    `source`, by default the folder."""
+    """Makes a folder and its parents if they do not exist. Raises InputError if that fails; the
+    error names `source`, by default the folder."""
     source = source or folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -146,7 +146,7 @@ def check_folder(folder: str | Path) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """Reason of an error, without the path: messages name the path already."""
+    """Text for the reason of an error, without the path: our messages name the path already."""
     return getattr(error, "strerror", None) or str(error)
 
 

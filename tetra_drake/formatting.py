@@ -24,7 +24,8 @@ def silent(text: str) -> None:
 
 
 def fixed(value: float, digits: int = 2) -> str:
-    """A number with this many decimals, never "-0.00". "-" if it is not finite."""
+    """A number as text with this many decimals, never "-0.00". It is "-" if the number is not
+    finite."""
     if not math.isfinite(value):
         return "-"
     return f"{value:z.{digits}f}"
@@ -37,8 +38,8 @@ def signed(value: float, digits: int = 2) -> str:
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """A number with this many significant digits, without exponent. "-" if it is not finite, and 0
-    for a rounding error."""
+    """A number as text with this many significant digits, without exponent. It is "-" if the number
+    is not finite, and "0" if it is so small that it is a rounding error."""
     if abs(value) < _ROUNDING or not math.isfinite(value):
         return fixed(value, 0)
     magnitude = int(f"{value:.{digits - 1}e}".partition("e")[2])
@@ -46,7 +47,7 @@ def rounded(value: float, digits: int = 3) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time as h:mm:ss; "-" if it is not finite."""
+    """A time in s as text h:mm:ss; "-" if it is not finite."""
     if not math.isfinite(seconds):
         return "-"
     minutes, second = divmod(round(seconds), 60)
@@ -94,7 +95,8 @@ _UNBROKEN = str.maketrans({" ": "\u00a0", "–": "–\u2060"})
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table of texts with headings."""
+    """A table of texts with a heading for each column. Methods give it as plain text, HTML or
+    Markdown."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]

@@ -183,14 +183,15 @@ class _Episodes:
         return np.asarray(self._scenario.actuation.commands(self._cables._replace(signal=signals)))
 
     def pictures(self) -> tuple[np.ndarray, ...]:
-        """Pictures of all robots now; see visualization.picture."""
+        """Pictures (height, width, 3) of all robots now, in RGB; see visualization.picture."""
         from tetra_drake.visualization.picture import picture
 
         simulation = self.simulation
         return tuple(picture(simulation.robot, p_WN) for p_WN in simulation.state.p_WN)
 
     def _observe(self, readings: Readings) -> np.ndarray:
-        """Observations of all robots (N, size); see tetra_drake.gym."""
+        """Observations of all robots (N, size) from their state; the module's docstring lists the
+        parts of a row."""
         per_length, per_weight = 1.0 / self._start_lengths, 1.0 / self._weight
         parts = (
             readings.lengths * per_length - 1.0,
@@ -220,9 +221,10 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
         """Args:
             scenario: a scenario, its name or file, or a run.
             control_period: time (s) between actions; by default the scenario's.
-            grouped: an action for each oscillator, otherwise for each driven cable.
+            grouped: if True, an action has a number for each oscillator, which moves all cables of
+                the oscillator; otherwise for each driven cable.
             record: records the trajectories, for result().
-            render_mode: "rgb_array" for pictures by render().
+            render_mode: "rgb_array" for pictures by render(); None for no pictures.
 
         Raises:
             InputError: if an argument does not fit the scenario.
@@ -280,8 +282,9 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
     ) -> None:
-        """See TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes
-        are truncated after `max_episode_steps`. `autoreset_mode` is "NextStep", "SameStep" or
+        """Makes `num_envs` robots on a scenario. For the arguments not named here, see
+        TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes are
+        truncated after `max_episode_steps`. `autoreset_mode` is "NextStep", "SameStep" or
         "Disabled"."""
         options: Info = {"grouped": grouped, "render_mode": render_mode}
         made: Info = {"control_period": control_period, "workers": workers}

@@ -135,8 +135,8 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
 def path_of_the_centre(
     result: SimulationResult, *, time: Span | None = None, instants: int = 9
 ) -> Drawn:
-    """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
-    straight, its height along x is shown instead."""
+    """Path of the robot's centre of mass from above, to scale. Arrows show the heading at equally
+    spaced instants. If the path is straight, its height along x is shown instead."""
     structure, unit = result.robot.structure, result.scenario.units
     trajectory = shown_part(result.trajectory, time)
     path = measures.path_of_centre(trajectory, structure)

@@ -67,15 +67,16 @@ DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 
 @dataclass(frozen=True)
 class Look:
-    """Look of figures on paper: width in inches, size of letters in points, and whether they have a
-    title."""
+    """Look of figures on paper: width in inches, size of letters in points, and whether figures
+    have a title."""
 
     width_in: float = 7.0
     font_size: float = 9.0
     title: bool = True
 
     def __post_init__(self) -> None:
-        """Raises InputError if a figure is too wide, or its letters are too large for its width."""
+        """Raises InputError if a figure is wider than 40 in, or its letters are too large for its
+        width."""
         most = _MOST_PER_INCH * self.width_in
         if not 0.0 < self.font_size <= most <= _MOST_PER_INCH * _WIDEST:
             expected = f"a width up to {_WIDEST:g} in, and per inch letters up to {_MOST_PER_INCH}"
@@ -202,8 +203,9 @@ class ShownFigure(Figure):
 
 
 def page_of(*, height_in: float) -> Page:
-    """The figure to draw on, inside a figure_function(): the caller's, from the keyword `figure`,
-    or a new one, `height_in` inches high with letters of the usual size. It gets the constrained
+    """The figure to draw on, for a function with the decorator figure_function(): the caller's,
+    from the keyword `figure`, or a new one. A new one is `height_in` inches high with letters of
+    the usual size, and higher with larger ones. The figure gets the constrained
     layout, unless the caller has set another layout."""
     figure = GIVEN.get()
     if figure is None:

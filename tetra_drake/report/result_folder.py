@@ -73,7 +73,7 @@ class PathColumns(Section):
 
 
 class ResultFile(Section):
-    """The keys of result.json that load_result() reads."""
+    """Part of result.json that load_result() reads back; the file has more keys."""
 
     name: str
     metrics: dict[str, Any]
@@ -142,7 +142,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
 
 
 def load_result(folder: str | Path) -> SimulationResult:
-    """Reads a result folder of `simulate`: the result with scenario, gait and trajectory.
+    """Reads a folder written by `simulate`: returns the result with scenario, gait and trajectory.
 
         >>> result = td.load_result("out")
         >>> signals = result.trajectory.signal.sel(oscillator="T1-T2")
@@ -217,7 +217,8 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
 def load_or_simulate(
     source: Path, *, scenario: str | None = None, warn: Say = silent
 ) -> SimulationResult:
-    """Result of a result folder; or of a new simulation of a gait file, or of a run's best gait.
+    """Loads the result in a folder of `simulate`; or simulates a gait file, or the best gait of a
+    run of `evolve`.
 
     `scenario` is a name or file, for gait files only: folders have their own. `warn` is called with
     a warning if the gait was made for another scenario.

@@ -60,8 +60,8 @@ def metrics_table(
 
 
 def _size_and_title(name: str, units: Units) -> tuple[float, str]:
-    """Unit in which a metric is shown, as its size in SI units (0.01 for percent), and the title of
-    the metric's row in a table, such as "distance (in)"."""
+    """Unit for showing the metric `name`, as its size in SI units (0.01 for percent); and the title
+    of the metric's row in a table, such as "distance (in)"."""
     title = _TITLES.get(name, name.replace("_", " "))
     if name in _SHARES:
         return 0.01, f"{title} (%)"
@@ -180,5 +180,5 @@ def trials_table(run: Run) -> TextTable:
 
 
 def _time(seconds: float) -> str:
-    """A wall time as text, such as "35 ms"."""
+    """A wall time as text, such as "35 ms" or "2.50 s"."""
     return f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{rounded(seconds)} s"

@@ -78,7 +78,8 @@ length."""
 
 
 def add_robot(meshcat: Meshcat, structure: Structure) -> None:
-    """Adds bodies (struts and nodes) and cables to the scene. place_robot() moves them."""
+    """Adds bodies (struts and nodes) and cables to the scene. They have no place yet:
+    place_robot() moves them to their poses."""
     names, p_BN = structure.node_names, structure.p_BN
     strut_radius, node_radius = drawn_radii(structure)
     shades = _mixed("rear", "lead", np.linspace(0.0, 1.0, len(structure.bodies)))
@@ -176,8 +177,8 @@ def set_surroundings(
 
     The floor surrounds `points` (..., 3), such as all positions of the nodes over time. The camera
     sees nodes at all of `seen` (..., 3). Both are in the world frame, in m.
-    Where a contact node is drawn larger than its foot, the floor is drawn lower than the ground, by
-    the least difference.
+    Where contact nodes are drawn larger than they are, the floor is drawn lower than the ground by
+    the least difference of radii, so that they do not seem to sink in.
     """
     thick = drawn_radii(robot.structure)[1].max() * np.vstack([np.eye(3), -np.eye(3)])
     seen = (seen.reshape(-1, 1, 3) + thick).reshape(-1, 3)

@@ -95,7 +95,7 @@ def make_video(
 
 def _frames(page: Page, times: np.ndarray, say: Say) -> Iterator[bytes]:
     """Screenshots of a replay page at these times (s) of the simulation, as the bytes of their RGB
-    pixels. `say` gets a line of text about the progress after every 50."""
+    pixels. `say` gets a line of text about the progress every 50 screenshots."""
     for number, time in enumerate(times.tolist()):
         do(page, "show", time)
         yield picture_of(page).tobytes()
