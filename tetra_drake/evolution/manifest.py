@@ -82,7 +82,8 @@ class Method:
 
     @property
     def given_from_python(self) -> list[str]:
-        """Names of what came from Python: "objective", "optimizer" or both."""
+        """What the caller of evolve() passed as a Python object of another package, so that the
+        command line cannot repeat the run: "objective", "optimizer", both or none of them."""
         return [part for part, name in vars(self).items() if "." in name]
 
 
