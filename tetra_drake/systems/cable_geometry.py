@@ -30,12 +30,13 @@ SLENDERNESS = 100.0
 class CableGeometry(LeafSystem):
     """Poses of the cylinders that show cables in a SceneGraph. The system has no state.
 
-    | port          | shape       | unit | meaning                                      |
-    |---------------|-------------|------|----------------------------------------------|
-    | ends          | (6 cables,) | m    | per cable: position of end a, then of end b  |
-    | geometry_pose |             | SI   | FramePoseVector of all cylinders             |
+    | port          | in, out | shape       | unit | meaning                                    |
+    |---------------|---------|-------------|------|--------------------------------------------|
+    | ends          | in      | (6*cables,) | m    | per cable: positions of end a and of end b |
+    |               |         |             |      | in the world                               |
+    | geometry_pose | out     | abstract    | SI   | FramePoseVector of all cylinders           |
 
-    A shape in a SceneGraph keeps its length. So each cable is shown by PIECES cylinders, which
+    A shape in a SceneGraph keeps its length. So each cable is shown by 4 cylinders (PIECES), which
     slide along each other like the tubes of a telescope.
     """
 

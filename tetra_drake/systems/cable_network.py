@@ -43,31 +43,36 @@ _LEAST_LENGTH = 1e-9
 class CableNetwork(LeafSystem):
     """Cables between bodies (thesis Eq. 6). The system has no state.
 
-    | port              | shape          | unit   | meaning                                  |
-    |-------------------|----------------|--------|------------------------------------------|
-    | state             | (13*n,)        | SI     | [q; v] of n bodies, as if free           |
-    | signals           | (m,)           | N      | actuation, one per group of cables       |
-    | drives            | (drives,)      | m or N | states of the actuators                  |
-    | generalized_force | (6*n,)         | N m, N | [t_W; f_W] at each body's origin         |
-    | tensions          | (cables,)      | N      | tension of each cable                    |
-    | lengths           | (cables,)      | m      | length of each cable                     |
-    | rates             | (cables,)      | m/s    | rate of each cable's length              |
-    | cable_forces      | (7 cables,)    | SI     | table of laws.cable, row by row          |
-    | ends              | (6 cables,)    | m      | per cable: position of end a, then of b  |
-    | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
+    | port              | in, out | shape       | unit        | meaning                           |
+    |-------------------|---------|-------------|-------------|-----------------------------------|
+    | state             | in      | (13*n,)     | SI          | [q; v] of n bodies, as if free    |
+    | signals           | in      | (m,)        | N           | one per group of driven cables    |
+    | drives            | in      | (drives,)   | m or N      | states of the actuators           |
+    | generalized_force | out     | (6*n,)      | N m, N      | [t_W; f_W] at each body's origin  |
+    | tensions          | out     | (cables,)   | N           | tension of each cable             |
+    | lengths           | out     | (cables,)   | m           | length of each cable              |
+    | rates             | out     | (cables,)   | m/s         | rate of each cable's length       |
+    | cable_forces      | out     | (7*cables,) | SI          | 7 numbers per cable, see below    |
+    | ends              | out     | (6*cables,) | m           | per cable: positions of end a and |
+    |                   |         |             |             | of end b in the world             |
+    | drive_rates       | out     | (drives,)   | m/s or N/s  | rates of the states `drives`      |
 
-    Inputs are `state`, `signals` and `drives`. A row of `cable_forces` has the direction (3) from
-    end a to end b, length, tension, derivative of the tension by the rate, and rate.
+    The 7 numbers of a cable are the direction from end a to end b in the world (3), the length (m),
+    the tension (N), the derivative of the tension by the rate (N s/m), and the rate (m/s).
+
+    A drive is the state of the actuator of one driven cable: a free length (m) or a tension (N).
+    The port `signals` exists only if there are any, `drives` and `drive_rates` only if the kind of
+    actuators has states.
 
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
-    loop. Where the model is `slack`, a cable goes slack instead of pushing. The port `signals`
-    exists only if there are any, `drives` and `drive_rates` only if the kind of actuators has
-    states. A cable whose ends meet has no direction: the outputs raise SimulationFailure.
+    loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
+    has no direction: the outputs raise SimulationFailure.
     """
 
     def __init__(self, model: Model, *, names: Sequence[str], signals: int) -> None:
-        """Cables of a model, which has their constants and the bodies. `names` are the cables'
-        names, for errors. `signals` is the number m of signals."""
+        """Makes the system for the cables of `model`, which has their constants, their actuators
+        and the bodies. `names` are the cables' names, for errors. `signals` is the number m of
+        signals, not the signals themselves."""
         super().__init__()
         self._names = names
         bodies, count = model.bodies.mass.size, model.cables.signal.size
@@ -103,8 +108,8 @@ class CableNetwork(LeafSystem):
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
     ) -> np.ndarray:
-        """The table `cable_forces` (cables, 7). Writes the generalized force to `force` (6*n,), if
-        given.
+        """The numbers of the port `cable_forces` as a table (cables, 7). Writes the generalized
+        force to `force` (6*n,), if given.
 
         With `moves_only`, the inputs other than the state are not read: only lengths and rates are
         valid. Raises SimulationFailure if a number of a cable is not finite although the state is.
@@ -136,7 +141,7 @@ class CableNetwork(LeafSystem):
 
 @dataclass(frozen=True)
 class Cable:
-    """Cable between the origins of two frames of a plant."""
+    """Cable between the origins of two frames of a plant, for AddCables()."""
 
     name: str
     frame_a: Frame
@@ -163,6 +168,9 @@ def AddCables(
     `signals` of the returned system if cables are actuated.
 
     Args:
+        builder: the builder that the plant was added to; the cables are added to it.
+        plant: the plant whose bodies the cables pull.
+        cables: the cables: names, ends and constants.
         actuated: for each signal, in the order of the signals, the names of the cables that it
             drives. The keys name the signals, in errors only. By default all cables are passive.
         actuation: kind of the actuators, Force() by default. Kinds with states are added as the
@@ -240,6 +248,8 @@ def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
     """Records (cables,) of dtype laws.cable.CABLE: nodes, signal and constants of each cable.
+
+    `actuated` has the names of the cables that each signal drives; see AddCables().
 
     Raises InputError if `actuated` has an unknown cable, or a cable twice.
     """
