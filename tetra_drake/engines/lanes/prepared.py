@@ -25,8 +25,7 @@ from tetra_drake.scenario.engine_kinds import Compiled
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Robot and the source of its signals (gait or command) in the form that the lanes of the
-    compiled engine need: arrays of constants, and the state at t = 0, for its kernels."""
+    """Driven robot in the form that the lanes need: constants and state of its kernels."""
 
     driven: DrivenRobot
     record: bool
@@ -46,9 +45,8 @@ class Prepared:
 
     @classmethod
     def of(cls, driven: DrivenRobot, *, record: bool) -> Prepared:
-        """Prepares a simulation in a lane (SIMD lane of the compiled engine). `driven` is the robot
-        with its gait or given signals. With `record`, the sample times include the trajectory's.
-        Raises InputError if gait or steering do not fit the scenario."""
+        """Prepares a robot for a lane, at t = 0. With `record`, its trajectory is sampled. Raises
+        InputError if gait or steering do not fit the scenario."""
         robot, model, structure = driven.robot, driven.robot.model, driven.robot.structure
         scenario, turns, solver = robot.scenario, driven.turns, Solver.of(model)
         cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
