@@ -184,8 +184,8 @@ def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
 def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
     """Content of a file with at most `most` bytes. `what` names the expected content in errors.
 
-    Raises InputError if the file cannot be read. Devices and pipes are refused, because they may
-    never end.
+    Raises InputError if the file cannot be read or has more than `most` bytes. Devices and
+    pipes are refused, because they may never end.
     """
     content = b""
     try:

@@ -95,9 +95,8 @@ dl/dt (m/s)."""
 
 @inlined
 def elastic_tension(stretch: Real, law: CableLaw) -> Real:
-    """Tension (N) of a cable at rest: the force of its spring. `stretch` (m) is its length minus
-    its free length. If it is negative, the tension is, although a cable that goes slack has none
-    then."""
+    """Tension (N) of a cable's spring at rest. `stretch` (m) is the cable's length minus its free
+    length. The tension is negative if the stretch is; slack_tension() takes it as 0 then."""
     return law.stiffness * stretch
 
 

@@ -90,8 +90,8 @@ def make_surface(
 ) -> Ground:
     """Ground with the given laws and terrain, but without contact nodes, for AddGroundContact().
 
-    `grid` has the terrain's heights. By default it is made from `terrain_kind`. A terrain that
-    begins in front of the robot unless its settings give a start then begins at x = 0."""
+    `grid` has the terrain's heights. By default it is made from `terrain_kind`, whose steps or
+    obstacles begin at x = 0 if its settings give no start."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     rows, columns = grid.heights.shape
     inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding

@@ -131,8 +131,8 @@ class Robot:
     @functools.cached_property
     def equilibrium(self) -> Equilibrium:
         """Equilibrium of the robot on flat ground without actuation, found at the first use. The
-        scenario's terrain and offsets are ignored. Raises InputError if there is no
-        equilibrium."""
+        scenario's terrain and the offsets of the bodies at the start are ignored. Raises InputError
+        if there is no equilibrium."""
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
         return equilibrium_of(self.scenario, _placed(self.scenario))

@@ -169,7 +169,8 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     where it is, and plans a shorter step. Changes the tables of `lanes` and `log` in place.
 
     `live` is True if the network is integrated together with the robot; otherwise signals are
-    interpolated between samples. Returns True if a simulation has reached its pause or has failed.
+    interpolated between samples. Returns True if a simulation has ended: at the time up to which it
+    was to run, or by a failure. Samples of motions that are recorded go to `log`.
     """
     clock, ended = lanes.clock, False
     if any_lane((clock[STATUS] == RUNNING) & (clock[TIME] >= clock[MARK])):

@@ -91,7 +91,8 @@ def put_contact(
     as contact number `place` of the lane.
 
     Its vector g, the derivative of the struts' distance, is read from `touching.vector`. Its weight
-    w in the implicit matrix is `spring` (time² * stiffness) + `damping` (time * damping).
+    w in the implicit matrix is `spring` + `damping`, both in kg: the stiffness times time², and
+    the damping coefficient times the time.
     """
     size = touching.vector.size
     count = touching.count[0]
