@@ -52,7 +52,8 @@ _SOFT = {"condim": "3", "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1]}
 
 
 def check_mjcf(scenario: Scenario) -> None:
-    """Raises InputError, naming the key, if MuJoCo does not know the terrain or the friction."""
+    """Raises InputError, which names the scenario's key, if MuJoCo cannot simulate the scenario's
+    terrain or its law of friction."""
     if scenario.terrain.plane_slope is None:
         kind = type(scenario.terrain).__name__
         problem = f"found !{kind}, but mujoco simulates only planes, or no ground"
@@ -64,12 +65,14 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     """MJCF text of a robot's MuJoCo model: a tendon for each cable and a motor for each driven one.
 
     If actuators bear the whole tension, tendons have no springs: a motor for each cable exerts its
-    tension. Motors are in the order of their cables. A motor has the name of its oscillator; if
-    this drives several cables, the name of the cable is added.
+    tension. Motors are in the order of their cables. The motor of a driven cable has the name of
+    the oscillator that drives the cable; if this drives several cables, the name of the cable is
+    added. The motor of another cable has the cable's name.
 
     Args:
         robot: the robot at its start.
-        rest: state (13*bodies,) of a key frame with the name `rest`; None for no key frame.
+        rest: state [q; v] (13*bodies,) whose poses become a key frame with the name `rest`; None
+            for no key frame.
         own_laws: True for an engine that computes contacts of struts by its own law, and tensions
             where is_pulled() is true. The model then leaves these to the engine.
 
@@ -124,8 +127,8 @@ def is_pulled(robot: Robot) -> bool:
 
 
 def loose_remark(robot: Robot) -> str:
-    """Remark on differences of MuJoCo's tendons and the robot's cables, with the cables' names; ""
-    if there are none. See tendon_faults()."""
+    """Remark on differences between MuJoCo's tendons and the robot's cables, with names of such
+    cables; "" if there are none. See tendon_faults() of laws.cable."""
     structure, remarks = robot.structure, []
     if not robot.scenario.actuation.keeps_spring:
         return ""
@@ -195,7 +198,7 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
 
 
 def _contact(robot: Robot, mass: float) -> dict:
-    """Contact settings for the floor and a body of this mass (kg)."""
+    """Attributes of an MJCF contact pair of the floor and a node of a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
     # Nodes that bear the weight are as in the blueprint, or in equilibrium.
@@ -237,8 +240,8 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
 
 
 def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
-    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if motors
-    exert their tensions."""
+    """Adds a tendon for each cable and a motor for each driven cable. With `pulled`, tendons exert
+    no force, and there is a motor for each cable, which exerts its whole tension."""
     structure, motors = robot.structure, {}
     for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
         for cable in (structure.cable_names[i] for i in group):

@@ -42,8 +42,8 @@ def find_statics(
 ) -> Statics:
     """Self-stress states and mechanisms of rigid bodies joined by cables and ball joints.
 
-    `held` (nodes, 3) is True for each axis of a node along which the world holds it; by default
-    nothing is held. `joints` (joints, 2) has the two nodes of each joint. For the other arguments
+    `held` (nodes, 3) is True where an anchor holds a node along the world's x, y or z axis; by
+    default nothing is held. `joints` (joints, 2) has the two nodes of each joint. For the other arguments
     see cable_wrenches().
     """
     held = np.zeros(p_WN.shape, dtype=bool) if held is None else held
@@ -78,8 +78,8 @@ def find_statics(
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
-    """Orthonormal basis (n, vectors) of the vectors that a matrix (m, n) maps to 0. Singular values
-    up to a share `tolerance` of the greatest count as 0."""
+    """Orthonormal basis (n, vectors), in columns, of the vectors that a matrix (m, n) maps to 0.
+    Singular values up to `tolerance` times the greatest one count as 0."""
     _, singular_values, rows = np.linalg.svd(matrix)
     greatest = singular_values.max(initial=0.0)
     return np.asarray(rows[np.count_nonzero(singular_values > tolerance * greatest) :].T)
