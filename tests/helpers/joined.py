@@ -74,13 +74,15 @@ RHOMBUS: dict[str, Any] = {
     "nodes": {"l": [-1, 0, 0.5], "r": [1, 0, 0.5], "u": [0, 0.6, 0.5], "d": [0, -0.6, 0.5]},
     "struts": {"bar": BAR | {"pairs": [["l", "u"], ["u", "r"], ["r", "d"], ["d", "l"]]}},
     "pinned": ["l", "r", "u", "d"],
+    "anchors": dict.fromkeys("lrud", "z"),
     "cables": {
         "long": {"pairs": [["l", "r"]], "stiffness": 1e3, "damping": 5.0, "tension": 100.0},
         "cross": {"pairs": [["u", "d"]], "stiffness": 1e3, "damping": 5.0, "tension": 60.0},
     },
     "gravity": 0.0,
 }
-"""Four bars that are pinned to a rhombus, with a cable along each diagonal."""
+"""Four bars that are pinned to a rhombus, with a cable along each diagonal. Without the anchors it
+would fold out of its plane."""
 
 
 def with_arm(**changes: object) -> Scenario:
