@@ -52,7 +52,8 @@ _SOFT = {"condim": "3", "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1]}
 
 
 def check_mjcf(scenario: Scenario) -> None:
-    """Raises InputError, naming the key, if MuJoCo does not know the terrain or the friction."""
+    """Raises InputError, which names the scenario's key, if MuJoCo cannot simulate the scenario's
+    terrain or its law of friction."""
     if scenario.terrain.plane_slope is None:
         kind = type(scenario.terrain).__name__
         problem = f"found !{kind}, but mujoco simulates only planes, or no ground"
@@ -64,12 +65,14 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     """MJCF text of a robot's MuJoCo model: a tendon for each cable and a motor for each driven one.
 
     If actuators bear the whole tension, tendons have no springs: a motor for each cable exerts its
-    tension. Motors are in the order of their cables. A motor has the name of its oscillator; if
-    this drives several cables, the name of the cable is added.
+    tension. Motors are in the order of their cables. The motor of a driven cable has the name of
+    the oscillator that drives the cable; if this drives several cables, the name of the cable is
+    added. The motor of another cable has the cable's name.
 
     Args:
         robot: the robot at its start.
-        rest: state (13*bodies,) of a key frame with the name `rest`; None for no key frame.
+        rest: state [q; v] (13*bodies,) whose poses become a key frame with the name `rest`; None
+            for no key frame.
         own_laws: True for an engine that computes contacts of struts by its own law, and tensions
             where is_pulled() is true. The model then leaves these to the engine.
 
@@ -105,6 +108,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     if robot.model.strut_contact.acts and not own_laws:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
+    _add_joints(model, structure, step=step)
     _add_pushes(model, world, structure)
     return xml_text(model)
 
@@ -123,8 +127,8 @@ def is_pulled(robot: Robot) -> bool:
 
 
 def loose_remark(robot: Robot) -> str:
-    """Remark on differences of MuJoCo's tendons and the robot's cables, with the cables' names; ""
-    if there are none. See tendon_faults()."""
+    """Remark on differences between MuJoCo's tendons and the robot's cables, with names of such
+    cables; "" if there are none. See tendon_faults() of laws.cable."""
     structure, remarks = robot.structure, []
     if not robot.scenario.actuation.keeps_spring:
         return ""
@@ -162,7 +166,7 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         principal = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())
         nodes = range(structure.first_node[i], structure.first_node[i + 1])
         feet = structure.contact_radius[[node for node in nodes if node in structure.contacts]]
-        is_bar = len(nodes) == 2 and not feet.any()
+        is_bar = len(nodes) == 2 and not feet.any() and i not in structure.given_inertia
         if is_bar:
             # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
             # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
@@ -194,7 +198,7 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
 
 
 def _contact(robot: Robot, mass: float) -> dict:
-    """Contact settings for the floor and a body of this mass (kg)."""
+    """Attributes of an MJCF contact pair of the floor and a node of a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
     # Nodes that bear the weight are as in the blueprint, or in equilibrium.
@@ -223,8 +227,9 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
     model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
     bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
     pairs, friction = add_element(model, "contact"), [_LEAST_FRICTION, _LEAST_FRICTION, 0, 0, 0]
+    places = robot.structure.places[robot.structure.struts]
     for i, j in itertools.combinations(range(len(bodies)), 2):
-        if bodies[i] == bodies[j]:
+        if bodies[i] == bodies[j] or np.isin(places[i], places[j]).any():
             continue
         per_mass = (1.0 / robot.structure.mass[bodies[[i, j]]]).sum()
         depth = 4.0 / (3.0 * math.pi) * _IMPACT_SPEED / math.sqrt(normal.stiffness * per_mass)
@@ -235,22 +240,23 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
 
 
 def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
-    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if motors
-    exert their tensions."""
+    """Adds a tendon for each cable and a motor for each driven cable. With `pulled`, tendons exert
+    no force, and there is a motor for each cable, which exerts its whole tension."""
     structure, motors = robot.structure, {}
     for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
         for cable in (structure.cable_names[i] for i in group):
             motors[cable] = oscillator if len(group) == 1 else f"{oscillator} {cable}"
     tendons, actuators = add_element(model, "tendon"), add_element(model, "actuator")
     width = structure.least_radius / 2
-    for name, cable in zip(structure.cable_names, structure.cables, strict=True):
+    for number, cable in enumerate(structure.cables):
+        name = structure.cable_names[number]
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]
         springlength = [least, cable["free_length"]]  # the spring exerts no force in between
         colour = ACTUATED_COLOUR if name in motors else PASSIVE_COLOUR
         own = {} if pulled else {"springlength": springlength, **law}
         tendon = add_element(tendons, "spatial", name=name, width=width, rgba=colour, **own)
-        for node in (cable["node_a"], cable["node_b"]):
+        for node in (cable["node_a"], *structure.cable_rings.get(number, ()), cable["node_b"]):
             add_element(tendon, "site", site=structure.node_names[node])
         if pulled or name in motors:
             motor = motors.get(name, name)
@@ -264,25 +270,50 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
     actuators, anchors, loads = add_element(model, "actuator"), structure.anchors, structure.loads
     laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
     for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
-        _add_push(actuators, world, f"anchor {structure.node_names[node]}", place, of_axes)
+        name = structure.node_names[node]
+        add_element(world, "site", name=f"anchor {name}", pos=place)
+        _add_push(actuators, f"anchor {name}", of_axes, site=name, refsite=f"anchor {name}")
     for node, force in zip(loads.nodes, loads.forces, strict=True):
-        of_axes = np.outer(force, [1.0, 0.0, 0.0])
-        _add_push(actuators, world, f"load {structure.node_names[node]}", np.zeros(3), of_axes)
+        name, of_axes = structure.node_names[node], np.outer(force, [1.0, 0.0, 0.0])
+        add_element(world, "site", name=f"load {name}", pos=np.zeros(3))
+        _add_push(actuators, f"load {name}", of_axes, site=name, refsite=f"load {name}")
 
 
-def _add_push(
-    actuators: Element, world: Element, name: str, place: np.ndarray, laws: np.ndarray
-) -> None:
-    """Adds MuJoCo actuators that push a node along the axes of the world, one for each axis whose
-    law is not zero.
+def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
+    """Adds a constraint for each joint that holds its nodes together with the joint's stiffness K
+    and damping C.
 
-    `name` is "anchor" or "load", a blank, and the name of the node. `laws` (3, 3) has a row per
-    axis: a constant force (N), the force per displacement of the node from the world's point
-    `place` (3,) in N/m, and the force per velocity in N s/m. A spring and a damper have negative
+    MuJoCo's constraint with the constants k and b, the impedance d and the inverse mass A of both
+    bodies exerts the force -d / ((1 - d) A) (k x + b v + a), with the displacement x of the nodes,
+    its rate v and its acceleration a, which hardly acts in a stiff joint. Here k is a quarter of
+    the largest one that is stable in explicit steps.
+    """
+    constraints, joints = add_element(model, "equality"), structure.joint_springs
+    for first, second, body_a, body_b, stiffness, damping in zip(*joints, strict=True):
+        time_constant = damping / stiffness
+        k = 1.0 / (step * (step + 2.0 * time_constant))
+        per_mass = 1.0 / structure.mass[body_a] + 1.0 / structure.mass[body_b]
+        impedance = stiffness * per_mass / (k + stiffness * per_mass)
+        names = structure.node_names
+        add_element(
+            constraints,
+            "connect",
+            site1=names[first],
+            site2=names[second],
+            solref=[-k * impedance, -k * time_constant * impedance],
+            solimp=[impedance, impedance, 1, 0.5, 1],
+        )
+
+
+def _add_push(actuators: Element, name: str, laws: np.ndarray, *, site: str, refsite: str) -> None:
+    """Adds MuJoCo actuators that push a site along the axes of another site, `refsite`, and this
+    the other way; one for each axis whose law is not zero.
+
+    `laws` (3, 3) has a row per axis: a constant force (N), the force per displacement from
+    `refsite` in N/m, and the force per velocity in N s/m. A spring and a damper have negative
     numbers.
     """
-    add_element(world, "site", name=name, pos=place)
-    ends = {"site": name.partition(" ")[2], "refsite": name}
+    ends = {"site": site, "refsite": refsite}
     for axis, gear, law in zip("xyz", np.eye(3, 6), laws, strict=True):
         if law.any():
             force = {"gear": gear, "gainprm": "0", "biastype": "affine", "biasprm": law}

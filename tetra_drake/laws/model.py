@@ -31,9 +31,9 @@ class Bodies(NamedTuple):
 
 
 class Couplings(NamedTuple):
-    """Pairs of bodies that cables join. The cables of a pair are consecutive. They run from the
-    first body, with the lower index, to the second body. Cables from fixed nodes of the world come
-    before all pairs."""
+    """Pairs of bodies that straight cables join. The cables of a pair are consecutive. They run
+    from the first body, with the lower index, to the second body. Straight cables from fixed nodes
+    of the world come before all pairs, routed cables after them."""
 
     first: Table
     """Index of the first body of each pair (pairs,)."""
@@ -41,7 +41,7 @@ class Couplings(NamedTuple):
     """Index of the second body of each pair (pairs,)."""
     first_cable: Table
     """Index of the first cable of each pair (pairs + 1,); the last number is the number of
-    cables."""
+    straight cables."""
     held: Table
     """Index of the body at the end of each cable from a fixed node (fixed cables,)."""
 
@@ -61,8 +61,26 @@ class AnchorSprings(NamedTuple):
     """Damping (anchors, 3) along x, y and z; 0 along a free axis."""
 
 
+class Joints(NamedTuple):
+    """Ball joints: pairs of nodes of two bodies that a spring and a damper hold together; SI
+    units."""
+
+    node_a: Table
+    """Index of the node of the first body (joints,), which has the lower index."""
+    node_b: Table
+    """Index of the node of the second body (joints,)."""
+    body_a: Table
+    """Index of the first body (joints,)."""
+    body_b: Table
+    """Index of the second body (joints,)."""
+    stiffness: Table
+    """Stiffness (joints,), the same along all axes."""
+    damping: Table
+    """Damping (joints,), the same along all axes."""
+
+
 class NodeLoads(NamedTuple):
-    """Constant forces on nodes."""
+    """Constant forces (N) on nodes, in the world frame."""
 
     nodes: Table
     """Indices of the loaded nodes (loads,)."""
@@ -84,6 +102,7 @@ class Model(NamedTuple):
     couplings: Couplings
     ground: Ground
     anchors: AnchorSprings
+    joints: Joints
     loads: NodeLoads
     bodies: Bodies
     struts: Struts
@@ -108,7 +127,8 @@ class Model(NamedTuple):
 
         It gives forces on nodes; the masses of its bodies are 0. `p_BN` (nodes, 3) are positions of
         the nodes (m) in the frames of their bodies, `first_node` (bodies + 1,) the index of each
-        body's first node. With `slack`, cables go slack instead of pushing.
+        body's first node, then the number of nodes on bodies. With `slack`, cables go slack instead
+        of pushing.
         """
         bodies, none = first_node.size - 1, np.zeros(0)
         no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
@@ -121,9 +141,10 @@ class Model(NamedTuple):
             couplings=Couplings(no_index, no_index, first[:1], no_index),
             ground=ground or Ground.nowhere(),
             anchors=AnchorSprings(no_index, no_index, no_vectors, no_vectors, no_vectors),
+            joints=Joints(no_index, no_index, no_index, no_index, none, none),
             loads=NodeLoads(no_index, no_vectors),
             bodies=Bodies(np.zeros(bodies), np.zeros((bodies, 6)), *np.zeros((2, bodies))),
-            struts=Struts(no_index, no_index, first, none, none),
+            struts=Struts(no_index, no_index, no_index, no_index, first, none, none),
             strut_contact=StrutContactLaw(acts=False, normal=np.zeros(2), search=np.zeros(4)),
             isotropic=True,
             slack=slack,

@@ -6,6 +6,7 @@ motions of a robot that is a billion times as stiff in other directions.
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,9 @@ from tetra_drake.laws.struts import Axes, axes_of, vector_between
 
 
 class Springs(NamedTuple):
-    """Springs between points of two bodies, or of a body and the world. A spring has k
-    displacements. They are sums of one part from each body's motion."""
+    """Springs between points of two bodies, or of a body and the world. Each spring has k
+    displacements, such as the 3 components of the relative motion of a cable's ends. A displacement
+    is the sum of two parts, one from the motion of each body."""
 
     body_a: np.ndarray
     """Indices of the first bodies (springs,)."""
@@ -32,10 +34,11 @@ class Springs(NamedTuple):
 
 
 def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
-    """Stiffness matrix (6*bodies, 6 bodies) of a robot on flat ground: N m, N and N/m.
+    """Stiffness matrix (6*bodies, 6*bodies) of a robot on flat ground.
 
     The displacement of a body is a rotation vector in rad, then a translation in m, in the world
-    frame. `forces` are the forces of a state without motion, with all tables computed.
+    frame. The units are N m between rotations, N/m between translations, N otherwise. `forces` are
+    the forces of a state without motion, with all tables computed.
     """
     bodies = robot.bodies.mass.size
     carriers = np.full(len(robot.p_BN), WORLD)
@@ -43,6 +46,9 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
     blocks = np.zeros((bodies + 1, bodies + 1, 6, 6))  # the last blocks are the world's
     for springs in (
         _cables(robot, forces, carriers),
+        _pieces(robot, forces, carriers),
+        _paths(robot, forces, carriers),
+        _joints(robot, forces, carriers),
         _supports(robot, forces, carriers),
         _touching_struts(robot, forces, carriers),
     ):
@@ -68,23 +74,83 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
 
 
 def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """The cables as springs. A slack cable has no stiffness. `carriers` (nodes,) is the index of
-    each node's body, WORLD for fixed nodes."""
-    cables, parts, nodes = robot.cables, forces.cable_forces, forces.nodes
-    p_BN_W = nodes[:, kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    """The straight cables as springs, along them by their stiffness and sideways by their tension.
+    A slack cable has no stiffness. `carriers` (nodes,) is the index of each node's body, WORLD for
+    fixed nodes."""
+    is_straight = np.diff(robot.cables.routes.first) == 0
+    node_a, node_b = robot.cables.node_a[is_straight], robot.cables.node_b[is_straight]
+    parts, lengthwise = forces.cable_forces[is_straight], _lengthwise(robot, forces)[is_straight]
     direction = parts[:, cable.DIRECTION : cable.DIRECTION + 3]
     along = np.einsum("ci,cj->cij", direction, direction)
-    tension = parts[:, cable.TENSION]
-    stretch = parts[:, cable.LENGTH] - cables.law.free_length
-    stiffness = cable.elastic_stiffness(stretch, cables.law)
-    lengthwise = np.where((tension > 0.0) | (not robot.slack), stiffness, 0.0)
-    sideways = tension / parts[:, cable.LENGTH]
+    sideways = parts[:, cable.TENSION] / parts[:, cable.LENGTH]
     return Springs(
-        carriers[cables.node_a],
-        carriers[cables.node_b],
-        kinematics.rigid_motions(p_BN_W[cables.node_a]),
-        -kinematics.rigid_motions(p_BN_W[cables.node_b]),
+        carriers[node_a],
+        carriers[node_b],
+        _motions(forces, node_a),
+        -_motions(forces, node_b),
         (lengthwise - sideways)[:, None, None] * along + sideways[:, None, None] * np.eye(3),
+    )
+
+
+def _lengthwise(robot: Model, forces: Forces) -> np.ndarray:
+    """Stiffness (cables,) of the cables along their length; 0 for slack ones."""
+    law, parts = robot.cables.law, forces.cable_forces
+    stiffness = cable.elastic_stiffness(parts[:, cable.LENGTH] - law.free_length, law)
+    return np.where((parts[:, cable.TENSION] > 0.0) | (not robot.slack), stiffness, 0.0)
+
+
+def _motions(forces: Forces, nodes: np.ndarray) -> np.ndarray:
+    """Displacements (nodes, 3, 6) of nodes for unit motions of their bodies."""
+    p_BN_W = forces.nodes[:, kinematics.P_BN_W : kinematics.P_BN_W + 3]
+    return kinematics.rigid_motions(p_BN_W[nodes])
+
+
+def _pieces(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
+    """The straight pieces of routed cables as springs that resist displacements across them, by
+    their tension. `carriers` (nodes,) is the index of each node's body."""
+    routes = robot.cables.routes
+    path_of = np.repeat(np.arange(len(routes.first) - 1), np.diff(routes.first))
+    begins = np.flatnonzero(np.diff(path_of, append=-1) == 0)
+    node_a, node_b = routes.nodes[begins], routes.nodes[begins + 1]
+    p_WN = forces.nodes[:, kinematics.P_WN : kinematics.P_WN + 3]
+    p_AB = p_WN[node_b] - p_WN[node_a]
+    length = np.linalg.norm(p_AB, axis=1)
+    direction = p_AB / length[:, None]
+    across = np.eye(3) - np.einsum("pi,pj->pij", direction, direction)
+    sideways = forces.cable_forces[path_of[begins], cable.TENSION] / length
+    motion_a, motion_b = _motions(forces, node_a), -_motions(forces, node_b)
+    stiffness = sideways[:, None, None] * across
+    return Springs(carriers[node_a], carriers[node_b], motion_a, motion_b, stiffness)
+
+
+def _paths(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
+    """The stiffness of routed cables along their paths, as springs between all pairs of nodes on a
+    path, also of a node and itself. The displacements (2,) are the parts of both nodes in the
+    change of the cable's length. `carriers` (nodes,) is the index of each node's body."""
+    routes, lengthwise = robot.cables.routes, _lengthwise(robot, forces)
+    pairs, stiffness = [], []
+    for path in np.flatnonzero(np.diff(routes.first)):
+        rows = range(routes.first[path], routes.first[path + 1])
+        for a, b in itertools.combinations_with_replacement(rows, 2):
+            pairs.append((a, b))
+            stiffness.append(lengthwise[path] * np.array([[a == b, a != b], [a != b, 0.0]]))
+    of_pairs = np.array(pairs, dtype=int).reshape(-1, 2)
+    parts = np.einsum("ki,kij->kj", forces.route_slopes, _motions(forces, routes.nodes))
+    motion_a, motion_b = np.zeros((2, len(of_pairs), 2, 6))
+    motion_a[:, 0], motion_b[:, 1] = parts[of_pairs].transpose(1, 0, 2)
+    body_a, body_b = carriers[routes.nodes[of_pairs]].T
+    return Springs(body_a, body_b, motion_a, motion_b, np.reshape(stiffness, (-1, 2, 2)))
+
+
+def _joints(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
+    """The joints as springs. `carriers` (nodes,) is the index of each node's body."""
+    joints = robot.joints
+    return Springs(
+        carriers[joints.node_a],
+        carriers[joints.node_b],
+        _motions(forces, joints.node_a),
+        -_motions(forces, joints.node_b),
+        joints.stiffness[:, None, None] * np.eye(3),
     )
 
 
@@ -133,11 +199,12 @@ def _stiffness_of_touch(
     touch: capsules.Touch, axes: Axes, reach: float, stiffness: float
 ) -> np.ndarray:
     """Second derivatives (12, 12), in N/m, of the energy of a contact of struts, with respect to
-    the displacements of their ends.
+    the displacements of their ends: start and end of the first strut, then of the second.
 
-    `reach` (m) is the sum of the radii, `stiffness` (N/m) the one of the contact. Half the squared
-    distance, D² / 2, is the minimum of a function of the positions s and t along the axes; see
-    laws.capsules. Its second derivatives are those at fixed positions, less what the positions gain
+    `touch` is the contact, `axes` the geometry of the struts, `reach` (m) the sum of their radii,
+    `stiffness` (N/m) the stiffness of the contact. D is the distance of the struts. D² / 2 is the
+    minimum of a function of the positions s and t along the axes; see laws.capsules. The second
+    derivatives of the minimum are the second derivatives at fixed s and t, less what s and t gain
     as they move. A position at the end of a strut does not move.
     """
     s, t, gradient = touch.s, touch.t, np.concatenate(touch.gradient)

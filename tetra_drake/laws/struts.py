@@ -26,6 +26,10 @@ class Struts(NamedTuple):
     """Index of the node at one end (struts,)."""
     node_b: Table
     """Index of the node at the other end (struts,)."""
+    place_a: Table
+    """Number of the place of node a (struts,). Nodes that joints hold together have one place."""
+    place_b: Table
+    """Number of the place of node b (struts,)."""
     first_strut: Table
     """Index of each body's first strut (bodies + 1,); the last number is the number of struts."""
     length: Table
@@ -66,7 +70,7 @@ def axes_of(struts: Struts, nodes: Table, i: int, j: int) -> Axes:
 def nearest_on_line(axes: Axes) -> Real:
     """Position along the first axis that is nearest to the line of the second: 0 at its start, 1 at
     its end (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9). Both axes count as
-    endless lines, so it may be below 0 or above 1."""
+    endless lines, so the result may be below 0 or above 1."""
     uu_vv = axes.uu * axes.vv
     square_of_sine = maximum(uu_vv - axes.uv * axes.uv, _PARALLEL * uu_vv)
     return (axes.uv * axes.vr - axes.ur * axes.vv) / square_of_sine
@@ -74,7 +78,8 @@ def nearest_on_line(axes: Axes) -> Real:
 
 @inlined
 def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
-    """Positions along both axes, 0 to 1, that are nearest to each other.
+    """Positions along both axes that are nearest to each other, first of the first axis, then of
+    the second: 0 at the start of an axis, 1 at its end.
 
     The argument `s` is the result of nearest_on_line(). If a position is beyond the end of its
     strut, the end is used, and the point of the other strut that is nearest to it.
@@ -101,6 +106,17 @@ def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
 
 
 @inlined
+def are_joined(struts: Struts, i: int, j: int) -> bool:
+    """True if a joint holds ends of struts i and j together, so that they cannot be apart."""
+    a, b = struts.place_a[i], struts.place_b[i]
+    return (
+        a == struts.place_a[j]
+        or a == struts.place_b[j]
+        or (b == struts.place_a[j] or b == struts.place_b[j])
+    )
+
+
+@inlined
 def share(x: Real) -> Real:
     """Clamps a number to the range from 0 to 1."""
     return minimum(maximum(x, 0.0), 1.0)
@@ -108,8 +124,8 @@ def share(x: Real) -> Real:
 
 @inlined
 def origin(state: Table, body: int) -> Vector3:
-    """Position (m) of a body's origin in the world. `state` is [q; v] of all bodies (13
-    bodies,)."""
+    """Position (m) of a body's origin in the world. `state` is [q; v] of all bodies
+    (13*bodies,)."""
     return state[7 * body + 4], state[7 * body + 5], state[7 * body + 6]
 
 
@@ -137,11 +153,11 @@ def least_strut_distance(
     struts: Struts, radius: Table, first_node: Table, state: Table, nodes: Table, least: Real
 ) -> Real:
     """Least distance (m) between the axes of struts of different bodies, or `least` (m) if that is
-    smaller.
+    smaller. Struts with a common joint do not count.
 
-    `radius` (bodies,) are radii of spheres around the bodies. `state` is [q; v] (13*bodies,),
-    `nodes` the table of laws.kinematics for this state. `first_node` is the index of each body's
-    first node.
+    `radius` (bodies,) are radii of spheres around the bodies. `first_node` is the index of each
+    body's first node (bodies + 1,); the last number is the index of the first fixed node. `state`
+    is [q; v] (13*bodies,), `nodes` the table of laws.kinematics for this state.
     """
     for first in range(radius.size):
         for second in range(first + 1, radius.size):
@@ -162,6 +178,6 @@ def least_strut_distance(
                 for b in range(struts.first_strut[second], struts.first_strut[second + 1]):
                     apart = difference(midpoint_a, midpoint(struts, nodes, b))
                     reach = 0.5 * (struts.length[a] + struts.length[b])
-                    if may_be_nearer(apart, reach, least):
+                    if may_be_nearer(apart, reach, least) and not are_joined(struts, a, b):
                         least = minimum(least, strut_distance(struts, nodes, a, b))
     return least

@@ -24,6 +24,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import length_rates
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 
 COMMAND, EXPECTED, LIMITS_FILE = "command.csv", "expected.csv", "limits.csv"
@@ -53,20 +54,21 @@ class Loads(NamedTuple):
 def export(
     scenario: GivenScenario, gait: GivenGait, out: str | Path, *, rate: float = 100.0
 ) -> str:
-    """Simulates a gait and writes it as commands for the actuators of a prototype. Returns a text,
-    the verdict.
+    """Simulates a gait and writes it as commands for the actuators of a prototype. Returns the
+    verdict, a text.
 
         >>> print(td.export(td.load_scenario("quick"), "gait.json", "prototype"))
 
     The verdict has the loads on the actuators, whether the actuators can bear them, and the
-    distance when the written commands are simulated. With feedback, the commands are the signals of
-    this one simulation.
+    distance that the robot walks if the written commands are simulated. For a gait with feedback,
+    the commands are recorded in this one simulation; the prototype's sensors do not change them.
 
     Args:
         scenario: a scenario, its name or file, or a run.
         gait: a gait, its file, or a run; a run means its best gait.
         out: the new folder. See the command `tetra-drake export` for its files.
-        rate: samples per second (Hz) in the files.
+        rate: samples per second (Hz) in the files, at most one per `cpg.listing_step`. The
+            duration of the simulation must be a whole number of samples.
 
     Raises:
         InputError: if an argument cannot be used.
@@ -115,16 +117,15 @@ def export(
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
-    """Loads on the actuators in a simulated motion: forces, speeds, travel and power of each driven
-    cable, and where a limit of the actuator binds."""
+    """Loads on the actuators in a simulated motion, from its recorded `trajectory`: forces, speeds,
+    travel and power of each driven cable, and at which times a limit of the actuator binds."""
     kind, constants = robot.scenario.actuation, robot.model.actuator
     cables, limits = robot.structure.cables[robot.driven], actuator.Limits(*constants.limits)
     walk = trajectory.isel(cable=robot.driven)
     law, length, tension = CableLaw.of(cables), walk.length.values, walk.tension.values
     signal = trajectory.signal.values[:, cables["signal"]]
-    a, b = cables["node_a"], cables["node_b"]
-    p_WN, v_WN = trajectory.p_WN.values, trajectory.v_WN.values
-    rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
+    rate = length_rates(robot.structure, trajectory.p_WN.values, trajectory.v_WN.values)
+    rate = rate[:, robot.driven]
     driven = actuator.DrivenCables(law, signal, length, rate, tension, walk.free_length.values)
 
     load, left, drives = tension, length, kind.drives(driven)
@@ -162,7 +163,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
 
 def load_verdict(loads: Loads, result: SimulationResult) -> str:
     """Text about the loads on the actuators in a simulation: greatest loads, limits, and whether
-    the actuators can play the gait without reaching a limit."""
+    the actuators can play the gait without reaching a limit. `result` is the recorded simulation
+    from which the loads were computed."""
     worst = loads.table.drop(columns="time_at_a_limit_percent").max()
     worst["least_length_mm"] = loads.table["least_length_mm"].min()
     table = worst.dropna().to_string(float_format=fixed)

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
-from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.scenario.blueprint import Blueprint, GivenInertia
 
 ROUNDING = 1e-12
 """Threshold for rounding errors: smaller coordinates (relative to the size of a body) and products
@@ -32,12 +32,13 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
     """Inertia of the bodies of a blueprint.
 
     Returns masses (bodies,) in kg, centres of mass (bodies, 3) in m in the blueprint's body frames
-    F, and unit inertias (bodies, 6) in m², as in Structure.unit_inertia.
+    F, and unit inertias (bodies, 6) in m²: xx, yy, zz, xy, xz, yz about the centre of mass, divided
+    by the mass.
     """
     made: dict[tuple[bytes, ...], Inertia] = {}  # equal bodies share one
     inertias = []
     node_a = blueprint.struts[:, 0]
-    for first, end in itertools.pairwise(blueprint.first_node.tolist()):
+    for body, (first, end) in enumerate(itertools.pairwise(blueprint.first_node.tolist())):
         nodes, struts = slice(first, end), (first <= node_a) & (node_a < end)
         parts = (
             blueprint.p_FN[nodes],
@@ -51,7 +52,8 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
         key = tuple(part.tobytes() for part in parts)
         if key not in made:
             made[key] = _body_inertia(*parts)
-        inertias.append(made[key])
+        given = blueprint.given_inertia.get(body)
+        inertias.append(_replaced(made[key], given) if given else made[key])
     masses, centres, units = (np.array(values) for values in zip(*inertias, strict=True))
     mass = masses + blueprint.payload  # a point mass at the centre of mass
     return mass, centres, (masses / mass)[:, np.newaxis] * units
@@ -59,6 +61,15 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 Inertia: TypeAlias = tuple[float, np.ndarray, np.ndarray]
 """Mass, centre of mass (3,), and unit inertia (6,) about it."""
+
+
+def _replaced(parts: Inertia, given: GivenInertia) -> Inertia:
+    """Inertia of a body that follows from its parts, with what is given in its place. The inertia
+    about the centre of mass is proportional to the mass unless it is given."""
+    mass, centre, unit = parts
+    mass = mass if given.mass is None else given.mass
+    centre = centre if given.centre is None else given.centre
+    return mass, centre, unit if given.inertia is None else given.inertia / mass
 
 
 def _body_inertia(
@@ -71,8 +82,11 @@ def _body_inertia(
     node_mass: np.ndarray,
 ) -> Inertia:
     """Inertia of one body: of its struts (solid cylinders), and of spheres and point masses at its
-    nodes. `struts` (struts, 2) has the two nodes of each strut, counted within the body. Numbers
-    that are rounding errors become 0."""
+    nodes. Numbers that are rounding errors become 0.
+
+    All arguments are in SI units. `p_FN` (nodes, 3) are the positions of the body's nodes, and
+    `struts` (struts, 2) the indices of the two nodes of each strut in it.
+    """
     total, along = SpatialInertia.Zero(), [0.0, 0.0, 1.0]
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
         if density > 0.0:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.laws.kinematics import rigid_motions
+from tetra_drake.scenario.blueprint import Segments
 
 TOLERANCE = 1e-6
 """Singular values below this share of the greatest count as zero. Lengths are in units of the
@@ -35,24 +36,30 @@ def find_statics(
     *,
     p_WN: np.ndarray,
     body_of_node: np.ndarray,
-    cable_ends: np.ndarray,
+    segments: Segments,
     held: np.ndarray | None = None,
+    joints: np.ndarray | None = None,
 ) -> Statics:
-    """Self-stress states and mechanisms of rigid bodies joined by cables.
+    """Self-stress states and mechanisms of rigid bodies joined by cables and ball joints.
 
-    `held` (nodes, 3) is True for each axis of a node along which the world holds it; by default
-    nothing is held. For the other arguments see cable_wrenches().
+    `held` (nodes, 3) is True where an anchor holds a node along the world's x, y or z axis; by
+    default nothing is held. `joints` (joints, 2) has the two nodes of each joint. For the other arguments
+    see cable_wrenches().
     """
     held = np.zeros(p_WN.shape, dtype=bool) if held is None else held
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
-    wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
+    wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, segments=segments)
     bodies, nodes = body_of_node.max() + 1, np.arange(len(p_WN))
     motions = np.zeros((nodes.size, 3, bodies + 1, 6))  # of nodes, by body and its motions
     motions[nodes, :, body_of_node] = rigid_motions(p_WN)
     motions = motions[:, :, :bodies].reshape(nodes.size, 3, 6 * bodies)
-    allowed = null_space(motions[held], TOLERANCE)
+    constraints = motions[held]
+    if joints is not None:
+        apart = motions[joints[:, 0]] - motions[joints[:, 1]]
+        constraints = np.concatenate([constraints, apart.reshape(-1, 6 * bodies)])
+    allowed = null_space(constraints, TOLERANCE)
     self_stresses = null_space(allowed.T @ wrenches, TOLERANCE)
-    rank = len(cable_ends) - self_stresses.shape[1]
+    rank = wrenches.shape[1] - self_stresses.shape[1]
 
     idle = []  # spins of straight bodies about their axes; of points about all axes
     for body in range(bodies):
@@ -71,16 +78,14 @@ def find_statics(
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
-    """Orthonormal basis (n, vectors) of the vectors that a matrix (m, n) maps to 0. Singular values
-    up to a share `tolerance` of the greatest count as 0."""
+    """Orthonormal basis (n, vectors), in columns, of the vectors that a matrix (m, n) maps to 0.
+    Singular values up to `tolerance` times the greatest one count as 0."""
     _, singular_values, rows = np.linalg.svd(matrix)
     greatest = singular_values.max(initial=0.0)
     return np.asarray(rows[np.count_nonzero(singular_values > tolerance * greatest) :].T)
 
 
-def cable_wrenches(
-    *, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray
-) -> np.ndarray:
+def cable_wrenches(*, p_WN: np.ndarray, body_of_node: np.ndarray, segments: Segments) -> np.ndarray:
     """Wrenches (6*B, cables) of cables with unit tension on B bodies.
 
     The six rows of a body are the torque about the world's origin (N m per N), then the force, both
@@ -89,14 +94,15 @@ def cable_wrenches(
     Args:
         p_WN: positions of the nodes (nodes, 3) in m.
         body_of_node: index of the body of each node (nodes,); -1 for a fixed node.
-        cable_ends: indices of the two nodes of each cable (cables, 2).
+        segments: straight pieces of the cables. A cable that runs over rings has several.
     """
-    cables, (node_a, node_b) = np.arange(len(cable_ends)), cable_ends.T
+    cables, (node_a, node_b) = segments.cable, segments.ends.T
     force = p_WN[node_b] - p_WN[node_a]
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     wrench = np.hstack([np.cross(p_WN[node_a], force), force])
     bodies = body_of_node.max() + 1
-    wrenches = np.zeros((bodies + 1, 6, len(cables)))  # the last wrenches are on the world
-    wrenches[body_of_node[node_a], :, cables] = wrench
-    wrenches[body_of_node[node_b], :, cables] = -wrench
-    return wrenches[:bodies].reshape(6 * bodies, len(cables))
+    count = cables.max(initial=-1) + 1
+    wrenches = np.zeros((bodies + 1, count, 6))  # the last wrenches are on the world
+    np.add.at(wrenches, (body_of_node[node_a], cables), wrench)
+    np.add.at(wrenches, (body_of_node[node_b], cables), -wrench)
+    return wrenches[:bodies].transpose(0, 2, 1).reshape(6 * bodies, count)

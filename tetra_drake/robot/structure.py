@@ -23,7 +23,7 @@ from pydrake.multibody.tree import (
 )
 
 from tetra_drake.laws import cable, kinematics
-from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, NodeLoads
+from tetra_drake.laws.model import WORLD, AnchorSprings, Couplings, Joints, NodeLoads
 from tetra_drake.laws.struts import Struts
 from tetra_drake.robot.bodies import body_inertias, strut_pose
 from tetra_drake.robot.equilibrium import Equilibrium
@@ -74,8 +74,8 @@ class Structure(Blueprint):
 
     def turned(self, slope: float) -> Self:
         """A copy of the structure that stands on an incline as it did on flat ground. The incline
-        rises by `slope` (rad) along x; all bodies turn about the world's y axis through the
-        origin."""
+        rises by the angle `slope` (rad) along x, falls if it is negative. All bodies are rotated
+        about the world's y axis through the origin."""
         # Written out, because processors round a product of matrices differently.
         s, c = math.sin(slope), math.cos(slope)
         forward, left, up = self.p_WB.T
@@ -88,7 +88,8 @@ class Structure(Blueprint):
     @functools.cached_property
     def cables(self) -> np.ndarray:
         """Cables with their nodes, signals and constants: records (cables,) of dtype
-        laws.cable.CABLE. The signal of a cable without actuator is PASSIVE."""
+        laws.cable.CABLE. Their `signal` is the index of the oscillator that drives the cable, or
+        laws.cable.PASSIVE without actuator."""
         cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
         cables["signal"] = cable.PASSIVE
@@ -100,16 +101,22 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def strut_table(self) -> Struts:
-        """Struts as arrays for the kernels."""
+        """Struts as arrays for the kernels: nodes, lengths (m), radii (m)."""
         node_a, node_b = self.struts.T
-        first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
-        length = np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1)
-        return Struts(node_a.copy(), node_b.copy(), first, length, radius=self.strut_radius)
+        return Struts(
+            node_a.copy(),
+            node_b.copy(),
+            place_a=self.places[node_a],
+            place_b=self.places[node_b],
+            first_strut=np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1)),
+            length=np.linalg.norm(self.p_BN[node_b] - self.p_BN[node_a], axis=1),
+            radius=self.strut_radius,
+        )
 
     @property
     def least_radius(self) -> float:
-        """Radius (m) of the thinnest strut, or a hundredth of the size of a robot without struts.
-        Shapes that are drawn have at least this radius."""
+        """Radius (m) of the thinnest strut. Without struts it is a hundredth of the robot's largest
+        extent along an axis. Shapes that are drawn have at least this radius."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return float(self.strut_radius.min()) if self.strut_radius.size else size / SLENDERNESS
 
@@ -121,19 +128,22 @@ class Structure(Blueprint):
         return np.asarray(np.maximum.reduceat(distances, self.first_node[:-1]))
 
     def strut_name(self, strut: int) -> str:
-        """Name of a strut: the names of its two nodes."""
+        """Name of the strut with the index `strut`: the names of its two nodes, with a space in
+        between."""
         return " ".join(self.node_names[node] for node in self.struts[strut])
 
     @property
     def couplings(self) -> Couplings:
-        """Pairs of bodies that cables join, in the order of the cables, for kernels that go through
-        the cables pair by pair. Raises ValueError if the cables of a pair are not next to each
-        other, or cables from fixed nodes are not first."""
-        pairs = self.carriers[self.cable_ends]
+        """Pairs of bodies that straight cables join, in the order of the cables, for kernels that
+        go through the cables pair by pair. Raises ValueError if the cables of a pair are not next
+        to each other, cables from fixed nodes are not first, or routed cables are not last."""
+        straight = len(self.cable_ends) - len(self.cable_rings)
+        pairs = self.carriers[self.cable_ends[:straight]]
         held = int(np.count_nonzero(pairs[:, 0] == WORLD))
         begins = held + np.flatnonzero(np.any(np.diff(pairs[held:], axis=0, prepend=-1), axis=1))
         first, second = pairs[begins].T
         is_ordered = (pairs[:held, 0] == WORLD).all() and (first < second).all()
+        is_ordered &= min(self.cable_rings, default=straight) >= straight
         if not is_ordered or len(np.unique(pairs[held:], axis=0)) < len(begins):
             raise ValueError("the cables are not in the order of the bodies that they join")
         first_cable, held_bodies = np.append(begins, len(pairs)), pairs[:held, 1].copy()
@@ -153,6 +163,13 @@ class Structure(Blueprint):
         )
 
     @property
+    def joint_springs(self) -> Joints:
+        """Springs that hold the nodes of ball joints together, for kernels."""
+        node_a, node_b = self.joints.T.copy()
+        body_a, body_b = self.carriers[node_a], self.carriers[node_b]
+        return Joints(node_a, node_b, body_a, body_b, self.joint_stiffness, self.joint_damping)
+
+    @property
     def loads(self) -> NodeLoads:
         """The constant forces (N) on nodes from the settings; only the nodes with a load."""
         nodes = np.flatnonzero(self.node_load.any(axis=1))
@@ -160,8 +177,9 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def node_shares(self) -> np.ndarray:
-        """Weights of the nodes (nodes,): the weighted sum of node positions is the centre of mass
-        in every pose of the bodies. Fixed nodes have the weight 0."""
+        """Factors of the nodes (nodes,), without unit, for the robot's centre of mass: in every
+        pose of the bodies it is the sum of the node positions times these factors. They are 0 for
+        fixed nodes, and may be negative."""
         *of_bodies, fixed = np.split(self.p_BN, self.first_node[1:])
         shares = []
         for p_BN, mass in zip(of_bodies, self.mass, strict=True):
@@ -187,34 +205,46 @@ class Structure(Blueprint):
     @property
     def initial_lengths(self) -> np.ndarray:
         """Lengths of the cables (cables,) in m at t = 0."""
-        node_a, node_b = node_positions(self, self.initial_state)[self.cable_ends.T]
-        return np.asarray(np.linalg.norm(node_b - node_a, axis=1))
+        node_a, node_b = node_positions(self, self.initial_state)[self.segments.ends.T]
+        return self.along_cables(np.linalg.norm(node_b - node_a, axis=1))
 
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
-    """Positions of the points whose motion is shown: the markers (..., markers, 3) among the nodes
-    p_WN (..., nodes, 3). A structure without markers is shown by its centre of mass (..., 1, 3)."""
+    """Positions in m of the points whose motion is shown: of the structure's markers (..., markers,
+    3), which are some of the nodes p_WN (..., nodes, 3). Without markers it is the centre of mass
+    (..., 1, 3)."""
     if structure.markers.size:
         return p_WN[..., structure.markers, :]
     return (structure.node_shares @ p_WN)[..., np.newaxis, :]
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Positions p_WN (nodes, 3) of the nodes in m, for a state (13*n,) of the bodies."""
+    """Positions p_WN (nodes, 3) of the nodes in m, for a state [q; v] (13*n,) of the n bodies."""
     return moved_nodes(structure, state)[:, kinematics.P_WN : kinematics.P_WN + 3]
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Table `nodes` of laws.kinematics (nodes, NODE_COLUMNS) for a state (13*n,) of the bodies:
-    positions and velocities. The forces are 0."""
+    """Table `nodes` of laws.kinematics (nodes, NODE_COLUMNS) for a state [q; v] (13*n,) of the n
+    bodies: positions (m) and velocities (m/s) in the world. Its columns of forces are 0."""
     nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
     kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
 
 
+def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
+    """Rates (times, cables) of the cables' lengths in m/s, from positions and velocities of the
+    nodes (times, nodes, 3) in m and m/s."""
+    ends = structure.segments.ends
+    p_AB, v_AB = (x[:, ends[:, 1]] - x[:, ends[:, 0]] for x in (p_WN, v_WN))
+    rates = np.zeros((len(structure.cable_names), len(p_WN)))
+    of_pieces = (p_AB * v_AB).sum(axis=2) / np.linalg.norm(p_AB, axis=2)
+    np.add.at(rates, structure.segments.cable, of_pieces.T)
+    return rates.T
+
+
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
-    """Adds the bodies of a structure, as free bodies, to a plant that is not finalized. If the
-    plant has a SceneGraph, struts and spheres are shown."""
+    """Adds the bodies of a structure, as free bodies, to a plant that is not finalized, and returns
+    them in the structure's order. If the plant has a SceneGraph, struts and spheres are shown."""
     given = zip(structure.bodies, structure.mass, structure.unit_inertia, strict=True)
     bodies = [
         plant.AddRigidBody(name, SpatialInertia(mass, np.zeros(3), UnitInertia(*unit)))
@@ -229,7 +259,8 @@ def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
 
 
 class Shape(NamedTuple):
-    """Visible shape of a body: a cylinder along the z axis of its frame S, or a sphere."""
+    """Visible shape fixed to a body: a cylinder along the z axis of the shape's frame S, or a
+    sphere about the origin of S."""
 
     name: str
     body: int

@@ -5,8 +5,9 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,13 +38,33 @@ LEAST_DISTANCE = 1e-3
 """Least distance between two nodes, as a share of the shortest strut."""
 
 
+class Segments(NamedTuple):
+    """Straight pieces of the cables. A straight cable has one, a routed cable several."""
+
+    ends: np.ndarray
+    """Indices of the two nodes of each piece (pieces, 2)."""
+    cable: np.ndarray
+    """Index of the cable of each piece (pieces,), ascending."""
+
+
+class GivenInertia(NamedTuple):
+    """Mass, centre of mass and inertia of a body that are given in place of what follows from its
+    parts; SI units. What is not given is None."""
+
+    mass: float | None
+    centre: np.ndarray | None
+    """Position (3,) of the centre of mass in the blueprint's frame F of the body."""
+    inertia: np.ndarray | None
+    """Moments and products of inertia (6,) about the centre of mass: xx, yy, zz, xy, xz, yz."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Blueprint:
     """Geometry and constants of a robot, computed from its settings; SI units.
 
     Nodes and struts are in the order of the bodies. Then come fixed nodes, which belong to no body:
-    the world holds them where they are. Left and right are the two sides of the plane
-    y = 0; mirror images are with respect to this plane.
+    the world holds them where they are. Left is y > 0, right is y < 0; mirror images are with
+    respect to the plane y = 0.
     """
 
     bodies: tuple[str, ...]
@@ -94,8 +115,8 @@ class Blueprint:
     cable_keys: tuple[str, ...]
     """Keys of the cables in the settings, such as "cables.side.pairs[0]", for error messages."""
     cable_ends: np.ndarray
-    """Indices of the two nodes of each cable (cables, 2). The node of the body with the lower index
-    comes first."""
+    """Indices of the two end nodes of each cable (cables, 2). The node of the body with the lower
+    index comes first."""
     cable_laws: tuple[Mapping[str, float], ...]
     """Constants of each cable's force law, by the names of laws.cable.CableLaw."""
     slack: bool
@@ -106,6 +127,20 @@ class Blueprint:
     """Names of the m oscillators, such as "T1-T2"."""
     groups: tuple[tuple[int, ...], ...] = ()
     """Indices of the cables that each oscillator drives (m)."""
+    cable_rings: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    """Inner nodes of each cable that runs over rings, from its first end to its second, by the
+    index of the cable. Such cables come after all straight ones."""
+    joints: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), dtype=int))
+    """Indices of the two nodes of each ball joint (joints, 2), nodes of two bodies at one place.
+    The node of the body with the lower index comes first."""
+    joint_keys: tuple[str, ...] = ()
+    """Keys of the joints in the settings, such as "joints.knee", for error messages."""
+    joint_stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """Stiffness of the springs that hold the nodes of a joint together (joints,)."""
+    joint_damping: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    """Damping of the springs that hold the nodes of a joint together (joints,)."""
+    given_inertia: Mapping[int, GivenInertia] = field(default_factory=dict)
+    """Given mass, centre and inertia, by the index of the body."""
     markers: np.ndarray = field(default_factory=lambda: np.array([], dtype=int))
     """Indices of the nodes whose motion is shown (markers,), in the order of the bodies. Empty if
     the motion of the centre of mass is shown."""
@@ -125,6 +160,35 @@ class Blueprint:
         fixed = len(self.node_names) - len(of_bodies)
         return np.pad(of_bodies, (0, fixed), constant_values=WORLD)
 
+    @functools.cached_property
+    def segments(self) -> Segments:
+        """Straight pieces of the cables, in the order of the cables."""
+        paths = [
+            [first, *self.cable_rings.get(cable, ()), last]
+            for cable, (first, last) in enumerate(self.cable_ends.tolist())
+        ]
+        ends = [pair for path in paths for pair in itertools.pairwise(path)]
+        cables = [cable for cable, path in enumerate(paths) for _ in path[1:]]
+        return Segments(np.array(ends, dtype=int).reshape(-1, 2), np.array(cables, dtype=int))
+
+    def along_cables(self, of_pieces: np.ndarray) -> np.ndarray:
+        """Sums (cables,) of numbers of the straight pieces (pieces,) along each cable."""
+        return np.bincount(self.segments.cable, of_pieces, minlength=len(self.cable_names))
+
+    def bodies_at(self, cables: Sequence[int]) -> set[int]:
+        """Indices of the bodies that some cables join, also at rings; WORLD for fixed nodes."""
+        pieces = self.segments.ends[np.isin(self.segments.cable, cables)]
+        return set(self.carriers[pieces].ravel().tolist())
+
+    @functools.cached_property
+    def places(self) -> np.ndarray:
+        """Number of the place of each node (nodes,). Nodes that joints hold together have the same
+        number; otherwise it is the node's index."""
+        places = np.arange(len(self.node_names))
+        for first, second in self.joints:
+            places[places == places[second]] = places[first]
+        return places
+
     @property
     def body_of_node(self) -> tuple[str, ...]:
         """Name of the body of each node; "world" for a fixed node."""
@@ -133,7 +197,8 @@ class Blueprint:
 
     @property
     def held(self) -> np.ndarray:
-        """True for each axis of a node along which the world holds it (nodes, 3)."""
+        """Whether the world holds each node along x, y and z, as Booleans (nodes, 3): by the spring
+        of an anchor or, for a fixed node, along all axes."""
         is_fixed = self.carriers == WORLD
         return is_fixed[:, np.newaxis] | (self.anchor_stiffness > 0.0)
 
@@ -144,8 +209,9 @@ class Blueprint:
 
     @property
     def scale(self) -> float:
-        """Factor by which lengths such as margins of figures grow or shrink with the robot; 1 for
-        robots of 0.1 m to 1 m (USUAL_SIZES)."""
+        """Factor by which lengths such as margins of figures grow or shrink with the robot: 1 for
+        robots of 0.1 m to 1 m, 3 for 3 m, 0.5 for 0.05 m. The size is the largest extent along an
+        axis."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return size / min(max(size, USUAL_SIZES[0]), USUAL_SIZES[1]) or 1.0  # a point has no size
 
@@ -158,20 +224,26 @@ class Blueprint:
     def sides(self) -> np.ndarray:
         """Side of each oscillator's cables (oscillators,): 1.0 if the middles of all of them are on
         the left, -1.0 on the right, 0.0 otherwise."""
-        y, least = self.p_WN[self.cable_ends].mean(axis=1)[:, 1], self._least_distance
+        middles, least = self.p_WN[self.segments.ends].mean(axis=1)[:, 1], self._least_distance
+        y = np.bincount(self.segments.cable, middles) / np.bincount(self.segments.cable)
         is_left = [(y[list(cables)] > least).all() for cables in self.groups]
         is_right = [(y[list(cables)] < -least).all() for cables in self.groups]
         return np.array(is_left, dtype=float) - np.array(is_right, dtype=float)
 
     @property
     def images(self) -> tuple[int | None, ...]:
-        """For each oscillator, the index of the oscillator that drives the mirror images of its
-        cables; None if there is none."""
-        ends = self.p_WN[self.cable_ends]
+        """For each oscillator, the index of the oscillator that drives exactly the mirror images of
+        its cables in the plane y = 0, such as itself; None if there is none."""
+        middles = [
+            self.p_WN[self.segments.ends[self.segments.cable == cable]].mean(axis=(0, 1))
+            for cable in range(len(self.cable_ends))
+        ]
+        middle = np.reshape(middles, (-1, 1, 3))
+        paths = np.concatenate([self.p_WN[self.cable_ends], middle], axis=1)
         image_of_cable: list[int] = []
-        for mirrored, group in zip(ends * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
-            forward = np.abs(ends - mirrored).max(axis=(1, 2))
-            backward = np.abs(ends - mirrored[::-1]).max(axis=(1, 2))
+        for mirrored, group in zip(paths * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
+            forward = np.abs(paths - mirrored).max(axis=(1, 2))
+            backward = np.abs(paths - mirrored[[1, 0, 2]]).max(axis=(1, 2))
             found = np.flatnonzero(np.minimum(forward, backward) <= self._least_distance).tolist()
             # Of parallel cables, the image is one of the same group.
             alike = [cable for cable in found if self.cable_groups[cable] == group]
@@ -182,12 +254,14 @@ class Blueprint:
         return tuple(groups.index(cables) if cables in groups else None for cables in images)
 
     def check(self) -> None:
-        """Raises InputError, naming the key, if the robot cannot be simulated."""
+        """Raises InputError, naming the key of the robot's settings, if it cannot be simulated."""
         self.check_sizes()
         self._check_bodies()
         self._check_cables()
 
         sizes = np.diff(self.first_node)
+        self._check_joints()
+
         is_bent = sizes[self.carriers[self.struts[:, 0]]] > 2
         for strut in np.flatnonzero(is_bent & np.isfinite(self.strut_stiffness)):
             _, group, _ = self.strut_keys[strut].split(".")
@@ -208,8 +282,8 @@ class Blueprint:
             refuse("contacts", "found none, expected one node at least")
 
     def check_sizes(self) -> None:
-        """Raises InputError if `offsets` or `payload` has not one item for each body, or if the
-        size of a strut is too extreme for the computation of forces."""
+        """Raises InputError if `offsets` or `payload` has not one item for each body, or if a strut
+        is too short, too long, too thin or too light for the computation of forces."""
         bodies = len(self.bodies)
         for key, items in (("offsets", self.offsets), ("payload", self.payload)):
             if len(items) != bodies:
@@ -229,7 +303,7 @@ class Blueprint:
                 refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
     def _check_bodies(self) -> None:
-        """Refuses bodies of hardly any mass, and two nodes at the same position.
+        """Raises InputError for bodies of hardly any mass, and for two nodes at the same position.
 
         The point masses of a body with several nodes do not count, as they have no inertia about
         the line between two of them.
@@ -241,6 +315,12 @@ class Blueprint:
         of_nodes[:moving] += np.where(np.repeat(sizes, sizes) == 1, self.node_mass[:moving], 0.0)
         mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
         np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
+        for body, given in self.given_inertia.items():
+            for key, value in (("centre", given.centre), ("inertia", given.inertia)):
+                if mass[body] < LIGHTEST and value is None:
+                    problem = "is missing, and no part of the body has mass and inertia"
+                    refuse(f"bodies.{self.bodies[body]}.{key}", problem)
+            mass[body] = mass[body] if given.mass is None else given.mass
         if mass.min() < LIGHTEST:
             node = self.first_node[mass.argmin()]
             without = "" if self.node_mass[node] else "without point masses "
@@ -251,25 +331,29 @@ class Blueprint:
         p_WN, least = self.p_WN, LEAST_DISTANCE * self.shortest
         for node in range(1, len(p_WN)):
             distances = np.linalg.norm(p_WN[:node] - p_WN[node], axis=1)
+            distances[self.places[:node] == self.places[node]] = np.inf
             if distances.min() < least:
                 problem = f"found the place of '{self.node_names[distances.argmin()]}'"
                 expected = f"expected nodes {least:.3g} m apart"
                 refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
 
     def _check_cables(self) -> None:
-        """Refuses cables that join no two bodies, bodies that no cables join to the others, and
-        tensions so high that the free length of a cable would be negative."""
-        pairs = self.carriers[self.cable_ends]
-        for key, (first, second) in zip(self.cable_keys, pairs.tolist(), strict=True):
-            if first == second == WORLD:
+        """Raises InputError for cables that do not join two bodies, or a body and the world; for
+        bodies that no cables, joints or anchors join to the others; and for a tension in the
+        settings so high that the free length of the cable would be negative."""
+        pairs = self.carriers[self.segments.ends]
+        for cable, key in enumerate(self.cable_keys):
+            first, *others = {*pairs[self.segments.cable == cable].ravel().tolist()}
+            if first == WORLD and not others:
                 refuse(key, "joins two fixed nodes, expected a node of a strut")
-            if first == second:
+            if not others:
                 problem = f"joins the body '{self.bodies[first]}' to itself"
                 refuse(key, f"{problem}, expected nodes of two bodies")
 
         joined = np.arange(len(self.bodies) + 1)  # equal numbers if joined; the last: the world
         anchored = self.carriers[self.held.any(axis=1)]
-        for first, second in [*pairs, *((WORLD, body) for body in anchored)]:
+        joints = self.carriers[self.joints]
+        for first, second in [*pairs, *joints, *((WORLD, body) for body in anchored)]:
             joined[joined == joined[first]] = joined[second]
         apart = np.flatnonzero(joined[:WORLD] != joined[0])
         if apart.size:
@@ -278,7 +362,8 @@ class Blueprint:
             )
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
-        for cable, length in enumerate(self._distances(self.cable_ends)):
+        lengths = self.along_cables(self._distances(self.segments.ends))
+        for cable, length in enumerate(lengths):
             law = CableLaw(**self.cable_laws[cable])
             if law.free_length < 0.0:
                 tension = round(elastic_tension(length - law.free_length, law), 12)
@@ -287,9 +372,26 @@ class Blueprint:
                 problem = f"found {tension} N, {expected}, where its free length is 0"
                 refuse(f"cables.{self.cable_groups[cable]}.tension", problem)
 
+    def _check_joints(self) -> None:
+        """Refuses joints of a body with itself or with the world, and nodes that are apart."""
+        apart = self._distances(self.joints)
+        joints = zip(self.joint_keys, self.joints, apart, strict=True)
+        for key, nodes, distance in joints:
+            names = " and ".join(f"'{self.node_names[node]}'" for node in nodes)
+            first, second = self.carriers[nodes]
+            if WORLD in (first, second):
+                refuse(key, f"found {names}, one of them fixed; expected an anchor for it instead")
+            if first == second:
+                problem = f"found {names} of the body '{self.bodies[first]}'"
+                refuse(key, f"{problem}, expected nodes of two bodies")
+            if distance > self._least_distance:
+                problem = f"found {names} {distance:.3g} m apart"
+                refuse(key, f"{problem}, expected two nodes at one place")
+
     @property
     def shortest(self) -> float:
-        """Length (m) of the shortest strut, or of the shortest cable if there are no struts."""
+        """Length (m) of the shortest strut, or of the shortest cable if there are no struts; 0 if
+        there are no cables either."""
         pairs = self.struts if len(self.struts) else self.cable_ends
         return float(self._distances(pairs).min()) if len(pairs) else 0.0
 

@@ -6,7 +6,8 @@ A vector over bodies has 6 numbers per body, rotation before translation, in the
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple, Self
+import itertools
+from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 
@@ -18,9 +19,9 @@ from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
-from tetra_drake.laws.model import Model
+from tetra_drake.laws.model import WORLD, Model
 from tetra_drake.laws.terrain import to_world
-from tetra_drake.laws.vectors import cross, put_vector, vector_at
+from tetra_drake.laws.vectors import cross, dot, put_vector, vector_at
 
 CABLES_AT_ONCE = 6
 """Number of cables of a pair of bodies whose damping is summed at once."""
@@ -30,34 +31,58 @@ U, W, D, WEIGHT, LINE_COLUMNS = 0, 3, 6, 9, 10
 add_cables()), the damping times the time, and the number of columns."""
 
 
+Pairs: TypeAlias = tuple[tuple[int, int], ...]
+
+
 class Solver(NamedTuple):
-    """Block layout and elimination order of the implicit matrix; see implicit_matrix()."""
+    """Positions of the 6 x 6 blocks of the implicit matrix in memory, and the order of elimination
+    of the bodies; see implicit_matrix()."""
 
     schedule: Schedule
     coupled: Table
     """Index of the block of each pair of coupled bodies (pairs,)."""
     fill: Table
-    """Indices of the blocks of fill-in, which only the elimination fills."""
+    """Indices of all other blocks of two bodies: of joints, routed cables and fill-in."""
+    jointed: Table
+    """Index of the block of each joint (joints,)."""
+    routed: Table
+    """Index of the block of each ordered pair of nodes on the path of a routed cable, one cable
+    after the other (pairs of path nodes,). -1 if a node is fixed, or if the pair in the other order
+    has the block."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """The solver for the coupled bodies of a robot."""
-        first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
-        return cls._of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
+        """The solver for a robot, whose bodies are coupled in pairs by cables and joints."""
+        couplings, joints, routes = robot.couplings, robot.joints, robot.cables.routes
+        body_of = np.full(len(robot.p_BN), WORLD)
+        sizes = np.diff(robot.first_node)
+        body_of[: robot.first_node[-1]] = np.repeat(np.arange(len(sizes)), sizes)
+        paths = np.split(body_of[routes.nodes], routes.first[1:-1])
+        on_paths = [pair for path in paths for pair in itertools.product(path.tolist(), repeat=2)]
+        return cls._of(
+            len(robot.bodies.mass),
+            tuple(zip(couplings.first.tolist(), couplings.second.tolist(), strict=True)),
+            tuple(zip(joints.body_a.tolist(), joints.body_b.tolist(), strict=True)),
+            tuple(on_paths),
+        )
 
     @classmethod
     @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
-    def _of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
-        schedule = Schedule.of(bodies, pairs)
-        blocks = schedule.blocks
-        coupled = np.array([blocks.pop(pair) for pair in pairs], dtype=np.int64)
-        return cls(schedule, coupled, fill=np.array(list(blocks.values()), dtype=np.int64))
+    def _of(cls, bodies: int, coupled: Pairs, jointed: Pairs, on_paths: Pairs) -> Self:
+        """The solver for the pairs of bodies that straight cables, joints and paths join."""
+        schedule = Schedule.of(bodies, [*coupled, *jointed, *(p for p in on_paths if p[0] < p[1])])
+        blocks = schedule.blocks | {(body, body): body for body in range(bodies)}
+        of_pairs = [
+            np.array([blocks.get(pair, -1) for pair in pairs], dtype=np.int64)
+            for pairs in (coupled, jointed, on_paths)
+        ]
+        fill = np.setdiff1d(np.arange(bodies, len(schedule.later)), of_pairs[0])
+        return cls(schedule, of_pairs[0], fill, jointed=of_pairs[1], routed=of_pairs[2])
 
 
 @inlined
 def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table) -> None:
-    """Writes the accelerations of bodies under forces `force` (6*bodies,) to `acceleration` (6
-    bodies,).
+    """Writes the accelerations (6*bodies,) of bodies under `force` (6*bodies,) to `acceleration`.
 
     Each body has 6 numbers, rotation before translation, in the world frame. `inertia_W` is
     Forces.inertia: the inertia of each body about the world's axes.
@@ -77,8 +102,8 @@ def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table
 
 @inlined
 def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tuple[Real, ...]:
-    """Momentum of body number `body`: its mass matrix times its velocity, part of `velocity` (6
-    bodies,).
+    """Momentum (6 numbers) of body number `body`: its mass matrix times its part of `velocity`
+    (6*bodies,), the velocities of all bodies.
 
     Each body has 6 numbers, rotation before translation, in the world frame. `inertia_W` is
     Forces.inertia: the inertia of each body about the world's axes.
@@ -105,18 +130,20 @@ def implicit_matrix(
     lines: Table,
     blocks: Table,
 ) -> None:
-    """Writes the implicit matrix of a step to `blocks`: mass matrix + time * damping matrix + time²
-    * stiffness of contacts and anchors.
+    """Writes the implicit matrix of a step, which multiplies the unknown velocity rates, to
+    `blocks`: mass matrix + time * damping matrix + time² * stiffness of contacts and anchors.
 
     `blocks` (blocks, 6, 6) has a block per body and per pair of coupled bodies; see module sparse.
-    `time` is in s, a share of the step. The damping of cables, normal forces and stiction makes the
-    equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
+    Of a symmetric block only the upper half is written. `state` and `modes` are at the beginning of
+    the step, and `forces` was computed for them. `time` is in s, a share of the step. The damping
+    of cables, normal forces and stiction makes the equations stiff. `lines` (CABLES_AT_ONCE,
+    LINE_COLUMNS) is scratch memory.
     """
     for body in range(robot.bodies.mass.size):
         for r in range(BLOCK):
             for c in range(r, BLOCK):
                 blocks[body, r, c] = 0.0
-    for i in range(solver.fill.size):
+    for i in range(solver.fill.size):  # the others are written by add_cables()
         for r in range(BLOCK):
             for c in range(BLOCK):
                 blocks[solver.fill[i], r, c] = 0.0
@@ -133,6 +160,13 @@ def implicit_matrix(
         add_diagonal(forces.nodes, node, body, diagonal, blocks)
         across = damping * x * y, damping * x * z, damping * y * z
         add_off_diagonal(forces.nodes, node, body, across, blocks)
+    add_routed_cables(robot, solver, forces, time, blocks)
+    joints = robot.joints
+    for i in range(joints.node_a.size):
+        k = time * (joints.damping[i] + time * joints.stiffness[i])
+        add_diagonal(forces.nodes, joints.node_a[i], joints.body_a[i], (k, k, k), blocks)
+        add_diagonal(forces.nodes, joints.node_b[i], joints.body_b[i], (k, k, k), blocks)
+        add_joint(forces.nodes, joints.node_a[i], joints.node_b[i], solver.jointed[i], k, blocks)
     for body in range(robot.bodies.mass.size):
         mass, inertia_W = robot.bodies.mass[body], forces.inertia
         if robot.isotropic:
@@ -173,12 +207,13 @@ def add_cables(
     lᵀ.
 
     `pair` is the number of a pair of bodies that cables join. At most CABLES_AT_ONCE (6) of its
-    cables are added, from cable `first` on. `time` is in s; `lines` is scratch memory, a row per
-    cable.
+    cables are added, from cable number `first` of the robot on. `time` is in s; `lines` is scratch
+    memory, a row per cable. The cables' directions and dampings are read from `forces`.
 
     The 12 numbers of l, times the velocities of both bodies, are the rate of the cable's length.
-    With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and w =
-    p_b x d. The sum over cables is a product of two columns of `lines`.
+    With the cable's direction d and its ends p_a and p_b, relative to the origins of their bodies,
+    l = (u, -d, w, d), u = d x p_a and w = p_b x d. The sum over cables is a product of two columns
+    of `lines`.
     """
     last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
     for j in range(CABLES_AT_ONCE):
@@ -223,8 +258,61 @@ def add_cables(
 
 
 @inlined
+def add_routed_cables(
+    robot: Model, solver: Solver, forces: Forces, time: Real, blocks: Table
+) -> None:
+    """Adds the damping of the routed cables to the implicit matrix `blocks`, as time * damping * l
+    lᵀ. `time` is in s.
+
+    A body's part of l is the sum of (p x s, s) over its nodes on the path, at p from its origin,
+    with the derivative s of the cable's length by the node's position.
+    """
+    routes, couplings, pair = robot.cables.routes, robot.couplings, 0
+    for i in range(couplings.first_cable[solver.coupled.size], robot.cables.signal.size):
+        damping = time * forces.cable_forces[i, TENSION_PER_RATE]
+        for a in range(routes.first[i], routes.first[i + 1]):
+            for b in range(routes.first[i], routes.first[i + 1]):
+                block = solver.routed[pair]
+                pair += 1
+                if block < 0:
+                    continue
+                l_a, l_b = of_path(forces, routes.nodes[a], a), of_path(forces, routes.nodes[b], b)
+                is_own = block < robot.bodies.mass.size
+                for r in range(BLOCK):
+                    for c in range(r if is_own else 0, BLOCK):
+                        blocks[block, r, c] += damping * l_a[r] * l_b[c]
+
+
+@inlined
+def of_path(forces: Forces, node: int, k: int) -> tuple[Real, ...]:
+    """Part of a node in the rate of a routed cable's length: its product with the velocity of the
+    node's body. `k` is the row of the node in `forces.route_slopes`."""
+    slope = vector_at(forces.route_slopes, k, 0)
+    return *cross(vector_at(forces.nodes, node, P_BN_W), slope), *slope
+
+
+@inlined
+def add_joint(nodes: Table, a: int, b: int, block: int, k: Real, blocks: Table) -> None:
+    """Adds -J_aᵀ k J_b of two nodes a and b to the block of their bodies in the implicit matrix.
+    For J see add_diagonal()."""
+    p_a, p_b = vector_at(nodes, a, P_BN_W), vector_at(nodes, b, P_BN_W)
+    across = dot(p_a, p_b)
+    for r in range(3):
+        for c in range(3):
+            blocks[block, r, c] += k * p_b[r] * p_a[c]
+        blocks[block, r, r] -= k * across
+        blocks[block, 3 + r, 3 + r] -= k
+    for r, c, after in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        blocks[block, r, 3 + c] += k * p_a[after]
+        blocks[block, c, 3 + r] -= k * p_a[after]
+        blocks[block, 3 + r, c] -= k * p_b[after]
+        blocks[block, 3 + c, r] += k * p_b[after]
+
+
+@inlined
 def put(value: Real, adds: bool, block: int, r: int, c: int, blocks: Table) -> None:
-    """Writes a number to row r and column c of a block, or adds it to the number there if `adds`.
+    """Writes a number to row r and column c of block number `block` of `blocks`, or adds it to the
+    number there if `adds`.
 
     If all blocks were set to zero first, to add only, a step would take 2 to 5 % longer.
     """
@@ -241,7 +329,8 @@ Column = tuple[Real, Real, Real, Real, Real, Real]
 
 @inlined
 def column(lines: Table, c: int) -> Column:
-    """Column c of `lines` (6, LINE_COLUMNS): a number for each of 6 cables."""
+    """Column c of the table `lines` (6, LINE_COLUMNS) of add_cables(): a number for each of 6
+    cables."""
     return lines[0, c], lines[1, c], lines[2, c], lines[3, c], lines[4, c], lines[5, c]
 
 
@@ -253,7 +342,7 @@ def weighted(w: Column, x: Column) -> Column:
 
 @inlined
 def product(x: Column, y: Column) -> Real:
-    """Scalar product of two columns."""
+    """Scalar product of two columns of add_cables(): a sum over 6 cables."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2] + x[3] * y[3] + x[4] * y[4] + x[5] * y[5]
 
 
@@ -269,8 +358,9 @@ def add_contact(
 ) -> None:
     """Adds the contact of a foot to the implicit matrix `blocks`, in lanes where the foot touches.
 
-    The foot is contact node number `i`. The contact is time * damping + time² * stiffness, `time`
-    in s.
+    The foot is contact node number `i`. What is added is time * damping + time² * stiffness of the
+    ground, along its normal and its tangents, with `time` in s. `state`, `modes` and `forces` are
+    only read.
     """
     nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
     touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
@@ -300,8 +390,9 @@ def add_diagonal(
 ) -> None:
     """Adds Jᵀ diag(k_x, k_y, k_z) J of a node to its body's block of the implicit matrix.
 
-    `node` is a row of `nodes`; `k` is along the world's axes. The node is at p from the body's
-    origin. J = [-[p]x 1] gives the node's velocity from the body's.
+    `node` is the node's row in `nodes`, `body` the number of its body. `k` is (k_x, k_y, k_z),
+    along the world's axes. The node is at p from the body's origin, in the world frame. J = [-[p]x
+    1] gives the node's velocity from the body's.
     """
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     k_x, k_y, k_z = k
@@ -329,7 +420,7 @@ def add_off_diagonal(
     """Adds Jᵀ K J of a node to its body's block of the implicit matrix. `k` is k_xy, k_xz and k_yz,
     the elements of the symmetric matrix K beside its diagonal, which is 0 here.
 
-    For J see add_diagonal().
+    For J and the other arguments see add_diagonal().
     """
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     xy, xz, yz = k
