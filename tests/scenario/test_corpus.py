@@ -78,3 +78,22 @@ def test_a_chain_hangs_as_its_weights_pull() -> None:
     weight = chain.robot.weight / 10.0
     np.testing.assert_allclose(force[:, 0], force[0, 0], rtol=1e-7)
     np.testing.assert_allclose(np.diff(force[:, 1]), weight, rtol=1e-6)
+
+
+def test_a_weight_on_a_ring_hangs_and_swings_as_on_an_ellipse() -> None:
+    # Its rope has a fixed length 2 a, so it moves on an ellipse whose foci are the supports, 2 c
+    # apart. At the lowest point, b below them, the ellipse has the curvature b / a^2.
+    pulley = study("pulley")
+    a, b = math.sqrt(2.0), 1.0
+    weight, g = pulley.robot.weight, pulley.robot.scenario.robot.gravity
+    tension = corpus.quantity(pulley, "tension rope")
+    assert tension == pytest.approx(0.5 * weight * a / b, rel=1e-6)
+    frequency = math.sqrt(g * b) / a / (2.0 * math.pi)
+    assert corpus.quantity(pulley, "frequency") == pytest.approx(frequency, rel=1e-5)
+
+
+def test_cables_across_a_rhombus_of_pinned_bars_pull_as_they_are_long() -> None:
+    # A bar from (x, 0) to (0, y) bears a force along it, so half the cables' pulls are as x and y.
+    rhombus = study("d_bar")
+    tensions, lengths = (corpus.quantity(rhombus, f"{k} long/cross") for k in ("tension", "length"))
+    assert tensions == pytest.approx(lengths, rel=1e-5)
