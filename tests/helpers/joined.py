@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from helpers.anchored import BAR, scenario_of
+from helpers.anchored import BAR, scenario_of, supported_prism
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.scenario import Scenario
 
 G = 9.80665
 HEAVY, LIGHT, STIFFNESS, REACH = 0.2, 0.1, 1e3, 0.2
@@ -67,6 +68,40 @@ HINGED: dict[str, Any] = {
     "anchor_stiffness": 1e6,
 }
 """A triangle that hangs from a fixed bar on a hinge of two joints."""
+
+
+RHOMBUS: dict[str, Any] = {
+    "nodes": {"l": [-1, 0, 0.5], "r": [1, 0, 0.5], "u": [0, 0.6, 0.5], "d": [0, -0.6, 0.5]},
+    "struts": {"bar": BAR | {"pairs": [["l", "u"], ["u", "r"], ["r", "d"], ["d", "l"]]}},
+    "pinned": ["l", "r", "u", "d"],
+    "anchors": dict.fromkeys("lrud", "z"),
+    "cables": {
+        "long": {"pairs": [["l", "r"]], "stiffness": 1e3, "damping": 5.0, "tension": 100.0},
+        "cross": {"pairs": [["u", "d"]], "stiffness": 1e3, "damping": 5.0, "tension": 60.0},
+    },
+    "gravity": 0.0,
+}
+"""Four bars that are pinned to a rhombus, with a cable along each diagonal. Without the anchors it
+would fold out of its plane."""
+
+
+def with_arm(**changes: object) -> Scenario:
+    """The shipped prism on supports, with an arm on a ball joint and a driven cable over a ring at
+    the arm's end."""
+    prism = supported_prism().robot.model_dump()
+    shoulder = prism["nodes"]["n3"]
+    hand = [shoulder[0] + 0.06, shoulder[1] + 0.02, shoulder[2] + 0.05]
+    arm = BAR | {"pairs": [["s", "h"]]}
+    rope = {"pairs": [["n0", "h", "n4"]], "stiffness": 200.0, "damping": 1.0, "tension": 4.0}
+    tree = prism | {
+        "nodes": prism["nodes"] | {"s": shoulder, "h": hand},
+        "struts": prism["struts"] | {"arm": arm},
+        "cables": prism["cables"] | {"rope": rope},
+        "joints": {"shoulder": {"nodes": ["n3", "s"]}},
+        "bodies": {"arm": {"struts": ["arm"], "mass": 0.03, "inertia": [4e-5, 3e-5, 2e-5]}},
+        "actuated": prism["actuated"] | {"rope": ["rope n4 h n0"]},
+    }
+    return scenario_of(tree, **changes)
 
 
 def released() -> Robot:

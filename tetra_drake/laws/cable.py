@@ -88,8 +88,8 @@ class Cables(NamedTuple):
 
     @classmethod
     def of(cls, cables: Table, rings: Mapping[int, Sequence[int]] | None = None) -> Self:
-        """Cables from an array (cables,) of the NumPy record type CABLE. `rings` has the inner nodes
-        of each routed cable, by the cable's index."""
+        """Cables from an array (cables,) of the NumPy record type CABLE. `rings` has the inner
+        nodes of each routed cable, by the cable's index."""
         node_a, node_b, signal = (cables[name].copy() for name in ("node_a", "node_b", "signal"))
         paths = [
             [node_a[i], *rings[i], node_b[i]] if rings and i in rings else []

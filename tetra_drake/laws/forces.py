@@ -284,9 +284,9 @@ def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
 
 @inlined
 def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
-    """Adds the forces of touching struts, anchors (springs to the world), joints and loads (constant
-    forces) to the forces on the nodes, in `forces.nodes`. They need neither signals nor modes.
-    `state` is [q; v] (13*bodies,)."""
+    """Adds the forces of touching struts, anchors (springs to the world), joints and loads
+    (constant forces) to the forces on the nodes, in `forces.nodes`. They need neither signals nor
+    modes. `state` is [q; v] (13*bodies,)."""
     nodes, anchors, joints, loads = forces.nodes, robot.anchors, robot.joints, robot.loads
     radius, law, near = robot.bodies.radius, robot.strut_contact, forces.near_struts
     capsules.add_strut_forces(robot.struts, law, radius, state, nodes, near)
