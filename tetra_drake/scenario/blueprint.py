@@ -322,8 +322,8 @@ class Blueprint:
                     refuse(f"bodies.{self.bodies[body]}.{key}", problem)
             mass[body] = mass[body] if given.mass is None else given.mass
         if mass.min() < LIGHTEST:
-            node = self.first_node[mass.argmin()]
-            without = "" if self.node_mass[node] else "without point masses "
+            body = mass.argmin()
+            node, without = self.first_node[body], "without point masses " * (sizes[body] > 1)
             problem = f"is on a body whose mass {without}is {mass.min():.3g} kg"
             expected = f"expected at least {LIGHTEST:g} kg"
             refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")

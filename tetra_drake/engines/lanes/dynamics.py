@@ -31,7 +31,7 @@ U, W, D, WEIGHT, LINE_COLUMNS = 0, 3, 6, 9, 10
 add_cables()), the damping times the time, and the number of columns."""
 
 
-Pairs: TypeAlias = tuple[tuple[int, int], ...]
+BodyPairs: TypeAlias = tuple[tuple[int, int], ...]
 
 
 class Solver(NamedTuple):
@@ -68,7 +68,7 @@ class Solver(NamedTuple):
 
     @classmethod
     @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
-    def _of(cls, bodies: int, coupled: Pairs, jointed: Pairs, on_paths: Pairs) -> Self:
+    def _of(cls, bodies: int, coupled: BodyPairs, jointed: BodyPairs, on_paths: BodyPairs) -> Self:
         """The solver for the pairs of bodies that straight cables, joints and paths join."""
         schedule = Schedule.of(bodies, [*coupled, *jointed, *(p for p in on_paths if p[0] < p[1])])
         blocks = schedule.blocks | {(body, body): body for body in range(bodies)}
