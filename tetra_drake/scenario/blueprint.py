@@ -322,8 +322,9 @@ class Blueprint:
                     refuse(f"bodies.{self.bodies[body]}.{key}", problem)
             mass[body] = mass[body] if given.mass is None else given.mass
         if mass.min() < LIGHTEST:
-            body = mass.argmin()
-            node, without = self.first_node[body], "without point masses " * (sizes[body] > 1)
+            lightest = mass.argmin()
+            node = self.first_node[lightest]
+            without = "without point masses " if sizes[lightest] > 1 else ""
             problem = f"is on a body whose mass {without}is {mass.min():.3g} kg"
             expected = f"expected at least {LIGHTEST:g} kg"
             refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
@@ -348,7 +349,7 @@ class Blueprint:
                 refuse(key, "joins two fixed nodes, expected a node of a strut")
             if not others:
                 problem = f"joins the body '{self.bodies[first]}' to itself"
-                refuse(key, f"{problem}, expected nodes of two bodies")
+                refuse(key, f"{problem}, expected nodes of two bodies, or a pinned node between")
 
         joined = np.arange(len(self.bodies) + 1)  # equal numbers if joined; the last: the world
         anchored = self.carriers[self.held.any(axis=1)]
