@@ -253,12 +253,11 @@ class Blueprint:
     def check(self) -> None:
         """Raises InputError, naming the key, if the robot cannot be simulated."""
         self.check_sizes()
+        self._check_joints()
         self._check_bodies()
         self._check_cables()
 
         sizes = np.diff(self.first_node)
-        self._check_joints()
-
         is_bent = sizes[self.carriers[self.struts[:, 0]]] > 2
         for strut in np.flatnonzero(is_bent & np.isfinite(self.strut_stiffness)):
             _, group, _ = self.strut_keys[strut].split(".")

@@ -46,7 +46,7 @@ def schema_text(*, structure: bool = False) -> str:
     schema is of draft 2020-12 of JSON Schema.
     """
     what = "structure" if structure else "scenario"
-    schema = {"$id": f"urn:tetra-drake:{what}:format-{FORMAT}.schema.json"}
+    schema: Tree = {"$id": f"urn:tetra-drake:{what}:format-{FORMAT}.schema.json"}
     schema |= (StructureFile if structure else Scenario).model_json_schema()
     schema["properties"].pop("file", None)  # a scenario's key, which names the structure's file
     for node in parts_in(schema):

@@ -25,6 +25,7 @@ from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_graph import (
     Member,
+    Pair,
     components,
     members,
     struts_by_name,
@@ -70,7 +71,6 @@ Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
 BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
 """A length that needs no unit where the structure has one."""
 Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
-Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
 CablePath = Annotated[list[str], Field(min_length=2, max_length=MOST_NODES)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
