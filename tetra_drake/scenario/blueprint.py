@@ -340,7 +340,10 @@ class Blueprint:
         """Raises InputError for cables that do not join two bodies, or a body and the world; for
         bodies that no cables, joints or anchors join to the others; and for a tension in the
         settings so high that the free length of the cable would be negative."""
-        pairs = self.carriers[self.segments.ends]
+        places, pairs = self.places[self.segments.ends], self.carriers[self.segments.ends]
+        for piece in np.flatnonzero(places[:, 0] == places[:, 1]):
+            problem = "has length 0 between nodes of a joint, expected nodes at two places"
+            refuse(self.cable_keys[self.segments.cable[piece]], problem)
         for cable, key in enumerate(self.cable_keys):
             first, *others = {*pairs[self.segments.cable == cable].ravel().tolist()}
             if first == WORLD and not others:
