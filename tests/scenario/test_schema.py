@@ -70,15 +70,13 @@ VALUES = [
 def damage(tree: Any, draw: random.Random) -> None:
     """Changes one place of a tree: another value, a key or an item more or less."""
     place, key = draw.choice([*places(tree)])
-    what = draw.choice(["value", "value", "remove", "rename", "repeat"])
+    what = draw.choice(["value", "value", "remove", "repeat"])
     if what == "remove":
         del place[key]
     elif what == "value":
         place[key] = draw.choice(VALUES)
     elif isinstance(place, list):
         place.append(place[key])
-    elif what == "rename":
-        place[f"{key}s"] = place.pop(key)
     else:
         place["spare"] = place[key]
 
