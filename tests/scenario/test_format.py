@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from helpers.format_page import EXAMPLE
 
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.shipped import STRUCTURES
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import parse_yaml
 
@@ -150,6 +152,17 @@ CAGE = "bodies: {cage: {%s}}"
 def test_problems_name_key_and_facts(changes, key, facts, refused) -> None:
     with refused("my.yaml", key, *facts):
         structure(changes)
+
+
+def test_cables_within_a_rigid_body_are_left_out(tmp_path, caplog) -> None:
+    cage = "{struts: [bar], mass: 0.8 kg, inertia: [8 g*m^2, 8 g*m^2, 4 g*m^2]}"
+    file = tmp_path / "cage.yaml"
+    shipped = (STRUCTURES / "prism.yaml").read_text().partition("actuated:")[0]
+    file.write_text(f"{shipped}bodies: {{cage: {cage}}}\n")
+    made = Structure.of(read_structure(file).blueprint())
+    assert (made.bodies, len(made.cable_names), made.mass.tolist()) == (("cage",), 0, [0.8])
+    assert made.unit_inertia[0].tolist() == pytest.approx([0.01, 0.01, 0.005, 0.0, 0.0, 0.0])
+    assert "side n0 n3" in caplog.text
 
 
 def test_two_bodies_of_one_name_are_refused(refused) -> None:

@@ -299,17 +299,8 @@ class StructureFile(Section):
         struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
-        cables, paths = self._cables_in_order(body_of)
-        rings = {i: path[1:-1] for i, path in enumerate(paths) if len(path) > 2}
-        joints = [
-            [number[node] for node in sorted(joint.nodes, key=body_of.__getitem__)]
-            for joint in self.joints.values()
-        ]
-        stiffness = np.array([joint.stiffness for joint in self.joints.values()])
-        time_constants = np.array([joint.time_constant for joint in self.joints.values()])
-        joined = self._nodes_of_joined()
-        cable_names = tuple(cable.names[0] for cable in cables)
-        numbers = _cable_numbers(cable_names)
+        cables, joined = self._cables_of(number, body_of), self._nodes_of_joined()
+        numbers = _cable_numbers(cables["cable_names"])
         groups = [  # unknown cables are refused by _check_actuated()
             tuple(numbers[name] for name in names if name in numbers)
             for names in self.actuated.values()
@@ -335,23 +326,8 @@ class StructureFile(Section):
             anchor_damping=self.anchor_stiffness * self.anchor_time_constant * held,
             payload=np.zeros(len(bodies)),
             offsets=np.array(self.offsets or np.zeros((len(bodies), 3))),
-            cable_names=cable_names,
-            cable_groups=tuple(cable.group for cable in cables),
-            cable_keys=tuple(cable.key for cable in cables),
-            cable_ends=np.array(
-                [[number[path[0]], number[path[-1]]] for path in paths], dtype=int
-            ).reshape(-1, 2),
-            cable_laws=tuple(
-                self.cables[cable.group].law(self._length(path))
-                for cable, path in zip(cables, paths, strict=True)
-            ),
-            cable_rings={
-                cable: tuple(number[node] for node in nodes) for cable, nodes in rings.items()
-            },
-            joints=np.array(joints, dtype=int).reshape(-1, 2),
-            joint_keys=tuple(f"joints.{name}" for name in self.joints),
-            joint_stiffness=stiffness,
-            joint_damping=stiffness * time_constants,
+            **cables,
+            **self._joints_of(number, body_of),
             given_inertia={
                 body_of[joined[name][0]]: given.given_inertia for name, given in self.bodies.items()
             },
@@ -361,28 +337,54 @@ class StructureFile(Section):
             groups=tuple(groups),
         )
 
-    def _cables_in_order(
-        self, body_of: Mapping[str, int]
-    ) -> tuple[list[Member], list[tuple[str, ...]]]:
-        """Cables in the order of a blueprint, each with its nodes from the body with the lower
-        index. `body_of` has the index of each node's body."""
-        cables = sorted(
-            members("cables", self.cables),
+    def _cables_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
+        """Fields of the blueprint for the cables, each from the body with the lower index. Cables
+        within a body of `bodies` are left out. `number` and `body_of` have the index of each node
+        and of its body."""
+        rigid = [{body_of[nodes[0]]} for nodes in self._nodes_of_joined().values()]
+        cables = [
+            cable
+            for cable in members("cables", self.cables)
+            if {body_of[node] for node in cable.nodes} not in rigid
+        ]
+        cables.sort(
             key=lambda cable: (
                 len(cable.nodes) > 2,
                 sorted(body_of[node] for node in (cable.nodes[0], cable.nodes[-1])),
-            ),
+            )
         )
-        paths = [
-            cable.nodes[::-1] if body_of[cable.nodes[0]] > body_of[cable.nodes[-1]] else cable.nodes
-            for cable in cables
-        ]
-        return cables, paths
+        paths, laws = [], []
+        for cable in cables:
+            is_backward = body_of[cable.nodes[0]] > body_of[cable.nodes[-1]]
+            path = cable.nodes[::-1] if is_backward else cable.nodes
+            paths.append([number[node] for node in path])
+            places = [np.array(self.nodes[node]) for node in path]
+            pieces = [np.linalg.norm(end - start) for start, end in itertools.pairwise(places)]
+            laws.append(self.cables[cable.group].law(float(sum(pieces))))
+        ends = [[path[0], path[-1]] for path in paths]
+        return {
+            "cable_names": tuple(cable.names[0] for cable in cables),
+            "cable_groups": tuple(cable.group for cable in cables),
+            "cable_keys": tuple(cable.key for cable in cables),
+            "cable_ends": np.array(ends, dtype=int).reshape(-1, 2),
+            "cable_laws": tuple(laws),
+            "cable_rings": {i: tuple(path[1:-1]) for i, path in enumerate(paths) if len(path) > 2},
+        }
 
-    def _length(self, path: Sequence[str]) -> float:
-        """Length (m) of the path through nodes at their places in the file."""
-        places = [np.array(self.nodes[node]) for node in path]
-        return sum(float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(places))
+    def _joints_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
+        """Fields of the blueprint for the joints, each from the body with the lower index. `number`
+        and `body_of` have the index of each node and of its body."""
+        joints = self.joints.values()
+        nodes = [sorted(joint.nodes, key=body_of.__getitem__) for joint in joints]
+        stiffness = np.array([joint.stiffness for joint in joints])
+        time_constants = np.array([joint.time_constant for joint in joints])
+        pairs = [[number[first], number[second]] for first, second in nodes]
+        return {
+            "joints": np.array(pairs, dtype=int).reshape(-1, 2),
+            "joint_keys": tuple(f"joints.{name}" for name in self.joints),
+            "joint_stiffness": stiffness,
+            "joint_damping": stiffness * time_constants,
+        }
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
         """Radii (m), densities (kg/m^3) and contact radii (m) of the spheres at the nodes: three

@@ -13,6 +13,7 @@ from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
+from tetra_drake.scenario.structure_graph import members
 from tetra_drake.scenario.yaml_text import read_mapping
 from tetra_drake.settings.refusals import TAG, described, no_such
 from tetra_drake.settings.section import Tree, keys_of
@@ -84,9 +85,12 @@ def _structure(content: Any, file: Path) -> StructureFile:
     """Structure from the parsed content of a file. A warning in the log names the nodes that
     nothing uses. Raises InputError that names `file` and key."""
     structure = StructureFile.from_tree(content, file)
-    used = structure.blueprint().node_names
-    if unused := [node for node in structure.nodes if node not in used]:
+    used = structure.blueprint()
+    if unused := [node for node in structure.nodes if node not in used.node_names]:
         _LOG.warning("%s: nodes that nothing uses are left out: %s", file, ", ".join(unused))
+    names = [cable.names[0] for cable in members("cables", structure.cables)]
+    if inner := [name for name in names if name not in used.cable_names]:
+        _LOG.warning("%s: cables within a rigid body are left out: %s", file, ", ".join(inner))
     return structure
 
 
