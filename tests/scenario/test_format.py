@@ -124,7 +124,6 @@ CAGE = "bodies: {cage: {%s}}"
         (SLING % "[left, low, eye, right]", "cables.sling.pairs[0]", ["length 0"]),
         ("nodes: {eye: [0, 0, 20.00001]}\n" + SLING % "[left, low, eye]", "cables.sling.pairs[0]",
          ["length 0", "joint"]),
-        (SLING % "[north, west, south]", "cables.sling.pairs[0]", ["'cage'"]),
         ("cables: {sling: {tension: 2 kN}}", "cables.sling.tension", ["944 N", "left west east"]),
         ("struts: {bar: {pairs: [[top, mid, low]]}}", "struts.bar.pairs[0]", ["at most 2"]),
         ("{nodes: {x: [1, 2, 3]}, joints: {knee: {nodes: [low, x]}}}", "nodes.x", ["no strut"]),
