@@ -19,6 +19,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
 from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
+from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.kinematics import FORCE, rigid_motions
 from tetra_drake.laws.terrain import Flat
@@ -28,8 +29,8 @@ from tetra_drake.robot.ground import START_DEPTH
 from tetra_drake.robot.remarks import BEARS, sinking_remark
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
-from tetra_drake.robot.structure import node_positions
-from tetra_drake.robot.struts import condensed, overlaps
+from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.struts import MEETING, condensed, overlaps
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenario
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
@@ -154,8 +155,9 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
 
     A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
     for it. A file of the NASA Tensegrity Robotics Toolkit (NTRT) has bare numbers, so it needs a
-    `unit` of length, such as "dm". Struts may overlap in the file, as they do in
-    some of NTRT's; in equilibrium they touch. Raises InputError that names file and key.
+    `unit` of length, such as "dm". Struts may overlap in the file, as they do in some of NTRT's; in
+    equilibrium they touch. If the axes of two struts meet, as in plane models, all struts pass
+    through each other. Raises InputError that names file and key.
     """
     shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
     if name_or_file not in shipped and not os.path.exists(name_or_file):
@@ -169,6 +171,10 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     else:
         structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
         given = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
+        placed = Structure.of(structure.blueprint())
+        crossing = overlaps(given, placed, placed.initial_state).values()
+        if any(distance <= MEETING for _, distance in crossing):
+            given = given.with_sections(strut_contact=NoStrutContact())
     friction = given.friction.without_bristles()
     scenario = given.with_sections(friction=friction, engine=Mujoco())
     try:
