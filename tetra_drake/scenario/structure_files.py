@@ -9,6 +9,8 @@ from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
+from tetra_drake.scenario.mjcf import mjcf_tree
+from tetra_drake.scenario.mjcf_file import is_mjcf
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.robot_structure import StructureFile
@@ -29,7 +31,8 @@ any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
-    """Reads a structure: a shipped one by name, or a structure file or file of NTRT by path.
+    """Reads a structure: a shipped one by name, or a structure file, file of NTRT or MJCF file by
+    path.
 
     `unit`, such as "dm", is the unit of coordinates without a unit. A file of NTRT needs it. Raises
     InputError that names file and key.
@@ -48,6 +51,8 @@ def names_scenario(name_or_file: str | Path) -> bool:
     name = str(name_or_file)
     if name in shipped_structures() or not os.path.isfile(name):
         return name in shipped_scenarios() and name not in shipped_structures()
+    if is_mjcf(name):
+        return False
     keys = [*keys_of(StructureFile), *keys_of(NtrtFile), *SCENARIO_KEYS]
     content = read_mapping(Path(name), "structure file", keys=keys)
     return not SCENARIO_KEYS.isdisjoint(content)
@@ -90,8 +95,10 @@ def _structure(content: Any, file: Path) -> StructureFile:
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
-    """Content of a structure file, or of a file of NTRT converted to one. If the `unit` of NTRT is
-    missing, the error names `source` and `key`."""
+    """Content of a structure file, or of a file of NTRT or MuJoCo converted to one. If the `unit`
+    of NTRT is missing, the error names `source` and `key`."""
+    if is_mjcf(file):
+        return mjcf_tree(file)
     keys = keys_of(StructureFile) | keys_of(NtrtFile)
     content = read_mapping(file, "structure file", keys=keys)
     if not KEYS_OF_NTRT & content.keys():

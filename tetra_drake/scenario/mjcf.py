@@ -1,0 +1,435 @@
+"""Reader of MJCF models with tendons, as structures.
+
+Spatial tendons over sites become cables, routed ones where they have more than two sites. A body
+with a free joint becomes a rigid body, with the parts that are welded to it and with MuJoCo's mass,
+centre and inertia. Its sites are nodes. A capsule or a cylinder between two nodes is a strut. Sites
+of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0. Nodes where
+spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0.
+Actuators of tendons become oscillators. The spring of a position actuator belongs to its cable.
+
+Tendons of MuJoCo push below their spring length, and their dampers also act where a cable is slack.
+Cables do neither. A scenario has its own friction, ground and solver. Cameras, lights, materials
+and sensors are no part of a structure. Everything else that is left out is told.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import logging
+import re
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.blueprint import TOLERANCE
+from tetra_drake.scenario.mjcf_file import compiled_model
+from tetra_drake.scenario.robot_structure import MOST_NODES
+from tetra_drake.settings.section import Tree
+
+SAME_HEIGHT = 1e-6
+"""Height (m) of a plane up to which nodes keep their coordinates and feet change their radii."""
+_WORLD = 0
+
+_LOG = logging.getLogger("tetra_drake")
+
+
+def mjcf_tree(file: Path) -> Tree:
+    """Converts an MJCF file to the content of a structure file.
+
+    The log names what is left out, and the key `ignored` lists it. Names that structure files
+    refuse are changed: "_" takes the place of blanks, dots, commas and brackets. Raises InputError
+    that names the file.
+    """
+    model, removed = compiled_model(file)
+    if model.nsite > MOST_NODES:
+        problem = f"found {model.nsite} sites, expected at most {MOST_NODES}"
+        raise InputError(file, "worldbody", problem)
+    made = _MjcfTranslation(model)
+    tree = made.tree()
+    notes = {"settings of earlier versions of MuJoCo": removed, **made.notes}
+    tree["ignored"] = [f"{what}: {', '.join(names)}" for what, names in notes.items() if names]
+    if not tree["cables"]:
+        problem = "has no spatial tendon that can be a cable, expected one"
+        raise InputError(file, "tendon", "; ".join([problem, *tree["ignored"]]))
+    for line in tree["ignored"]:
+        _LOG.warning("%s: %s", file, line)
+    return {key: part for key, part in tree.items() if part}
+
+
+class _MjcfNode(NamedTuple):
+    """Node of a rigid body."""
+
+    root: int
+    """First of the rigid body's bodies in MuJoCo; 0 for the world."""
+    place: np.ndarray
+    """Position (3,) in the world."""
+
+
+class _MjcfPart(NamedTuple):
+    """Cable, strut or foot."""
+
+    name: str
+    constants: Sequence[float]
+    nodes: tuple[str, ...]
+
+
+class _MjcfTranslation:
+    """Conversion of a compiled model to the content of a structure file."""
+
+    def __init__(self, model: Any) -> None:
+        import mujoco
+
+        self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
+        mujoco.mj_kinematics(model, self.data)
+        self.nodes: dict[str, _MjcfNode] = {}
+        self.cable_of: dict[int, str] = {}
+        """Name of each tendon's cable."""
+        self.notes: dict[str, list[str]] = {}
+        """Names of elements that are changed or left out, by what is told of them."""
+        for what, kind, is_changed in _changes(mujoco, model):
+            for number in np.flatnonzero(is_changed):
+                self._note(what, kind, number)
+
+    def tree(self) -> Tree:
+        """Content of the structure file. Bodies that no tendon and no joint reaches are left
+        out."""
+        model, paths = self.model, dict(self._paths())
+        connects = self._equalities(self.mujoco.mjtEq.mjEQ_CONNECT)
+        roots = self.roots[model.site_bodyid].tolist()
+        on_paths = {*itertools.chain(*paths.values())}
+        used = {roots[site] for site in on_paths} - {_WORLD}
+        used |= {root for eq in connects for root, _ in self._ends_of(eq)} - {_WORLD}
+        node_of = {}
+        for site, (root, place) in enumerate(zip(roots, self.data.site_xpos, strict=True)):
+            if site in on_paths or root in used:
+                node_of[site] = self._node(root, place, self._name("site", site))
+        joints, anchors = self._joints(connects)
+        height, is_touching = self._floor()
+        sunk = height if abs(height) < SAME_HEIGHT else 0.0
+        rods, feet = self._rods_and_feet(sorted(used), is_touching, sunk)
+        struts, moving = _struts(rods, has_feet=bool(feet)), [*self._nodes_of(*used)]
+        return {
+            "nodes": {n: _place(node.place, height - sunk) for n, node in self.nodes.items()},
+            "struts": struts,
+            "cables": self._cables({i: [node_of[s] for s in paths[i]] for i in paths}),
+            "spheres": _spheres(feet),
+            "bodies": self._bodies(sorted(used), struts, height - sunk),
+            "joints": joints,
+            "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | anchors,
+            "actuated": self._actuated(),
+            "contacts": [] if feet.keys() == {*moving} else [*feet],
+            "gravity": _text(max(0.0, -_gravity(self.mujoco, model)[2]), "m/s^2"),
+        }
+
+    def _name(self, kind: str, number: int) -> str:
+        """Name of an element, such as a site; its kind and number if it has none."""
+        return getattr(self.model, kind)(number).name or f"{kind}{number}"
+
+    def _note(self, what: str, kind: str, number: int) -> None:
+        self.notes.setdefault(what, []).append(self._name(kind, number))
+
+    def _equalities(self, kind: Any) -> list[int]:
+        """Indices of the active equality constraints of a kind."""
+        is_active = self.model.eq_active0.astype(bool)
+        return np.flatnonzero(is_active & (self.model.eq_type == kind)).tolist()
+
+    @functools.cached_property
+    def roots(self) -> np.ndarray:
+        """First body of the rigid body that each body belongs to (bodies,); 0 for the world. Only a
+        free joint parts a body from its parent."""
+        model = self.model
+        free = model.jnt_bodyid[model.jnt_type == self.mujoco.mjtJoint.mjJNT_FREE].tolist()
+        self.roots = roots = np.zeros(model.nbody, dtype=int)
+        for body in range(1, model.nbody):
+            roots[body] = body if body in free else roots[model.body_parentid[body]]
+        for eq in self._equalities(self.mujoco.mjtEq.mjEQ_WELD):
+            first, second = sorted(root for root, _ in self._ends_of(eq))
+            roots[roots == second] = first
+        return roots
+
+    def _ends_of(self, eq: int) -> Iterator[tuple[int, np.ndarray]]:
+        """The two rigid bodies of a connect or weld, each with the point (3,) of the connect on it,
+        in the world."""
+        model, data = self.model, self.data
+        of_sites = model.eq_objtype[eq] == int(self.mujoco.mjtObj.mjOBJ_SITE)
+        ends = model.eq_obj1id[eq], model.eq_obj2id[eq]
+        for end, p in zip(ends, model.eq_data[eq, :6].reshape(2, 3), strict=True):
+            body = model.site_bodyid[end] if of_sites else end
+            of_body = data.xpos[body] + data.xmat[body].reshape(3, 3) @ p
+            yield int(self.roots[body]), data.site_xpos[end] if of_sites else of_body
+
+    def _nodes_of(self, *roots: int) -> list[str]:
+        """Names of the nodes of rigid bodies."""
+        return [name for name, node in self.nodes.items() if node.root in roots]
+
+    def _found(self, root: int, place: np.ndarray) -> str | None:
+        """Node of a rigid body at a place (3,) in the world; None if there is none."""
+        near = TOLERANCE * float(np.linalg.norm(np.ptp(self.data.site_xpos, axis=0)))
+        for name in self._nodes_of(root):
+            if np.abs(self.nodes[name].place - place).max() <= near:
+                return name
+        return None
+
+    def _node(self, root: int, place: np.ndarray, name: str) -> str:
+        """Node of a rigid body at a place; a new one of this name if there is none."""
+        found = self._found(root, place) or _plain(name, self.nodes)
+        self.nodes.setdefault(found, _MjcfNode(root, place))
+        return found
+
+    def _paths(self) -> Iterator[tuple[int, list[int]]]:
+        """Spatial tendons that can be cables, each with its sites in order."""
+        model, wrap = self.model, self.mujoco.mjtWrap
+        for tendon, first in enumerate(model.tendon_adr):
+            own = slice(first, first + model.tendon_num[tendon])
+            kinds = model.wrap_type[own]
+            sites = model.wrap_objid[own][kinds == wrap.mjWRAP_SITE].tolist()
+            if np.isin(kinds, [wrap.mjWRAP_JOINT, wrap.mjWRAP_PULLEY]).any():
+                self._note("tendons over joints or pulleys, left out", "tendon", tendon)
+            elif len({*self.roots[model.site_bodyid[sites]].tolist()}) == 1:
+                self._note("tendons that join a body to itself, left out", "tendon", tendon)
+            elif self._law(tendon)[0] <= 0.0:
+                self._note("tendons without stiffness, left out", "tendon", tendon)
+            else:
+                if len(sites) < len(kinds):
+                    what = "tendons around surfaces, read as straight between sites"
+                    self._note(what, "tendon", tendon)
+                yield tendon, sites
+
+    @functools.cached_property
+    def _tendons(self) -> np.ndarray:
+        """Tendon that each actuator drives (actuators,); -1 for an actuator of something else."""
+        is_on_tendon = self.model.actuator_trntype == self.mujoco.mjtTrn.mjTRN_TENDON
+        return np.where(is_on_tendon, self.model.actuator_trnid[:, 0], -1)
+
+    def _law(self, tendon: int) -> tuple[float, float, float]:
+        """Stiffness, damping and free length of a tendon, with the springs and dampers of its
+        actuators."""
+        model = self.model
+        stiffness, damping = model.tendon_stiffness[tendon], model.tendon_damping[tendon]
+        force = stiffness * model.tendon_lengthspring[tendon, 1]
+        is_spring = _are_linear(self.mujoco, model) & (self._tendons == tendon)
+        for actuator in np.flatnonzero(is_spring):
+            gear = model.actuator_gear[actuator, 0]
+            push, per_length, per_rate = model.actuator_biasprm[actuator, :3]
+            stiffness, damping = stiffness - gear**2 * per_length, damping - gear**2 * per_rate
+            force += gear * push
+        return stiffness, damping, force / stiffness if stiffness else 0.0
+
+    def _cables(self, paths: dict[int, list[str]]) -> Tree:
+        """Groups of cables, from the nodes of each tendon."""
+        groups: Tree = {}
+        tendons = {self._name("tendon", tendon): tendon for tendon in paths}
+        found = [
+            _MjcfPart(
+                name, self._law(tendon), tuple(n for n, _ in itertools.groupby(paths[tendon]))
+            )
+            for name, tendon in tendons.items()
+        ]
+        units = {"stiffness": "N/m", "damping": "N*s/m", "free_length": "m"}
+        for group, cables in _grouped(found).items():
+            law = dict(zip(units, map(_text, cables[0].constants, units.values()), strict=True))
+            groups[group] = law | {"pairs": [[*cable.nodes] for cable in cables]}
+            for cable in cables:
+                self.cable_of[tendons[cable.name]] = " ".join([group, *cable.nodes])
+        return groups
+
+    def _floor(self) -> tuple[float, np.ndarray]:
+        """Height of the first level plane, and a mask (geoms,) of what can touch it. Without such a
+        plane nothing touches, and the height is the lowest node's if this is below 0."""
+        model = self.model
+        kinds, others = model.geom_contype, model.geom_conaffinity
+        is_plane = model.geom_type == self.mujoco.mjtGeom.mjGEOM_PLANE
+        floors = np.flatnonzero(is_plane & (self.data.geom_xmat[:, 8] > 1.0 - TOLERANCE**2))
+        for geom in np.flatnonzero((model.geom_bodyid == _WORLD) & ((kinds | others) > 0)):
+            if geom not in floors[:1]:
+                self._note("shapes of the world, left out", "geom", geom)
+        if not floors.size:
+            lowest = min((float(node.place[2]) for node in self.nodes.values()), default=0.0)
+            return min(0.0, lowest), np.zeros(model.ngeom, dtype=bool)
+        floor = floors[0]
+        pairs = np.stack([model.pair_geom1, model.pair_geom2], axis=1)
+        paired = np.isin(np.arange(model.ngeom), pairs[(pairs == floor).any(axis=1)])
+        masks = (kinds & others[floor]) | (kinds[floor] & others)
+        return float(self.data.geom_xpos[floor][2]), paired | (masks != 0)
+
+    def _rods_and_feet(
+        self, used: list[int], is_touching: np.ndarray, sunk: float
+    ) -> tuple[dict[frozenset[str], _MjcfPart], dict[str, float]]:
+        """Capsules and cylinders between two nodes, by these, and the radius (m) of each node that
+        touches the floor: spheres, and ends of capsules. `sunk` is added to the radii."""
+        model, data, geom_kinds = self.model, self.data, self.mujoco.mjtGeom
+        rods: dict[frozenset[str], _MjcfPart] = {}
+        feet: dict[str, float] = {}
+        sphere, capsule, cylinder = map(
+            int, (geom_kinds.mjGEOM_SPHERE, geom_kinds.mjGEOM_CAPSULE, geom_kinds.mjGEOM_CYLINDER)
+        )
+        is_used = np.isin(self.roots[model.geom_bodyid], used)
+        for geom in sorted(np.flatnonzero(is_used), key=model.geom_type.__getitem__):
+            kind, (radius, half, _) = model.geom_type[geom], model.geom_size[geom]
+            root, name = int(self.roots[model.geom_bodyid[geom]]), self._name("geom", geom)
+            axis = data.geom_xmat[geom].reshape(3, 3)[:, 2] * half  # 0 for a sphere
+            places = data.geom_xpos[geom] + np.outer([-1.0, 1.0], axis)
+            if is_touching[geom] and kind in (sphere, capsule):
+                for node in [self._node(root, place, name) for place in places]:
+                    feet[node] = max(feet.get(node, 0.0), radius + sunk)
+            elif is_touching[geom]:
+                self._note("shapes that do not touch the ground", "geom", geom)
+            ends = tuple(filter(None, (self._found(root, place) for place in places)))
+            if kind in (capsule, cylinder) and len({*ends}) == len(places):
+                rods.setdefault(frozenset(ends), _MjcfPart(name, [2.0 * radius], ends))
+        return rods, feet
+
+    def _bodies(self, used: list[int], struts: Tree, height: float) -> Tree:
+        """Mass, centre of mass and inertia of the rigid bodies, with their struts and nodes."""
+        model, data = self.model, self.data
+        bodies: Tree = {}
+        pairs = {" ".join([name, *pair]): pair for name in struts for pair in struts[name]["pairs"]}
+        for root in used:
+            parts = np.flatnonzero(self.roots == root)
+            mass = model.body_mass[parts]
+            centre = mass @ data.xipos[parts] / mass.sum()
+            inertia = np.zeros((3, 3))
+            for part, arm in zip(parts, data.xipos[parts] - centre, strict=True):
+                axes = data.ximat[part].reshape(3, 3)
+                inertia += axes * model.body_inertia[part] @ axes.T
+                inertia += model.body_mass[part] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+            moments = np.append(inertia.diagonal(), inertia[[0, 0, 1], [1, 2, 2]])
+            moments[np.abs(moments) < TOLERANCE**2 * moments.max()] = 0.0
+            own = {name: pair for name, pair in pairs.items() if self.nodes[pair[0]].root == root}
+            joined = {*itertools.chain(*own.values())}
+            rest = [name for name in self._nodes_of(root) if name not in joined]
+            made = {
+                "struts": [*own],
+                "nodes": rest,
+                "mass": _text(mass.sum(), "kg"),
+                "centre": _place(centre, height),
+                "inertia": [_text(moment, "kg*m^2") for moment in moments],
+            }
+            name = _plain(self._name("body", root), bodies)
+            bodies[name] = {key: part for key, part in made.items() if part}
+        return bodies
+
+    def _joints(self, connects: list[int]) -> tuple[Tree, Tree]:
+        """Joints, from connects of two bodies, and anchors, from connects with the world."""
+        joints: Tree = {}
+        anchors: Tree = {}
+        for eq in connects:
+            ends = [(root, at) for root, at in self._ends_of(eq) if root != _WORLD]
+            name = _plain(self._name("equality", eq), joints)
+            nodes = [self._node(*end, f"{name}-{i}") for i, end in enumerate(ends, 1)]
+            if len(nodes) == 1:
+                anchors[nodes[0]] = "xyz"
+            elif len({*nodes}) > 1:
+                joints[name] = {"nodes": nodes}
+        return joints, anchors
+
+    def _actuated(self) -> Tree:
+        """Oscillators: actuators of cables. Those whose names differ only by the names of their
+        tendons are one oscillator."""
+        actuated: Tree = {}
+        keys: dict[str, str] = {}
+        cables, is_linear = dict(self.cable_of), _are_linear(self.mujoco, self.model)
+        for actuator, tendon in enumerate(self._tendons.tolist()):
+            if tendon not in cables or not is_linear[actuator]:
+                self._note("actuators of no cable, or its second ones", "actuator", actuator)
+                continue
+            name = self._name("actuator", actuator).removesuffix(f" {self._name('tendon', tendon)}")
+            key = keys.setdefault(name, _plain(name, actuated))
+            actuated.setdefault(key, []).append(cables.pop(tendon))
+        return actuated
+
+
+def _are_linear(mujoco: Any, model: Any) -> np.ndarray:
+    """True for the actuators (actuators,) that are forces or linear springs; False for muscles."""
+    biases = [mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE]
+    has_fixed_gain = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
+    return np.asarray(has_fixed_gain & np.isin(model.actuator_biastype, biases))
+
+
+def _gravity(mujoco: Any, model: Any) -> np.ndarray:
+    """Acceleration of gravity (3,) in the world frame."""
+    is_off = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    return np.zeros(3) if is_off else np.array(model.opt.gravity)
+
+
+def _changes(mujoco: Any, model: Any) -> Iterator[tuple[str, str, Any]]:
+    """What is told of elements that are changed or left out, their kind, and a mask of them."""
+    is_joint = model.jnt_type != mujoco.mjtJoint.mjJNT_FREE
+    yield "joints that are not free, read as rigid", "joint", is_joint
+    kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
+    is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
+    yield "other equality constraints, left out", "equality", ~is_known
+    is_pushing = (model.tendon_lengthspring[:, 0] > 0.0) & (model.tendon_stiffness > 0.0)
+    yield "springs that push below their length, read as cables that go slack", "tendon", is_pushing
+    names = "limited actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
+    for name in names.split():  # earlier versions of MuJoCo have not all of them
+        values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
+        has_it = values.reshape(model.ntendon, -1).any(axis=1)
+        yield f"{name} of tendons, left out", "tendon", has_it
+    is_linear = _are_linear(mujoco, model)
+    yield "muscles and other actuators with a law of their own, left out", "actuator", ~is_linear
+    springs = is_linear & model.actuator_biasprm.any(axis=1)
+    yield "actuators with springs, read at control 0", "actuator", springs
+    yield "gravity compensation, left out", "body", model.body_gravcomp
+    yield "key frames, left out", "key", np.ones(model.nkey)
+    yield "flexible parts, left out", "flex", np.ones(model.nflex)
+
+
+def _struts(rods: dict[frozenset[str], _MjcfPart], *, has_feet: bool) -> Tree:
+    """Groups of struts without mass. Feet have their own radii."""
+    made = {"density": "0 kg/m^3", "node_diameter": "0 m"}
+    made |= {"contact_radius": "0 m"} if has_feet else {}
+    return {
+        name: {"diameter": _text(own[0].constants[0], "m"), **made}
+        | {"pairs": [[*rod.nodes] for rod in own]}
+        for name, own in _grouped(rods.values()).items()
+    }
+
+
+def _spheres(feet: dict[str, float]) -> Tree:
+    """Groups of spheres without mass, from the radius of each foot. A foot of radius 0 has none."""
+    found = [_MjcfPart(f"foot {n}", [2.0 * r], (n,)) for n, r in feet.items() if r > 0.0]
+    return {
+        name: {"diameter": _text(own[0].constants[0], "m"), "density": "0 kg/m^3"}
+        | {"nodes": [foot.nodes[0] for foot in own]}
+        for name, own in _grouped(found).items()
+    }
+
+
+def _grouped(parts: Iterable[_MjcfPart]) -> dict[str, list[_MjcfPart]]:
+    """Groups of the parts with equal constants and the same beginning of the name: its first word,
+    or what is before its first digit. The same nodes are in a group only once."""
+    groups: dict[tuple[Any, ...], list[_MjcfPart]] = {}
+    copies: Counter[frozenset[str]] = Counter()
+    for part in parts:
+        word = part.name.split()[0] if " " in part.name else re.split(r"\d", part.name)[0]
+        nodes = frozenset(part.nodes)
+        key = word, copies[nodes], *(f"{constant:.9g}" for constant in part.constants)
+        groups.setdefault(key, []).append(part)
+        copies[nodes] += 1
+    named: dict[str, list[_MjcfPart]] = {}
+    for (word, *_), own in groups.items():
+        named[_plain(word.strip("_-") or "part", named)] = own
+    return named
+
+
+def _plain(name: str, taken: Collection[str]) -> str:
+    """Name without the characters that structure files refuse, numbered if it is taken."""
+    plain = re.sub(r"[\s.,\[\]]+", "_", name)
+    numbered = (f"{plain}-{number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain([plain], numbered) if one not in taken)
+
+
+def _text(number: float, unit: str) -> str:
+    return f"{number:.12g} {unit}"
+
+
+def _place(place: np.ndarray, height: float) -> list[str]:
+    """Coordinates in a structure file, from the position in MuJoCo's world and the height of the
+    ground there. They are rounded to 1e-12 m."""
+    return [_text(round(x, 12) + 0.0, "m") for x in (place - [0.0, 0.0, height]).tolist()]
