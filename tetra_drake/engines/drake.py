@@ -199,9 +199,10 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     """
     structure = robot.structure
     is_elastic = structure.cables["stiffness"] > 0.0
-    cables, ends = structure.cables[is_elastic], structure.cable_ends[is_elastic]
+    cables, pieces = structure.cables[is_elastic], structure.segments
     per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
-    per_reduced_mass = per_mass[structure.carriers[ends]].sum(axis=1)
+    of_pieces = per_mass[structure.carriers[pieces.ends]].sum(axis=1)
+    per_reduced_mass = np.bincount(pieces.cable, of_pieces, minlength=is_elastic.size)[is_elastic]
     ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
     by_damping = min(_COARSEST, max(_FINEST, 0.5 * min(ratios, default=0.0)))
 

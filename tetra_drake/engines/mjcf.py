@@ -71,7 +71,8 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
         robot: the robot at its start.
         rest: state (13*bodies,) of a key frame with the name `rest`; None for no key frame.
         own_laws: True for an engine that computes contacts of struts by its own law, and tensions
-            where is_pulled() is true. The model then leaves these to the engine.
+            where is_pulled() is true. The model then leaves these to the engine, and its joints are
+            springs, not rigid constraints.
 
     Raises:
         InputError: if MuJoCo does not know the terrain or the friction.
@@ -105,6 +106,10 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     if robot.model.strut_contact.acts and not own_laws:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
+    if own_laws:
+        _add_joint_springs(model, structure)
+    else:
+        _add_connections(model, structure)
     _add_pushes(model, world, structure)
     return xml_text(model)
 
@@ -145,6 +150,7 @@ def integrator_of(robot: Robot, *, pulled: bool) -> str:
     fixed: in steps of 0.125 ms, the mast would fall with 0.76 g.
     """
     has_dampers = robot.structure.cables["damping"].any() and not pulled
+    has_dampers |= len(robot.structure.joints) > 0
     return "Euler" if has_dampers else "implicitfast"
 
 
@@ -162,7 +168,7 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         principal = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())
         nodes = range(structure.first_node[i], structure.first_node[i + 1])
         feet = structure.contact_radius[[node for node in nodes if node in structure.contacts]]
-        is_bar = len(nodes) == 2 and not feet.any()
+        is_bar = len(nodes) == 2 and not feet.any() and i not in structure.given_inertia
         if is_bar:
             # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
             # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
@@ -223,8 +229,9 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
     model.append(Comment(f" the struts' damping is right for impacts at {_IMPACT_SPEED:g} m/s "))
     bodies = robot.structure.carriers[robot.structure.struts[:, 0]]
     pairs, friction = add_element(model, "contact"), [_LEAST_FRICTION, _LEAST_FRICTION, 0, 0, 0]
+    places = robot.structure.places[robot.structure.struts]
     for i, j in itertools.combinations(range(len(bodies)), 2):
-        if bodies[i] == bodies[j]:
+        if bodies[i] == bodies[j] or np.isin(places[i], places[j]).any():
             continue
         per_mass = (1.0 / robot.structure.mass[bodies[[i, j]]]).sum()
         depth = 4.0 / (3.0 * math.pi) * _IMPACT_SPEED / math.sqrt(normal.stiffness * per_mass)
@@ -243,14 +250,15 @@ def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
             motors[cable] = oscillator if len(group) == 1 else f"{oscillator} {cable}"
     tendons, actuators = add_element(model, "tendon"), add_element(model, "actuator")
     width = structure.least_radius / 2
-    for name, cable in zip(structure.cable_names, structure.cables, strict=True):
+    for number, cable in enumerate(structure.cables):
+        name = structure.cable_names[number]
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
         least = 0.0 if structure.slack else cable["free_length"]
         springlength = [least, cable["free_length"]]  # the spring exerts no force in between
         colour = ACTUATED_COLOUR if name in motors else PASSIVE_COLOUR
         own = {} if pulled else {"springlength": springlength, **law}
         tendon = add_element(tendons, "spatial", name=name, width=width, rgba=colour, **own)
-        for node in (cable["node_a"], cable["node_b"]):
+        for node in (cable["node_a"], *structure.cable_rings.get(number, ()), cable["node_b"]):
             add_element(tendon, "site", site=structure.node_names[node])
         if pulled or name in motors:
             motor = motors.get(name, name)
@@ -264,25 +272,41 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
     actuators, anchors, loads = add_element(model, "actuator"), structure.anchors, structure.loads
     laws = np.stack([0.0 * anchors.stiffness, -anchors.stiffness, -anchors.damping], axis=2)
     for node, place, of_axes in zip(anchors.nodes, anchors.places, laws, strict=True):
-        _add_push(actuators, world, f"anchor {structure.node_names[node]}", place, of_axes)
+        name = structure.node_names[node]
+        add_element(world, "site", name=f"anchor {name}", pos=place)
+        _add_push(actuators, f"anchor {name}", of_axes, site=name, refsite=f"anchor {name}")
     for node, force in zip(loads.nodes, loads.forces, strict=True):
-        of_axes = np.outer(force, [1.0, 0.0, 0.0])
-        _add_push(actuators, world, f"load {structure.node_names[node]}", np.zeros(3), of_axes)
+        name, of_axes = structure.node_names[node], np.outer(force, [1.0, 0.0, 0.0])
+        add_element(world, "site", name=f"load {name}", pos=np.zeros(3))
+        _add_push(actuators, f"load {name}", of_axes, site=name, refsite=f"load {name}")
 
 
-def _add_push(
-    actuators: Element, world: Element, name: str, place: np.ndarray, laws: np.ndarray
-) -> None:
-    """Adds MuJoCo actuators that push a node along the axes of the world, one for each axis whose
-    law is not zero.
+def _add_joint_springs(model: Element, structure: Structure) -> None:
+    """Adds MuJoCo actuators that hold the nodes of joints together, by the law of this package."""
+    actuators, joints = add_element(model, "actuator"), structure.joint_springs
+    for first, second, _, _, stiffness, damping in zip(*joints, strict=True):
+        site, refsite = structure.node_names[first], structure.node_names[second]
+        laws = np.tile([0.0, -stiffness, -damping], (3, 1))
+        _add_push(actuators, f"joint {site} {refsite}", laws, site=site, refsite=refsite)
 
-    `name` is "anchor" or "load", a blank, and the name of the node. `laws` (3, 3) has a row per
-    axis: a constant force (N), the force per displacement of the node from the world's point
-    `place` (3,) in N/m, and the force per velocity in N s/m. A spring and a damper have negative
+
+def _add_connections(model: Element, structure: Structure) -> None:
+    """Adds MuJoCo's constraints that hold the nodes of joints together."""
+    constraints = add_element(model, "equality")
+    for first, second in structure.joints:
+        site1, site2 = structure.node_names[first], structure.node_names[second]
+        add_element(constraints, "connect", site1=site1, site2=site2)
+
+
+def _add_push(actuators: Element, name: str, laws: np.ndarray, *, site: str, refsite: str) -> None:
+    """Adds MuJoCo actuators that push a site along the axes of another site, `refsite`, and this
+    the other way; one for each axis whose law is not zero.
+
+    `laws` (3, 3) has a row per axis: a constant force (N), the force per displacement from
+    `refsite` in N/m, and the force per velocity in N s/m. A spring and a damper have negative
     numbers.
     """
-    add_element(world, "site", name=name, pos=place)
-    ends = {"site": name.partition(" ")[2], "refsite": name}
+    ends = {"site": site, "refsite": refsite}
     for axis, gear, law in zip("xyz", np.eye(3, 6), laws, strict=True):
         if law.any():
             force = {"gear": gear, "gainprm": "0", "biastype": "affine", "biasprm": law}

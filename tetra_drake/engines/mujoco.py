@@ -87,17 +87,20 @@ def is_stable(robot: Robot, step: float) -> bool:
 
     The steps are explicit for positions and cables. They are stable if step^2 K + 2 step C < 4 M
     with the stiffness K, the damping C and the mass M. So a damper c counts as a spring 2 c / step.
-    All cables count as taut. Anchors and struts that touch do not count.
+    All cables count as taut. Struts that touch do not count, nor do anchors of a robot without
+    joints: there MuJoCo's steps are implicit for them.
     """
     from scipy.linalg import eigvalsh
 
-    anchors, cables = robot.model.anchors, robot.model.cables
-    free = anchors._replace(stiffness=np.zeros_like(anchors.stiffness))
-    taut = Unactuated(robot.model._replace(slack=False, anchors=free))
+    anchors, joints, cables = robot.model.anchors, robot.model.joints, robot.model.cables
+    held = anchors.stiffness + 2.0 / step * anchors.damping
+    anchors = anchors._replace(stiffness=held * (joints.node_a.size > 0))
+    joints = joints._replace(stiffness=joints.stiffness + 2.0 / step * joints.damping)
+    taut = Unactuated(robot.model._replace(slack=False, anchors=anchors, joints=joints))
     force_at_rest(taut, robot.structure.initial_state)
     taut.forces.near_struts.count[:] = 0
-    stiffer = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
-    taut.model = taut.model._replace(cables=cables._replace(law=stiffer))
+    law = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
+    taut.model = taut.model._replace(cables=cables._replace(law=law))
     return bool(eigvalsh(step**2 * stiffness_at_rest(taut), mass_matrix(taut)).max() < 4.0)
 
 

@@ -12,6 +12,7 @@ damper is weaker than the spring, this is Eq. 6.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
@@ -96,6 +97,15 @@ class Cables(NamedTuple):
             first=np.cumsum([0, *map(len, paths)]),
         )
         return cls(node_a, node_b, signal, CableLaw.of(cables), routes)
+
+    @property
+    def pieces(self) -> Table:
+        """Indices of the two nodes of each straight piece of the cables (pieces, 2)."""
+        ends = np.stack([self.node_a, self.node_b], axis=1)
+        paths = np.split(self.routes.nodes, self.routes.first[1:-1])
+        of_cables = (path if path.size else end for path, end in zip(paths, ends, strict=False))
+        pieces = [piece for path in of_cables for piece in itertools.pairwise(path)]
+        return np.array(pieces, dtype=np.int64).reshape(-1, 2)
 
 
 @inlined

@@ -24,6 +24,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import length_rates
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
 
 COMMAND, EXPECTED, LIMITS_FILE = "command.csv", "expected.csv", "limits.csv"
@@ -122,9 +123,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     walk = trajectory.isel(cable=robot.driven)
     law, length, tension = CableLaw.of(cables), walk.length.values, walk.tension.values
     signal = trajectory.signal.values[:, cables["signal"]]
-    a, b = cables["node_a"], cables["node_b"]
-    p_WN, v_WN = trajectory.p_WN.values, trajectory.v_WN.values
-    rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
+    rate = length_rates(robot.structure, trajectory.p_WN.values, trajectory.v_WN.values)
+    rate = rate[:, robot.driven]
     driven = actuator.DrivenCables(law, signal, length, rate, tension, walk.free_length.values)
 
     load, left, drives = tension, length, kind.drives(driven)

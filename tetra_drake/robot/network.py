@@ -55,11 +55,7 @@ class Weights:
 
             # Oscillators are at distance 0 if their cables join the same bodies, at distance 1 if
             # they share a body, at distance 2 if both are at distance 1 of a third, and so on.
-            bodies, groups = (
-                self.blueprint.carriers[self.blueprint.cable_ends],
-                self.blueprint.groups,
-            )
-            joined = [set(bodies[list(cables)].ravel().tolist()) for cables in groups]
+            joined = [self.blueprint.bodies_at(cables) for cables in self.blueprint.groups]
             shape = len(joined), len(joined)
             near = np.array([[bool(a & b) for b in joined] for a in joined]).reshape(shape)
             same = np.array([[a == b for b in joined] for a in joined]).reshape(shape)

@@ -144,8 +144,7 @@ class Robot:
         and there is none."""
         structure, pathways = self.structure, self.scenario.cpg.feedback if self.has_network else []
         drivers = structure.cables["signal"].copy()
-        bodies = structure.carriers[structure.cable_ends]
-        last = [bodies[list(cables)].max() for cables in structure.groups]
+        last = [max(structure.bodies_at(cables)) for cables in structure.groups]
         groups = drivers - cable.PASSIVE
         sizes = np.bincount(groups)[groups]  # of each cable's group
         neutral = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))

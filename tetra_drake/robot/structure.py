@@ -163,12 +163,9 @@ class Structure(Blueprint):
     @property
     def joint_springs(self) -> Joints:
         """Springs that hold the nodes of ball joints together, for kernels."""
-        return Joints(
-            *self.joints.T.copy(),
-            *self.carriers[self.joints].T.copy(),
-            stiffness=self.joint_stiffness,
-            damping=self.joint_damping,
-        )
+        node_a, node_b = self.joints.T.copy()
+        body_a, body_b = self.carriers[node_a], self.carriers[node_b]
+        return Joints(node_a, node_b, body_a, body_b, self.joint_stiffness, self.joint_damping)
 
     @property
     def loads(self) -> NodeLoads:
@@ -229,6 +226,17 @@ def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
     nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
     kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
+
+
+def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
+    """Rates (times, cables) of the cables' lengths in m/s, from positions and velocities of the
+    nodes (times, nodes, 3) in m and m/s."""
+    ends = structure.segments.ends
+    p_AB, v_AB = (x[:, ends[:, 1]] - x[:, ends[:, 0]] for x in (p_WN, v_WN))
+    rates = np.zeros((len(structure.cable_names), len(p_WN)))
+    of_pieces = (p_AB * v_AB).sum(axis=2) / np.linalg.norm(p_AB, axis=2)
+    np.add.at(rates, structure.segments.cable, of_pieces.T)
+    return rates.T
 
 
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:

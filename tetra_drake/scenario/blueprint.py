@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -173,6 +173,11 @@ class Blueprint:
             np.array(ends, dtype=int).reshape(-1, 2), np.repeat(range(len(paths)), pieces)
         )
 
+    def bodies_at(self, cables: Sequence[int]) -> set[int]:
+        """Indices of the bodies that some cables join, also at rings; WORLD for fixed nodes."""
+        pieces = self.segments.ends[np.isin(self.segments.cable, cables)]
+        return set(self.carriers[pieces].ravel().tolist())
+
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Number of the place of each node (nodes,). Nodes that joints hold together have the same
@@ -215,7 +220,8 @@ class Blueprint:
     def sides(self) -> np.ndarray:
         """Side of each oscillator's cables (oscillators,): 1.0 if the middles of all of them are on
         the left, -1.0 on the right, 0.0 otherwise."""
-        y, least = self.p_WN[self.cable_ends].mean(axis=1)[:, 1], self._least_distance
+        middles, least = self.p_WN[self.segments.ends].mean(axis=1)[:, 1], self._least_distance
+        y = np.bincount(self.segments.cable, middles) / np.bincount(self.segments.cable)
         is_left = [(y[list(cables)] > least).all() for cables in self.groups]
         is_right = [(y[list(cables)] < -least).all() for cables in self.groups]
         return np.array(is_left, dtype=float) - np.array(is_right, dtype=float)
@@ -224,11 +230,16 @@ class Blueprint:
     def images(self) -> tuple[int | None, ...]:
         """For each oscillator, the index of the oscillator that drives the mirror images of its
         cables; None if there is none."""
-        ends = self.p_WN[self.cable_ends]
+        middles = [
+            self.p_WN[self.segments.ends[self.segments.cable == cable]].mean(axis=(0, 1))
+            for cable in range(len(self.cable_ends))
+        ]
+        middle = np.reshape(middles, (-1, 1, 3))
+        paths = np.concatenate([self.p_WN[self.cable_ends], middle], axis=1)
         image_of_cable: list[int] = []
-        for mirrored, group in zip(ends * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
-            forward = np.abs(ends - mirrored).max(axis=(1, 2))
-            backward = np.abs(ends - mirrored[::-1]).max(axis=(1, 2))
+        for mirrored, group in zip(paths * [1.0, -1.0, 1.0], self.cable_groups, strict=True):
+            forward = np.abs(paths - mirrored).max(axis=(1, 2))
+            backward = np.abs(paths - mirrored[[1, 0, 2]]).max(axis=(1, 2))
             found = np.flatnonzero(np.minimum(forward, backward) <= self._least_distance).tolist()
             # Of parallel cables, the image is one of the same group.
             alike = [cable for cable in found if self.cable_groups[cable] == group]

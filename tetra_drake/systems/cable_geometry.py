@@ -32,16 +32,16 @@ class CableGeometry(LeafSystem):
 
     | port          | shape       | unit | meaning                                      |
     |---------------|-------------|------|----------------------------------------------|
-    | ends          | (6 cables,) | m    | per cable: position of end a, then of end b  |
+    | ends          | (6*pieces,) | m    | per piece: position of start, then of end    |
     | geometry_pose |             | SI   | FramePoseVector of all cylinders             |
 
-    A shape in a SceneGraph keeps its length. So each cable is shown by PIECES cylinders, which
-    slide along each other like the tubes of a telescope.
+    A shape in a SceneGraph keeps its length. So each straight piece of a cable is shown by PIECES
+    cylinders, which slide along each other like the tubes of a telescope.
     """
 
     def __init__(self, scene_graph: SceneGraph, name: str, *, lengths: Mapping[str, float]) -> None:
         """Registers the cylinders in a scene, with a source called `name`. `lengths` has the length
-        (m) of each cable at the start, by its name."""
+        (m) of each straight piece of a cable at the start, by its name."""
         super().__init__()
         self.source = scene_graph.RegisterSource(name)
         """Identifier of the source of the cylinders in the scene."""

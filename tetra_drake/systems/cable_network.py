@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -41,7 +42,7 @@ _LEAST_LENGTH = 1e-9
 
 
 class CableNetwork(LeafSystem):
-    """Cables between bodies (thesis Eq. 6). The system has no state.
+    """Cables between bodies (thesis Eq. 6), also over rings. The system has no state.
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
@@ -53,7 +54,7 @@ class CableNetwork(LeafSystem):
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (cables,)      | m/s    | rate of each cable's length              |
     | cable_forces      | (7 cables,)    | SI     | table of laws.cable, row by row          |
-    | ends              | (6 cables,)    | m      | per cable: position of end a, then of b  |
+    | ends              | (6*pieces,)    | m      | per piece: position of start, then end   |
     | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
     Inputs are `state`, `signals` and `drives`. A row of `cable_forces` has the direction (3) from
@@ -75,7 +76,7 @@ class CableNetwork(LeafSystem):
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
         self._parts = Packed((model, self._forces))
         state, self._no_signals = np.empty(13 * bodies), np.zeros(signals)
-        self._ends = np.stack([model.cables.node_a, model.cables.node_b], axis=1)
+        self._ends = model.cables.pieces
         self._compute_forces = machine_code(
             compute_cable_forces, self._parts, state, self._no_signals, self._force
         )
@@ -98,7 +99,8 @@ class CableNetwork(LeafSystem):
         DeclareOutput(self, "lengths", count, lambda s, c: moved(s, c)[:, cable.LENGTH], motion)
         DeclareOutput(self, "rates", count, lambda s, c: moved(s, c)[:, cable.RATE], motion)
         DeclareOutput(self, "cable_forces", size, table, inputs)
-        DeclareOutput(self, "ends", 6 * count, CableNetwork._ends_of_cables, motion)
+        size = 6 * len(self._ends)
+        DeclareOutput(self, "ends", size, CableNetwork._ends_of_pieces, motion)
 
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
@@ -125,7 +127,7 @@ class CableNetwork(LeafSystem):
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._table(context, output.get_mutable_value())
 
-    def _ends_of_cables(self, context: Context) -> np.ndarray:
+    def _ends_of_pieces(self, context: Context) -> np.ndarray:
         self._table(context, moves_only=True)
         return self._forces.nodes[self._ends, kinematics.P_WN : kinematics.P_WN + 3]
 
@@ -136,13 +138,21 @@ class CableNetwork(LeafSystem):
 
 @dataclass(frozen=True)
 class Cable:
-    """Cable between the origins of two frames of a plant."""
+    """Cable between the origins of two frames of a plant, straight or over rings."""
 
     name: str
     frame_a: Frame
     frame_b: Frame
     law: cable.CableLaw
     """Its constants in SI units."""
+    rings: tuple[Frame, ...] = ()
+    """Frames at whose origins the cable runs over frictionless rings, from a to b. The cable has
+    one tension along its whole path."""
+
+    @property
+    def path(self) -> tuple[Frame, ...]:
+        """Frames along the cable, from end a to end b."""
+        return (self.frame_a, *self.rings, self.frame_b)
 
 
 def AddCables(
@@ -185,9 +195,15 @@ def AddCables(
     check_type("AddCables", "actuated", actuated, Mapping)
     check_type("AddCables", "actuation", actuation, ActuatorKind)
     check_type("AddCables", "slack", slack, bool)
-    lengths = _default_lengths(plant, cables)
-    nodes = Nodes.of(plant, (frame for one in cables for frame in (one.frame_a, one.frame_b)))
+    pieces = _default_lengths(plant, cables)
+    lengths = np.array([sum(of_pieces) for of_pieces in pieces])
+    nodes = Nodes.of(plant, (frame for one in cables for frame in one.path))
     table = _cable_table(cables, actuated, nodes)
+    rings = {
+        place: [nodes.of_frame[ring.index()] for ring in one.rings]
+        for place, one in enumerate(cables)
+        if one.rings
+    }
     driven = np.flatnonzero(table["signal"] != cable.PASSIVE)
     law, signals = cable.CableLaw.of(table[driven]), np.zeros(driven.size)
     default = actuation.drives(DrivenCables.at_rest(law, lengths[driven], signals))
@@ -199,7 +215,7 @@ def AddCables(
     if scene_graph is not None:
         check_part("AddCables", "scene_graph", builder, scene_graph, SceneGraph)
     laws: dict[str, Any] = {
-        "cables": cable.Cables.of(table),
+        "cables": cable.Cables.of(table, rings),
         "actuator": actuation.actuator(),
         "slack": slack,
     }
@@ -212,7 +228,13 @@ def AddCables(
         builder.Connect(network.GetOutputPort("drive_rates"), actuators.get_input_port())
         builder.Connect(actuators.get_output_port(), network.GetInputPort("drives"))
     if scene_graph is not None and names:
-        shown = CableGeometry(scene_graph, name, lengths=dict(zip(names, lengths, strict=True)))
+        named = zip(names, pieces, strict=True)
+        of_pieces = {
+            one if len(each) == 1 else f"{one} {number}": length
+            for one, each in named
+            for number, length in enumerate(each, 1)
+        }
+        shown = CableGeometry(scene_graph, name, lengths=of_pieces)
         builder.AddNamedSystem(f"{name}_geometry", shown)
         builder.Connect(network.GetOutputPort("ends"), shown.get_input_port())
         poses = scene_graph.get_source_pose_port(shown.source)
@@ -234,6 +256,9 @@ def _check_cables(plant: MultibodyPlant, cables: Sequence[Cable]) -> None:
         check_constants("AddCables", key, one.law._asdict())
         for end in ("frame_a", "frame_b"):
             check_frame("AddCables", f"{key}.{end}", plant, getattr(one, end))
+        check_type("AddCables", f"{key}.rings", one.rings, tuple, list)
+        for number, ring in enumerate(one.rings):
+            check_frame("AddCables", f"{key}.rings[{number}]", plant, ring)
 
 
 def _cable_table(
@@ -263,14 +288,16 @@ def _cable_table(
     return table
 
 
-def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> np.ndarray:
-    """Lengths of cables (cables,) in m at the plant's default positions. Raises InputError if the
-    ends of a cable are at one place."""
-    context = plant.CreateDefaultContext()
-    offsets = [one.frame_b.CalcPose(context, one.frame_a).translation() for one in cables]
-    lengths: np.ndarray = np.linalg.norm(np.reshape(offsets, (-1, 3)), axis=1)
-    for one, length in zip(cables, lengths, strict=True):
-        if not _LEAST_LENGTH <= length < np.inf:
-            problem = f"found a length of {length:.3g} m at the plant's default positions"
+def _default_lengths(plant: MultibodyPlant, cables: Sequence[Cable]) -> list[list[float]]:
+    """Lengths in m of the straight pieces of each cable at the plant's default positions. Raises
+    InputError if the ends of a piece are at one place."""
+    context, lengths = plant.CreateDefaultContext(), []
+    for one in cables:
+        pieces = itertools.pairwise(one.path)
+        offsets = [end.CalcPose(context, start).translation() for start, end in pieces]
+        of_pieces: list[float] = np.linalg.norm(offsets, axis=1).tolist()
+        lengths.append(of_pieces)
+        if not all(_LEAST_LENGTH <= length < math.inf for length in of_pieces):
+            problem = f"found a length of {min(of_pieces):.3g} m at the plant's default positions"
             raise InputError("AddCables", f"cables.{one.name}", f"{problem}, expected more")
     return lengths

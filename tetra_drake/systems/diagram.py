@@ -61,7 +61,7 @@ def MakeTensegrityDiagram(
       without oscillators has no cpg.
     - feedback: only if `cpg.feedback` is not empty
     - cables_actuators: only if the kind of actuators has states, as winches have
-    - state_forces: only if struts touch, or nodes of bodies are held or loaded
+    - state_forces: only if struts touch, or nodes of bodies are held, joined or loaded
     - controller: in place of cpg and start_up, a system with the output port `signals`, and any
       others. Its input ports may be `state` and any output port of cables and ground, such as
       `lengths`, `rates`, `tensions` and `normal_forces`: ports of the same name are connected. See
@@ -111,7 +111,8 @@ def MakeTensegrityDiagram(
         witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
     )
     model = robot.model
-    if model.strut_contact.acts or model.anchors.nodes.size or model.loads.nodes.size:
+    held = model.anchors.nodes.size or model.joints.node_a.size or model.loads.nodes.size
+    if model.strut_contact.acts or held:
         Attach(builder, plant, builder.AddNamedSystem("state_forces", StateForces(robot)))
 
     state = plant.get_state_output_port()
@@ -155,9 +156,15 @@ def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
     """The cables of a structure, for AddCables(). `nodes` are the frames of its nodes, in their
     order, from AddNodes()."""
     return [
-        Cable(name, nodes[a], nodes[b], CableLaw(**law))
-        for name, (a, b), law in zip(
-            structure.cable_names, structure.cable_ends, structure.cable_laws, strict=True
+        Cable(
+            name,
+            nodes[first],
+            nodes[last],
+            CableLaw(**structure.cable_laws[cable]),
+            rings=tuple(nodes[node] for node in structure.cable_rings.get(cable, ())),
+        )
+        for cable, (name, (first, last)) in enumerate(
+            zip(structure.cable_names, structure.cable_ends, strict=True)
         )
     ]
 

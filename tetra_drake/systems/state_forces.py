@@ -1,4 +1,5 @@
-"""Forces that depend on the state alone, as a LeafSystem: contact of struts, anchors, loads."""
+"""Forces that depend on the state alone, as a LeafSystem: contact of struts, anchors, joints,
+loads."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from tetra_drake.robot.robot import Robot
 
 
 class StateForces(LeafSystem):
-    """Forces of struts that touch, anchors, and constant loads. The system has no state.
+    """Forces of struts that touch, anchors, joints and constant loads. The system has no state.
 
     | port              | shape   | unit   | meaning                                 |
     |-------------------|---------|--------|-----------------------------------------|

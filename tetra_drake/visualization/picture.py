@@ -52,10 +52,11 @@ def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
         thick = _widths(struts, depth)
         drawn.append(LineCollection(list(shadows), colors=COLOURS["square"], linewidths=thick))
 
-    is_driven = structure.cables["signal"] != PASSIVE
+    pieces = structure.segments
+    is_driven = structure.cables["signal"][pieces.cable] != PASSIVE
     cables = np.where(is_driven, COLOURS["actuated"], COLOURS["passive"])
     points = np.tile(np.arange(len(p_WN))[:, np.newaxis], 2)  # round caps are spheres
-    ends, depth = _seen(p_WN[np.vstack([structure.struts, structure.cable_ends, points])], camera)
+    ends, depth = _seen(p_WN[np.vstack([structure.struts, pieces.ends, points])], camera)
     colours = [COLOURS["rear"]] * len(struts), cables, [COLOURS["node"]] * len(nodes)
     radii = np.concatenate([struts, np.full(len(cables), 0.5 * THICKEST * struts.min()), nodes])
     order = np.argsort(-depth.mean(axis=1))

@@ -166,7 +166,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
     cables = {
         "path": [path.split("/")[1:] for path in cable_paths(structure)],
-        "nodes": structure.cables[["node_a", "node_b"]].tolist(),
+        "nodes": structure.segments.ends.tolist(),
     }
     return {
         "times": frames["time"].values.round(5).tolist(),

@@ -105,8 +105,8 @@ def place_robot(
         position = frame["p_WB"].values[0, body]
         meshcat.SetTransform(f"/robot/{name}", RigidTransform(turn, position))
     p_WN, radii = frame["p_WN"].values[0], cable_radii(structure, frame, per_newton)[0]
-    for cable, path, radius in zip(structure.cables, cable_paths(structure), radii, strict=True):
-        p_WA, p_WB = p_WN[cable["node_a"]], p_WN[cable["node_b"]]
+    ends = p_WN[structure.segments.ends]
+    for (p_WA, p_WB), path, radius in zip(ends, cable_paths(structure), radii, strict=True):
         matrix = np.eye(4)
         matrix[:3, :3] = RotationMatrix.MakeFromOneVector(p_WB - p_WA, 2).matrix()
         matrix[:3, :3] *= radius, radius, np.linalg.norm(p_WB - p_WA)
@@ -131,10 +131,14 @@ def node_colours(structure: Structure) -> list[str]:
 
 
 def cable_paths(structure: Structure) -> list[str]:
-    """Path of each cable in the scene: below /cables/actuated or /cables/passive."""
-    named = zip(structure.cables["signal"], structure.cable_names, strict=True)
-    kinds = {True: "actuated", False: "passive"}
-    return [f"/cables/{kinds[bool(signal != PASSIVE)]}/{name}" for signal, name in named]
+    """Path of each straight piece of a cable in the scene: below /cables/actuated or
+    /cables/passive. The pieces of a routed cable are numbered."""
+    pieces, paths = structure.segments.cable.tolist(), []
+    for piece, cable in enumerate(pieces):
+        kind = "passive" if structure.cables["signal"][cable] == PASSIVE else "actuated"
+        number = f" {piece - pieces.index(cable) + 1}" if cable in structure.cable_rings else ""
+        paths.append(f"/cables/{kind}/{structure.cable_names[cable]}{number}")
+    return paths
 
 
 def drawn_radii(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
@@ -157,12 +161,12 @@ def radius_per_newton(structure: Structure, tension: float) -> float:
 
 
 def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float) -> np.ndarray:
-    """Drawn radii of cables (frames, cables) in m: proportional to tension, between a least and a
-    greatest radius."""
+    """Drawn radii of the straight pieces of cables (frames, pieces) in m: proportional to tension,
+    between a least and a greatest radius."""
     strut = least_drawn_radius(structure)
     least, most = THINNEST * strut, 1.3 * THICKEST * strut
     radii: np.ndarray = (per_newton * frames["tension"].values).clip(least, most)
-    return radii
+    return radii[:, structure.segments.cable]
 
 
 def set_surroundings(
