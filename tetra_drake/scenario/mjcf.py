@@ -19,7 +19,7 @@ import itertools
 import logging
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -74,8 +74,9 @@ class _MjcfPart(NamedTuple):
     """Cable, strut or foot."""
 
     name: str
-    constants: Sequence[float]
-    nodes: tuple[str, ...]
+    """Name of the tendon or geom."""
+    nodes: list[str]
+    settings: Tree
 
 
 class _MjcfTranslation:
@@ -87,10 +88,9 @@ class _MjcfTranslation:
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
         mujoco.mj_kinematics(model, self.data)
         self.nodes: dict[str, _MjcfNode] = {}
-        self.cable_of: dict[int, str] = {}
-        """Name of each tendon's cable."""
         self.notes: dict[str, list[str]] = {}
         """Names of elements that are changed or left out, by what is told of them."""
+        self.is_linear = _are_linear(mujoco, model)
         for what, kind, is_changed in _changes(mujoco, model):
             for number in np.flatnonzero(is_changed):
                 self._note(what, kind, number)
@@ -102,8 +102,8 @@ class _MjcfTranslation:
         connects = self._equalities(self.mujoco.mjtEq.mjEQ_CONNECT)
         roots = self.roots[model.site_bodyid].tolist()
         on_paths = {*itertools.chain(*paths.values())}
-        used = {roots[site] for site in on_paths} - {_WORLD}
-        used |= {root for eq in connects for root, _ in self._ends_of(eq)} - {_WORLD}
+        reached = {root for eq in connects for root, _ in self._ends_of(eq)}
+        used = sorted(({roots[site] for site in on_paths} | reached) - {_WORLD})
         node_of = {}
         for site, (root, place) in enumerate(zip(roots, self.data.site_xpos, strict=True)):
             if site in on_paths or root in used:
@@ -111,19 +111,22 @@ class _MjcfTranslation:
         joints, anchors = self._joints(connects)
         height, is_touching = self._floor()
         sunk = height if abs(height) < SAME_HEIGHT else 0.0
-        rods, feet = self._rods_and_feet(sorted(used), is_touching, sunk)
-        struts, moving = _struts(rods, has_feet=bool(feet)), [*self._nodes_of(*used)]
+        rods, feet = self._rods_and_feet(used, is_touching, sunk)
+        struts, strut_names = _grouped(rods, "pairs")
+        nodes_of = {tendon: [node_of[site] for site in sites] for tendon, sites in paths.items()}
+        found = [self._cable(tendon, nodes) for tendon, nodes in nodes_of.items()]
+        cables, cable_names = _grouped(found, "pairs")
         return {
             "nodes": {n: _place(node.place, height - sunk) for n, node in self.nodes.items()},
             "struts": struts,
-            "cables": self._cables({i: [node_of[s] for s in paths[i]] for i in paths}),
+            "cables": cables,
             "spheres": _spheres(feet),
-            "bodies": self._bodies(sorted(used), struts, height - sunk),
+            "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), height - sunk),
             "joints": joints,
             "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | anchors,
-            "actuated": self._actuated(),
-            "contacts": [] if feet.keys() == {*moving} else [*feet],
-            "gravity": _text(max(0.0, -_gravity(self.mujoco, model)[2]), "m/s^2"),
+            "actuated": self._actuated(dict(zip(paths, cable_names, strict=True))),
+            "contacts": [] if feet.keys() == {*self._nodes_of(*used)} else [*feet],
+            "gravity": _text(self._gravity(), "m/s^2"),
         }
 
     def _name(self, kind: str, number: int) -> str:
@@ -212,31 +215,19 @@ class _MjcfTranslation:
         model = self.model
         stiffness, damping = model.tendon_stiffness[tendon], model.tendon_damping[tendon]
         force = stiffness * model.tendon_lengthspring[tendon, 1]
-        is_spring = _are_linear(self.mujoco, model) & (self._tendons == tendon)
-        for actuator in np.flatnonzero(is_spring):
+        for actuator in np.flatnonzero(self.is_linear & (self._tendons == tendon)):
             gear = model.actuator_gear[actuator, 0]
             push, per_length, per_rate = model.actuator_biasprm[actuator, :3]
             stiffness, damping = stiffness - gear**2 * per_length, damping - gear**2 * per_rate
             force += gear * push
         return stiffness, damping, force / stiffness if stiffness else 0.0
 
-    def _cables(self, paths: dict[int, list[str]]) -> Tree:
-        """Groups of cables, from the nodes of each tendon."""
-        groups: Tree = {}
-        tendons = {self._name("tendon", tendon): tendon for tendon in paths}
-        found = [
-            _MjcfPart(
-                name, self._law(tendon), tuple(n for n, _ in itertools.groupby(paths[tendon]))
-            )
-            for name, tendon in tendons.items()
-        ]
-        units = {"stiffness": "N/m", "damping": "N*s/m", "free_length": "m"}
-        for group, cables in _grouped(found).items():
-            law = dict(zip(units, map(_text, cables[0].constants, units.values()), strict=True))
-            groups[group] = law | {"pairs": [[*cable.nodes] for cable in cables]}
-            for cable in cables:
-                self.cable_of[tendons[cable.name]] = " ".join([group, *cable.nodes])
-        return groups
+    def _cable(self, tendon: int, nodes: list[str]) -> _MjcfPart:
+        """Cable of a tendon, from the nodes at its sites."""
+        law = map(_text, self._law(tendon), ["N/m", "N*s/m", "m"])
+        settings = dict(zip(["stiffness", "damping", "free_length"], law, strict=True))
+        path = [node for node, _ in itertools.groupby(nodes)]
+        return _MjcfPart(self._name("tendon", tendon), path, settings)
 
     def _floor(self) -> tuple[float, np.ndarray]:
         """Height of the first level plane, and a mask (geoms,) of what can touch it. Without such a
@@ -245,7 +236,9 @@ class _MjcfTranslation:
         kinds, others = model.geom_contype, model.geom_conaffinity
         is_plane = model.geom_type == self.mujoco.mjtGeom.mjGEOM_PLANE
         floors = np.flatnonzero(is_plane & (self.data.geom_xmat[:, 8] > 1.0 - TOLERANCE**2))
-        for geom in np.flatnonzero((model.geom_bodyid == _WORLD) & ((kinds | others) > 0)):
+        for geom in np.flatnonzero(
+            (self.roots[model.geom_bodyid] == _WORLD) & ((kinds | others) != 0)
+        ):
             if geom not in floors[:1]:
                 self._note("shapes of the world, left out", "geom", geom)
         if not floors.size:
@@ -259,15 +252,13 @@ class _MjcfTranslation:
 
     def _rods_and_feet(
         self, used: list[int], is_touching: np.ndarray, sunk: float
-    ) -> tuple[dict[frozenset[str], _MjcfPart], dict[str, float]]:
-        """Capsules and cylinders between two nodes, by these, and the radius (m) of each node that
-        touches the floor: spheres, and ends of capsules. `sunk` is added to the radii."""
-        model, data, geom_kinds = self.model, self.data, self.mujoco.mjtGeom
+    ) -> tuple[list[_MjcfPart], dict[str, float]]:
+        """Capsules and cylinders between two nodes, and the radius (m) of each node that touches
+        the floor: spheres, and ends of capsules. `sunk` is added to the radii."""
+        model, data, kinds = self.model, self.data, self.mujoco.mjtGeom
         rods: dict[frozenset[str], _MjcfPart] = {}
         feet: dict[str, float] = {}
-        sphere, capsule, cylinder = map(
-            int, (geom_kinds.mjGEOM_SPHERE, geom_kinds.mjGEOM_CAPSULE, geom_kinds.mjGEOM_CYLINDER)
-        )
+        sphere, capsule = int(kinds.mjGEOM_SPHERE), int(kinds.mjGEOM_CAPSULE)
         is_used = np.isin(self.roots[model.geom_bodyid], used)
         for geom in sorted(np.flatnonzero(is_used), key=model.geom_type.__getitem__):
             kind, (radius, half, _) = model.geom_type[geom], model.geom_size[geom]
@@ -279,16 +270,19 @@ class _MjcfTranslation:
                     feet[node] = max(feet.get(node, 0.0), radius + sunk)
             elif is_touching[geom]:
                 self._note("shapes that do not touch the ground", "geom", geom)
-            ends = tuple(filter(None, (self._found(root, place) for place in places)))
-            if kind in (capsule, cylinder) and len({*ends}) == len(places):
-                rods.setdefault(frozenset(ends), _MjcfPart(name, [2.0 * radius], ends))
-        return rods, feet
+            ends = [node for place in places if (node := self._found(root, place))]
+            if kind in (capsule, int(kinds.mjGEOM_CYLINDER)) and len({*ends}) == len(places):
+                settings = {"diameter": _text(2.0 * radius, "m"), "node_diameter": "0 m"}
+                settings["density"] = "0 kg/m^3"
+                rods.setdefault(frozenset(ends), _MjcfPart(name, ends, settings))
+        for rod in rods.values():
+            rod.settings.update({"contact_radius": "0 m"} if feet else {})
+        return [*rods.values()], feet
 
-    def _bodies(self, used: list[int], struts: Tree, height: float) -> Tree:
+    def _bodies(self, used: list[int], struts: dict[str, _MjcfPart], height: float) -> Tree:
         """Mass, centre of mass and inertia of the rigid bodies, with their struts and nodes."""
         model, data = self.model, self.data
         bodies: Tree = {}
-        pairs = {" ".join([name, *pair]): pair for name in struts for pair in struts[name]["pairs"]}
         for root in used:
             parts = np.flatnonzero(self.roots == root)
             mass = model.body_mass[parts]
@@ -300,18 +294,16 @@ class _MjcfTranslation:
                 inertia += model.body_mass[part] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
             moments = np.append(inertia.diagonal(), inertia[[0, 0, 1], [1, 2, 2]])
             moments[np.abs(moments) < TOLERANCE**2 * moments.max()] = 0.0
-            own = {name: pair for name, pair in pairs.items() if self.nodes[pair[0]].root == root}
-            joined = {*itertools.chain(*own.values())}
-            rest = [name for name in self._nodes_of(root) if name not in joined]
-            made = {
-                "struts": [*own],
-                "nodes": rest,
+            nodes = self._nodes_of(root)
+            own = [name for name, strut in struts.items() if strut.nodes[0] in nodes]
+            on_struts = {node for name in own for node in struts[name].nodes}
+            bodies[_plain(self._name("body", root), bodies)] = {
+                "struts": own,
+                "nodes": [node for node in nodes if node not in on_struts],
                 "mass": _text(mass.sum(), "kg"),
                 "centre": _place(centre, height),
                 "inertia": [_text(moment, "kg*m^2") for moment in moments],
             }
-            name = _plain(self._name("body", root), bodies)
-            bodies[name] = {key: part for key, part in made.items() if part}
         return bodies
 
     def _joints(self, connects: list[int]) -> tuple[Tree, Tree]:
@@ -328,14 +320,13 @@ class _MjcfTranslation:
                 joints[name] = {"nodes": nodes}
         return joints, anchors
 
-    def _actuated(self) -> Tree:
-        """Oscillators: actuators of cables. Those whose names differ only by the names of their
-        tendons are one oscillator."""
+    def _actuated(self, cables: dict[int, str]) -> Tree:
+        """Oscillators: actuators of cables, from the name of each tendon's cable. Actuators whose
+        names differ only by the names of their tendons are one oscillator."""
         actuated: Tree = {}
         keys: dict[str, str] = {}
-        cables, is_linear = dict(self.cable_of), _are_linear(self.mujoco, self.model)
         for actuator, tendon in enumerate(self._tendons.tolist()):
-            if tendon not in cables or not is_linear[actuator]:
+            if tendon not in cables or not self.is_linear[actuator]:
                 self._note("actuators of no cable, or its second ones", "actuator", actuator)
                 continue
             name = self._name("actuator", actuator).removesuffix(f" {self._name('tendon', tendon)}")
@@ -343,18 +334,22 @@ class _MjcfTranslation:
             actuated.setdefault(key, []).append(cables.pop(tendon))
         return actuated
 
+    def _gravity(self) -> float:
+        """Acceleration of gravity along -z."""
+        option = self.model.opt
+        if option.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+            return 0.0
+        x, y, z = option.gravity
+        if x or y or z > 0.0:
+            self.notes["gravity that is not along -z, left out"] = [f"{x:g} {y:g} {z:g}"]
+        return max(0.0, -z)
+
 
 def _are_linear(mujoco: Any, model: Any) -> np.ndarray:
     """True for the actuators (actuators,) that are forces or linear springs; False for muscles."""
     biases = [mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE]
     has_fixed_gain = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
     return np.asarray(has_fixed_gain & np.isin(model.actuator_biastype, biases))
-
-
-def _gravity(mujoco: Any, model: Any) -> np.ndarray:
-    """Acceleration of gravity (3,) in the world frame."""
-    is_off = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-    return np.zeros(3) if is_off else np.array(model.opt.gravity)
 
 
 def _changes(mujoco: Any, model: Any) -> Iterator[tuple[str, str, Any]]:
@@ -371,51 +366,38 @@ def _changes(mujoco: Any, model: Any) -> Iterator[tuple[str, str, Any]]:
         values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
         has_it = values.reshape(model.ntendon, -1).any(axis=1)
         yield f"{name} of tendons, left out", "tendon", has_it
-    is_linear = _are_linear(mujoco, model)
-    yield "muscles and other actuators with a law of their own, left out", "actuator", ~is_linear
-    springs = is_linear & model.actuator_biasprm.any(axis=1)
+    springs = _are_linear(mujoco, model) & model.actuator_biasprm.any(axis=1)
     yield "actuators with springs, read at control 0", "actuator", springs
     yield "gravity compensation, left out", "body", model.body_gravcomp
     yield "key frames, left out", "key", np.ones(model.nkey)
     yield "flexible parts, left out", "flex", np.ones(model.nflex)
 
 
-def _struts(rods: dict[frozenset[str], _MjcfPart], *, has_feet: bool) -> Tree:
-    """Groups of struts without mass. Feet have their own radii."""
-    made = {"density": "0 kg/m^3", "node_diameter": "0 m"}
-    made |= {"contact_radius": "0 m"} if has_feet else {}
-    return {
-        name: {"diameter": _text(own[0].constants[0], "m"), **made}
-        | {"pairs": [[*rod.nodes] for rod in own]}
-        for name, own in _grouped(rods.values()).items()
-    }
-
-
 def _spheres(feet: dict[str, float]) -> Tree:
     """Groups of spheres without mass, from the radius of each foot. A foot of radius 0 has none."""
-    found = [_MjcfPart(f"foot {n}", [2.0 * r], (n,)) for n, r in feet.items() if r > 0.0]
-    return {
-        name: {"diameter": _text(own[0].constants[0], "m"), "density": "0 kg/m^3"}
-        | {"nodes": [foot.nodes[0] for foot in own]}
-        for name, own in _grouped(found).items()
-    }
+    found = []
+    for node, radius in feet.items():
+        settings = {"diameter": _text(2.0 * radius, "m"), "density": "0 kg/m^3"}
+        found += [_MjcfPart("foot", [node], settings)] if radius > 0.0 else []
+    return _grouped(found, "nodes")[0]
 
 
-def _grouped(parts: Iterable[_MjcfPart]) -> dict[str, list[_MjcfPart]]:
-    """Groups of the parts with equal constants and the same beginning of the name: its first word,
-    or what is before its first digit. The same nodes are in a group only once."""
-    groups: dict[tuple[Any, ...], list[_MjcfPart]] = {}
+def _grouped(parts: Iterable[_MjcfPart], key: str) -> tuple[Tree, list[str]]:
+    """Groups of the parts with equal settings and the same beginning of the name: its first word,
+    or what is before its first digit. Returns the groups, with the parts under `key`, and the full
+    name of each part, such as "side n1 n2". The same nodes are in a group only once."""
+    groups: Tree = {}
+    names: list[str] = []
+    group_of: dict[tuple[Any, ...], str] = {}
     copies: Counter[frozenset[str]] = Counter()
-    for part in parts:
-        word = part.name.split()[0] if " " in part.name else re.split(r"\d", part.name)[0]
-        nodes = frozenset(part.nodes)
-        key = word, copies[nodes], *(f"{constant:.9g}" for constant in part.constants)
-        groups.setdefault(key, []).append(part)
-        copies[nodes] += 1
-    named: dict[str, list[_MjcfPart]] = {}
-    for (word, *_), own in groups.items():
-        named[_plain(word.strip("_-") or "part", named)] = own
-    return named
+    for name, nodes, settings in parts:
+        word = name.split()[0] if " " in name else re.split(r"\d", name)[0].strip("_-") or "part"
+        alike = word, copies[frozenset(nodes)], *settings.values()
+        copies[frozenset(nodes)] += 1
+        group = group_of.setdefault(alike, _plain(word, groups))
+        groups.setdefault(group, settings | {key: []})[key] += [nodes] if key == "pairs" else nodes
+        names.append(" ".join([group, *nodes]))
+    return groups, names
 
 
 def _plain(name: str, taken: Collection[str]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import write_whole
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.mjcf import mjcf_tree
 from tetra_drake.scenario.mjcf_file import is_mjcf
@@ -15,9 +16,9 @@ from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
-from tetra_drake.scenario.yaml_text import read_mapping
+from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 from tetra_drake.settings.refusals import TAG, described, no_such
-from tetra_drake.settings.section import Tree, keys_of
+from tetra_drake.settings.section import Tree, keys_of, written
 from tetra_drake.settings.units import given_quantity
 
 _LOG = logging.getLogger("tetra_drake")
@@ -43,6 +44,14 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
         raise InputError(name_or_file, "", problem)
     content = _tree_of_file(file, unit, source=file, key="unit")
     return _structure(content | ({"unit": unit} if unit else {}), file)
+
+
+def save_structure(structure: StructureFile, path: Path, *, source: str) -> None:
+    """Writes a structure file with all digits. Its first line names the `source` of the structure.
+    Raises InputError if the file cannot be written."""
+    text = dump_yaml({"format": 1} | written(structure.model_dump(exclude_defaults=True)))
+    name = " ".join(Path(source).name.split())
+    write_whole(path, f"# Converted from {name} by tetra-drake.\n{text}")
 
 
 def names_scenario(name_or_file: str | Path) -> bool:
