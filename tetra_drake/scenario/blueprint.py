@@ -170,7 +170,8 @@ class Blueprint:
         ends = [pair for path in paths for pair in itertools.pairwise(path)]
         pieces = [len(path) - 1 for path in paths]
         return Segments(
-            np.array(ends, dtype=int).reshape(-1, 2), np.repeat(range(len(paths)), pieces)
+            np.array(ends, dtype=int).reshape(-1, 2),
+            np.repeat(np.arange(len(paths)), np.array(pieces, dtype=int)),
         )
 
     def bodies_at(self, cables: Sequence[int]) -> set[int]:
@@ -312,9 +313,10 @@ class Blueprint:
         mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
         np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
         for body, given in self.given_inertia.items():
-            if mass[body] < LIGHTEST and given.inertia is None:
-                problem = "is missing, and no part of the body has mass and inertia"
-                refuse(f"bodies.{self.bodies[body]}.inertia", problem)
+            for key, value in (("centre", given.centre), ("inertia", given.inertia)):
+                if mass[body] < LIGHTEST and value is None:
+                    problem = "is missing, and no part of the body has mass and inertia"
+                    refuse(f"bodies.{self.bodies[body]}.{key}", problem)
             mass[body] = mass[body] if given.mass is None else given.mass
         if mass.min() < LIGHTEST:
             node = self.first_node[mass.argmin()]

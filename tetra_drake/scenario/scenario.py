@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -69,6 +69,8 @@ class Scenario(Section):
 
     keys_of_files: ClassVar = {"base": "Name or file of a scenario that has the other values."}
 
+    format: Literal[1] = 1
+    """Version of the format of the file."""
     name: str
     """Label of the scenario; equal scenarios may have different names."""
     robot: RobotKind
@@ -154,7 +156,7 @@ class Scenario(Section):
     def values(self) -> dict[str, Any]:
         """Values by dotted keys, without the scenario's name. Scenarios with the same values are
         equal; the name is only a label."""
-        return flattened(self.model_dump(exclude={"name"}))
+        return flattened(self.model_dump(exclude={"format", "name"}))
 
     @property
     def units(self) -> Units:

@@ -63,6 +63,7 @@ def quantity(unit: str, **words: float) -> tuple[Any, ...]:
 Length = Annotated[float, *quantity("m")]
 Angle = Annotated[float, *quantity("rad")]
 Mass = Annotated[float, *quantity("kg")]
+InertiaQuantity = Annotated[float, *quantity("kg*m^2")]
 Density = Annotated[float, *quantity("kg/m^3")]
 Time = Annotated[float, *quantity("s")]
 Frequency = Annotated[float, *quantity("Hz")]
