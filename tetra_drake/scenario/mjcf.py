@@ -4,7 +4,8 @@ Spatial tendons over sites become cables, routed ones where they have more than 
 with a free joint becomes a rigid body, with the parts that are welded to it and with MuJoCo's mass,
 centre and inertia. Its sites are nodes. A capsule or a cylinder between two nodes is a strut. Sites
 of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0. Nodes where
-spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0.
+spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free
+robot that is lower is raised to it.
 Actuators of tendons become oscillators. The spring of a position actuator belongs to its cable.
 
 Tendons of MuJoCo push below their spring length, and their dampers also act where a cable is slack.
@@ -92,7 +93,7 @@ class _MjcfTranslation:
         """Names of elements that are changed or left out, by what is told of them."""
         self.is_linear = _are_linear(mujoco, model)
         for what, kind, is_changed in _changes(mujoco, model):
-            for number in np.flatnonzero(is_changed):
+            for number in np.flatnonzero(is_changed).tolist():
                 self._note(what, kind, number)
 
     def tree(self) -> Tree:
@@ -109,19 +110,24 @@ class _MjcfTranslation:
             if site in on_paths or root in used:
                 node_of[site] = self._node(root, place, self._name("site", site))
         joints, anchors = self._joints(connects)
-        height, is_touching = self._floor()
-        sunk = height if abs(height) < SAME_HEIGHT else 0.0
+        floor, is_touching = self._floor()
+        level = float(self.data.geom_xpos[floor][2]) if floor is not None else 0.0
+        sunk = level if abs(level) < SAME_HEIGHT else 0.0
         rods, feet = self._rods_and_feet(used, is_touching, sunk)
+        ground = level - sunk
+        if floor is None or not self._nodes_of(_WORLD):  # a free robot may stand in the soft floor
+            lows = [node.place[2] - feet.get(name, 0.0) for name, node in self.nodes.items()]
+            ground = min([ground, *lows])
         struts, strut_names = _grouped(rods, "pairs")
         nodes_of = {tendon: [node_of[site] for site in sites] for tendon, sites in paths.items()}
         found = [self._cable(tendon, nodes) for tendon, nodes in nodes_of.items()]
         cables, cable_names = _grouped(found, "pairs")
         return {
-            "nodes": {n: _place(node.place, height - sunk) for n, node in self.nodes.items()},
+            "nodes": {n: _place(node.place, ground) for n, node in self.nodes.items()},
             "struts": struts,
             "cables": cables,
             "spheres": _spheres(feet),
-            "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), height - sunk),
+            "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground),
             "joints": joints,
             "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | anchors,
             "actuated": self._actuated(dict(zip(paths, cable_names, strict=True))),
@@ -229,26 +235,24 @@ class _MjcfTranslation:
         path = [node for node, _ in itertools.groupby(nodes)]
         return _MjcfPart(self._name("tendon", tendon), path, settings)
 
-    def _floor(self) -> tuple[float, np.ndarray]:
-        """Height of the first level plane, and a mask (geoms,) of what can touch it. Without such a
-        plane nothing touches, and the height is the lowest node's if this is below 0."""
+    def _floor(self) -> tuple[int | None, np.ndarray]:
+        """The first level plane, and a mask (geoms,) of what can touch it."""
         model = self.model
         kinds, others = model.geom_contype, model.geom_conaffinity
         is_plane = model.geom_type == self.mujoco.mjtGeom.mjGEOM_PLANE
-        floors = np.flatnonzero(is_plane & (self.data.geom_xmat[:, 8] > 1.0 - TOLERANCE**2))
-        for geom in np.flatnonzero(
-            (self.roots[model.geom_bodyid] == _WORLD) & ((kinds | others) != 0)
-        ):
+        is_level = self.data.geom_xmat[:, 8] > 1.0 - TOLERANCE**2
+        floors = np.flatnonzero(is_plane & is_level).tolist()
+        is_solid = (self.roots[model.geom_bodyid] == _WORLD) & ((kinds | others) != 0)
+        for geom in np.flatnonzero(is_solid).tolist():
             if geom not in floors[:1]:
                 self._note("shapes of the world, left out", "geom", geom)
-        if not floors.size:
-            lowest = min((float(node.place[2]) for node in self.nodes.values()), default=0.0)
-            return min(0.0, lowest), np.zeros(model.ngeom, dtype=bool)
+        if not floors:
+            return None, np.zeros(model.ngeom, dtype=bool)
         floor = floors[0]
         pairs = np.stack([model.pair_geom1, model.pair_geom2], axis=1)
         paired = np.isin(np.arange(model.ngeom), pairs[(pairs == floor).any(axis=1)])
         masks = (kinds & others[floor]) | (kinds[floor] & others)
-        return float(self.data.geom_xpos[floor][2]), paired | (masks != 0)
+        return floor, paired | (masks != 0)
 
     def _rods_and_feet(
         self, used: list[int], is_touching: np.ndarray, sunk: float
@@ -260,7 +264,7 @@ class _MjcfTranslation:
         feet: dict[str, float] = {}
         sphere, capsule = int(kinds.mjGEOM_SPHERE), int(kinds.mjGEOM_CAPSULE)
         is_used = np.isin(self.roots[model.geom_bodyid], used)
-        for geom in sorted(np.flatnonzero(is_used), key=model.geom_type.__getitem__):
+        for geom in sorted(np.flatnonzero(is_used).tolist(), key=model.geom_type.__getitem__):
             kind, (radius, half, _) = model.geom_type[geom], model.geom_size[geom]
             root, name = int(self.roots[model.geom_bodyid[geom]]), self._name("geom", geom)
             axis = data.geom_xmat[geom].reshape(3, 3)[:, 2] * half  # 0 for a sphere
@@ -270,16 +274,17 @@ class _MjcfTranslation:
                     feet[node] = max(feet.get(node, 0.0), radius + sunk)
             elif is_touching[geom]:
                 self._note("shapes that do not touch the ground", "geom", geom)
-            ends = [node for place in places if (node := self._found(root, place))]
+            ends = [end for place in places if (end := self._found(root, place))]
             if kind in (capsule, int(kinds.mjGEOM_CYLINDER)) and len({*ends}) == len(places):
                 settings = {"diameter": _text(2.0 * radius, "m"), "node_diameter": "0 m"}
                 settings["density"] = "0 kg/m^3"
-                rods.setdefault(frozenset(ends), _MjcfPart(name, ends, settings))
+                given = self.model.geom(geom).name or "strut"
+                rods.setdefault(frozenset(ends), _MjcfPart(given, ends, settings))
         for rod in rods.values():
             rod.settings.update({"contact_radius": "0 m"} if feet else {})
         return [*rods.values()], feet
 
-    def _bodies(self, used: list[int], struts: dict[str, _MjcfPart], height: float) -> Tree:
+    def _bodies(self, used: list[int], struts: dict[str, _MjcfPart], ground: float) -> Tree:
         """Mass, centre of mass and inertia of the rigid bodies, with their struts and nodes."""
         model, data = self.model, self.data
         bodies: Tree = {}
@@ -301,8 +306,8 @@ class _MjcfTranslation:
                 "struts": own,
                 "nodes": [node for node in nodes if node not in on_struts],
                 "mass": _text(mass.sum(), "kg"),
-                "centre": _place(centre, height),
-                "inertia": [_text(moment, "kg*m^2") for moment in moments],
+                "centre": _place(centre, ground),
+                "inertia": [f"{moment:.15g} kg*m^2" for moment in moments],
             }
         return bodies
 
@@ -411,7 +416,7 @@ def _text(number: float, unit: str) -> str:
     return f"{number:.12g} {unit}"
 
 
-def _place(place: np.ndarray, height: float) -> list[str]:
+def _place(place: np.ndarray, ground: float) -> list[str]:
     """Coordinates in a structure file, from the position in MuJoCo's world and the height of the
     ground there. They are rounded to 1e-12 m."""
-    return [_text(round(x, 12) + 0.0, "m") for x in (place - [0.0, 0.0, height]).tolist()]
+    return [_text(round(x, 12) + 0.0, "m") for x in (place - [0.0, 0.0, ground]).tolist()]
