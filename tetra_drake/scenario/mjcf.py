@@ -34,6 +34,8 @@ from tetra_drake.settings.section import Tree
 
 SAME_HEIGHT = 1e-6
 """Height (m) of a plane up to which nodes keep their coordinates and feet change their radii."""
+_LARGEST_GAP = 1000.0
+"""Largest gap of a joint that is closed, as a multiple of the distance that makes two nodes one."""
 _WORLD = 0
 
 _LOG = logging.getLogger("tetra_drake")
@@ -106,12 +108,15 @@ class _MjcfTranslation:
         reached = {root for eq in connects for root, _ in self._ends_of(eq)}
         used = sorted(({roots[site] for site in on_paths} | reached) - {_WORLD})
         node_of = {}
-        for site, (root, place) in enumerate(zip(roots, self.data.site_xpos, strict=True)):
+        for site, root in enumerate(roots):
             if site in on_paths or root in used:
+                place = self._place(model.site_bodyid[site], model.site_pos[site])
                 node_of[site] = self._node(root, place, self._name("site", site))
         joints, anchors = self._joints(connects)
         floor, is_touching = self._floor()
-        level = float(self.data.geom_xpos[floor][2]) if floor is not None else 0.0
+        level = 0.0
+        if floor is not None:
+            level = float(self._place(model.geom_bodyid[floor], model.geom_pos[floor])[2])
         sunk = level if abs(level) < SAME_HEIGHT else 0.0
         rods, feet = self._rods_and_feet(used, is_touching, sunk)
         ground = level - sunk
@@ -122,8 +127,9 @@ class _MjcfTranslation:
         nodes_of = {tendon: [node_of[site] for site in sites] for tendon, sites in paths.items()}
         found = [self._cable(tendon, nodes) for tendon, nodes in nodes_of.items()]
         cables, cable_names = _grouped(found, "pairs")
+        self._close(joints)
         return {
-            "nodes": {n: _place(node.place, ground) for n, node in self.nodes.items()},
+            "nodes": {n: _coordinates(node.place, ground) for n, node in self.nodes.items()},
             "struts": struts,
             "cables": cables,
             "spheres": _spheres(feet),
@@ -161,16 +167,21 @@ class _MjcfTranslation:
             roots[roots == second] = first
         return roots
 
+    def _place(self, body: int, p: np.ndarray) -> np.ndarray:
+        """Position (3,) in the world of the point p (3,) of a body of MuJoCo. MuJoCo's own position
+        of a site is the body's if it is less than 1e-6 m away."""
+        return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ p)
+
     def _ends_of(self, eq: int) -> Iterator[tuple[int, np.ndarray]]:
         """The two rigid bodies of a connect or weld, each with the point (3,) of the connect on it,
         in the world."""
-        model, data = self.model, self.data
-        of_sites = model.eq_objtype[eq] == int(self.mujoco.mjtObj.mjOBJ_SITE)
-        ends = model.eq_obj1id[eq], model.eq_obj2id[eq]
-        for end, p in zip(ends, model.eq_data[eq, :6].reshape(2, 3), strict=True):
-            body = model.site_bodyid[end] if of_sites else end
-            of_body = data.xpos[body] + data.xmat[body].reshape(3, 3) @ p
-            yield int(self.roots[body]), data.site_xpos[end] if of_sites else of_body
+        model = self.model
+        ends = [model.eq_obj1id[eq], model.eq_obj2id[eq]]
+        points = model.eq_data[eq, :6].reshape(2, 3)
+        if model.eq_objtype[eq] == int(self.mujoco.mjtObj.mjOBJ_SITE):
+            points, ends = model.site_pos[ends], model.site_bodyid[ends]
+        for body, p in zip(ends, points, strict=True):
+            yield int(self.roots[body]), self._place(body, p)
 
     def _nodes_of(self, *roots: int) -> list[str]:
         """Names of the nodes of rigid bodies."""
@@ -178,11 +189,15 @@ class _MjcfTranslation:
 
     def _found(self, root: int, place: np.ndarray) -> str | None:
         """Node of a rigid body at a place (3,) in the world; None if there is none."""
-        near = TOLERANCE * float(np.linalg.norm(np.ptp(self.data.site_xpos, axis=0)))
         for name in self._nodes_of(root):
-            if np.abs(self.nodes[name].place - place).max() <= near:
+            if np.linalg.norm(self.nodes[name].place - place) <= self._near:
                 return name
         return None
+
+    @functools.cached_property
+    def _near(self) -> float:
+        """Distance up to which two points are one node."""
+        return TOLERANCE * float(np.linalg.norm(np.ptp(self.data.site_xpos, axis=0)))
 
     def _node(self, root: int, place: np.ndarray, name: str) -> str:
         """Node of a rigid body at a place; a new one of this name if there is none."""
@@ -268,7 +283,8 @@ class _MjcfTranslation:
             kind, (radius, half, _) = model.geom_type[geom], model.geom_size[geom]
             root, name = int(self.roots[model.geom_bodyid[geom]]), self._name("geom", geom)
             axis = data.geom_xmat[geom].reshape(3, 3)[:, 2] * half  # 0 for a sphere
-            places = data.geom_xpos[geom] + np.outer([-1.0, 1.0], axis)
+            middle = self._place(model.geom_bodyid[geom], model.geom_pos[geom])
+            places = middle + np.outer([-1.0, 1.0], axis)
             if is_touching[geom] and kind in (sphere, capsule):
                 for node in [self._node(root, place, name) for place in places]:
                     feet[node] = max(feet.get(node, 0.0), radius + sunk)
@@ -291,9 +307,12 @@ class _MjcfTranslation:
         for root in used:
             parts = np.flatnonzero(self.roots == root)
             mass = model.body_mass[parts]
-            centre = mass @ data.xipos[parts] / mass.sum()
+            centres = np.array(
+                [self._place(part, model.body_ipos[part]) for part in parts.tolist()]
+            )
+            centre = mass @ centres / mass.sum()
             inertia = np.zeros((3, 3))
-            for part, arm in zip(parts, data.xipos[parts] - centre, strict=True):
+            for part, arm in zip(parts, centres - centre, strict=True):
                 axes = data.ximat[part].reshape(3, 3)
                 inertia += axes * model.body_inertia[part] @ axes.T
                 inertia += model.body_mass[part] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
@@ -306,7 +325,7 @@ class _MjcfTranslation:
                 "struts": own,
                 "nodes": [node for node in nodes if node not in on_struts],
                 "mass": _text(mass.sum(), "kg"),
-                "centre": _place(centre, ground),
+                "centre": _coordinates(centre, ground),
                 "inertia": [f"{moment:.15g} kg*m^2" for moment in moments],
             }
         return bodies
@@ -324,6 +343,16 @@ class _MjcfTranslation:
             elif len({*nodes}) > 1:
                 joints[name] = {"nodes": nodes}
         return joints, anchors
+
+    def _close(self, joints: Tree) -> None:
+        """Moves the second node of each joint with a small gap to the first."""
+        for name, joint in joints.items():
+            first, second = joint["nodes"]
+            place, node = self.nodes[first].place, self.nodes[second]
+            gap = float(np.linalg.norm(place - node.place))
+            if self._near < gap <= _LARGEST_GAP * self._near:
+                self.nodes[second] = node._replace(place=place)
+                self.notes.setdefault("joints with a gap, which is closed", []).append(name)
 
     def _actuated(self, cables: dict[int, str]) -> Tree:
         """Oscillators: actuators of cables, from the name of each tendon's cable. Actuators whose
@@ -416,7 +445,7 @@ def _text(number: float, unit: str) -> str:
     return f"{number:.12g} {unit}"
 
 
-def _place(place: np.ndarray, ground: float) -> list[str]:
+def _coordinates(place: np.ndarray, ground: float) -> list[str]:
     """Coordinates in a structure file, from the position in MuJoCo's world and the height of the
     ground there. They are rounded to 1e-12 m."""
     return [_text(round(x, 12) + 0.0, "m") for x in (place - [0.0, 0.0, ground]).tolist()]
