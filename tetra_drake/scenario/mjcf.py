@@ -289,7 +289,7 @@ class _MjcfTranslation:
                 for node in [self._node(root, place, name) for place in places]:
                     feet[node] = max(feet.get(node, 0.0), radius + sunk)
             elif is_touching[geom]:
-                self._note("shapes that do not touch the ground", "geom", geom)
+                self._note("shapes that touch the floor in MuJoCo, but not here", "geom", geom)
             ends = [end for place in places if (end := self._found(root, place))]
             if kind in (capsule, int(kinds.mjGEOM_CYLINDER)) and len({*ends}) == len(places):
                 settings = {"diameter": _text(2.0 * radius, "m"), "node_diameter": "0 m"}
@@ -398,8 +398,11 @@ def _changes(mujoco: Any, model: Any) -> Iterator[tuple[str, str, Any]]:
     names = "limited actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
     for name in names.split():  # earlier versions of MuJoCo have not all of them
         values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
-        has_it = values.reshape(model.ntendon, -1).any(axis=1)
-        yield f"{name} of tendons, left out", "tendon", has_it
+        yield (
+            f"the setting '{name}' of tendons, left out",
+            "tendon",
+            [np.any(value) for value in values],
+        )
     springs = _are_linear(mujoco, model) & model.actuator_biasprm.any(axis=1)
     yield "actuators with springs, read at control 0", "actuator", springs
     yield "gravity compensation, left out", "body", model.body_gravcomp

@@ -33,16 +33,7 @@ def compiled_model(file: Path) -> tuple[Any, list[str]]:
 
     Raises InputError if the file is no MJCF, if MuJoCo refuses it, or if MuJoCo is missing.
     """
-    text = read_text(file, "MJCF file", most=LARGEST_MJCF)
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InputError(file, "", "declares a document type, expected XML without one")
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        raise InputError(file, "", f"is not XML: {error}") from error
-    if root.tag != "mujoco":
-        problem = f"found the root element <{root.tag:.40}>, expected <mujoco>"
-        raise InputError(file, "", problem)
+    root = _parsed(file, file.parent, set())
     try:
         import mujoco
     except ImportError as error:
@@ -54,15 +45,33 @@ def compiled_model(file: Path) -> tuple[Any, list[str]]:
     try:
         if not left_out:
             return mujoco.MjModel.from_xml_path(str(file)), left_out
-        folder = os.path.abspath(file.parent)
-        for include in root.iter("include"):
-            include.set("file", os.path.join(folder, include.get("file", "")))
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-        spec.modelfiledir = folder
+        spec.modelfiledir = os.path.abspath(file.parent)
         return spec.compile(), left_out
     except (ValueError, mujoco.FatalError) as error:
         problem = f"mujoco refuses the file: {' '.join(str(error).split())}"
         raise InputError(file, "", problem) from error
+
+
+def _parsed(file: Path, folder: Path, seen: set[Path]) -> ElementTree.Element:
+    """Root element of a file, with the content of the files that it includes. Their paths are
+    relative to `folder`. Raises InputError for one of the files `seen`, to which it is added."""
+    if file in seen:
+        raise InputError(file, "include", "found the file twice, expected it once")
+    seen.add(file)
+    text = read_text(file, "MJCF file", most=LARGEST_MJCF)
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InputError(file, "", "declares a document type, expected XML without one")
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        raise InputError(file, "", f"is not XML: {error}") from error
+    for parent in [*root.iter()]:
+        for place, child in reversed([*enumerate(parent)]):
+            if child.tag == "include":
+                included = _parsed(folder / child.get("file", ""), folder, seen)
+                parent[place : place + 1] = included
+    return root
 
 
 def _modernise(root: ElementTree.Element) -> list[str]:
