@@ -79,14 +79,13 @@ AnchorAxes = Annotated[
         {"type": "string", "pattern": r"^(?!.*(.).*\1)[xyz]{1,3}$", "format": "some of x, y, z"}
     ),
 ]
-Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
 class StrutGroup(Section):
     """Struts with the same constants: solid cylinders with a sphere of the same density at each
     end."""
 
-    pairs: Pairs
+    pairs: Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes that each strut joins."""
     diameter: Length = Field(gt=0)
     """Diameter of a strut."""

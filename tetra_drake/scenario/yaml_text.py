@@ -14,11 +14,14 @@ from yamlcore.loader import CommonResolver
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.refusals import TAG, described
 from tetra_drake.settings.section import Tree
 
 LARGEST_YAML = 2**20
 """Largest size of a file in bytes."""
+
+FORMAT = 1
+"""Version of the format of scenario files and structure files, see FORMAT.md."""
 
 
 def parse_yaml(content: str, source: object) -> Any:
@@ -41,12 +44,15 @@ def read_mapping(file: Path, what: str, *, keys: Collection[str]) -> Tree:
     """Content of a YAML file: a mapping with some of `keys`. `what` is the kind of file, such as
     "scenario file", for error messages.
 
-    Raises InputError for another content. The file may be a private one, so the error does not show
-    its content.
+    Raises InputError for another content, or for another version of the format. The file may be a
+    private one, so the error does not show its content.
     """
     content = parse_yaml(read_text(file, what, most=LARGEST_YAML), file)
     if not isinstance(content, dict):
         raise InputError(file, "", f"holds no mapping of keys, expected a {what}")
+    version = content.get("format", FORMAT)
+    if type(version) is not int or version != FORMAT:
+        raise InputError(file, "format", f"found {described(version)}, expected {FORMAT}")
     if content.keys().isdisjoint(keys):
         problem = f"has none of the keys of a {what}, expected some of {', '.join(keys)}"
         raise InputError(file, "", problem)

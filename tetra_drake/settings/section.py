@@ -34,10 +34,9 @@ Show = Callable[[float, str], str]
 
 
 def _complete_schema(schema: Tree, section: type[Section]) -> None:
-    """Adapts pydantic's JSON Schema of a section to files, in place. It drops required keys, and
-    adds descriptions, units of defaults, and the keys that only files have."""
+    """Adapts pydantic's JSON Schema of a section to files, in place: adds descriptions, units of
+    defaults, and the keys that only files have."""
     schema |= EMPTY
-    schema.pop("required", None)  # a base may have the keys
     for key, text in section.keys_of_files.items():
         schema["properties"][key] = {"type": "string", "default": None, "description": text}
     for node in parts_in(schema):
