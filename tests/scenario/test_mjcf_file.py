@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
+from tetra_drake.cli import main
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.shipped import shipped_structures
@@ -158,6 +160,22 @@ def test_a_file_of_an_earlier_mujoco_means_the_same(tmp_path: Path) -> None:
     assert [one.blueprint().p_WN.tolist() for one in read] == [[[0.1, 0, 1], [0, 0, 0]]] * 2
     assert [one.bodies for one in read[:1]] == [read[1].bodies]
     assert "sensornoise" in str(read[0].ignored)
+
+
+def test_the_command_writes_a_structure_file(tmp_path: Path, capsys) -> None:
+    file = tmp_path / "prism.xml"
+    file.write_text(make_mjcf(robot_of_file("prism")))
+    assert main(["structure", str(file), "--out", str(tmp_path / "mine.yaml")]) == 0
+    assert "mine: 3 bodies, 6 nodes, 9 cables, 6 oscillators, 60.83 g" in capsys.readouterr().out
+    text = (tmp_path / "mine.yaml").read_text()
+    assert text.startswith("# Converted from prism.xml by tetra-drake.\nformat: 1\nnodes:\n")
+
+
+def test_without_mujoco_the_error_says_how_to_install_it(monkeypatch, tmp_path, refused) -> None:
+    (tmp_path / "a.xml").write_text(OTHERS)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with refused(tmp_path / "a.xml", "", "pip install"):
+        read_structure(tmp_path / "a.xml")
 
 
 @pytest.mark.parametrize(

@@ -95,19 +95,26 @@ class _MjcfTranslation:
         self.notes: dict[str, list[str]] = {}
         """Names of elements that are changed or left out, by what is told of them."""
         self.is_linear = _are_linear(mujoco, model)
+        is_on_tendon = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+        self.driven = np.where(is_on_tendon, model.actuator_trnid[:, 0], -1)
+        """Tendon that each actuator drives (actuators,); -1 for an actuator of something else."""
+        size = np.ptp(np.vstack([self.data.site_xpos, self.data.xpos]), axis=0)
+        self.near = TOLERANCE * float(np.linalg.norm(size))
+        """Distance up to which two points are one node."""
         for what, kind, is_changed in _changes(mujoco, model):
             for number in np.flatnonzero(is_changed).tolist():
                 self._note(what, kind, number)
 
     def tree(self) -> Tree:
-        """Content of the structure file. Bodies that no tendon and no joint reaches are left
-        out."""
+        """Content of the structure file."""
         model, paths = self.model, dict(self._paths())
         connects = self._equalities(self.mujoco.mjtEq.mjEQ_CONNECT)
         roots = self.roots[model.site_bodyid].tolist()
         on_paths = {*itertools.chain(*paths.values())}
         reached = {root for eq in connects for root, _ in self._ends_of(eq)}
         used = sorted(({roots[site] for site in on_paths} | reached) - {_WORLD})
+        for root in sorted({*self.roots.tolist()} - {*used, _WORLD}):
+            self._note("bodies that no tendon and no connect reaches, left out", "body", root)
         node_of = {}
         for site, root in enumerate(roots):
             if site in on_paths or root in used:
@@ -160,7 +167,7 @@ class _MjcfTranslation:
         free joint parts a body from its parent."""
         model = self.model
         free = model.jnt_bodyid[model.jnt_type == self.mujoco.mjtJoint.mjJNT_FREE].tolist()
-        self.roots = roots = np.zeros(model.nbody, dtype=int)
+        self.roots = roots = np.zeros(model.nbody, dtype=int)  # _ends_of() reads it
         for body in range(1, model.nbody):
             roots[body] = body if body in free else roots[model.body_parentid[body]]
         for eq in self._equalities(self.mujoco.mjtEq.mjEQ_WELD):
@@ -190,15 +197,8 @@ class _MjcfTranslation:
 
     def _found(self, root: int, place: np.ndarray) -> str | None:
         """Node of a rigid body at a place (3,) in the world; None if there is none."""
-        for name in self._nodes_of(root):
-            if np.linalg.norm(self.nodes[name].place - place) <= self._near:
-                return name
-        return None
-
-    @functools.cached_property
-    def _near(self) -> float:
-        """Distance up to which two points are one node."""
-        return TOLERANCE * float(np.linalg.norm(np.ptp(self.data.site_xpos, axis=0)))
+        of_body = ((name, self.nodes[name].place - place) for name in self._nodes_of(root))
+        return next((name for name, way in of_body if np.linalg.norm(way) <= self.near), None)
 
     def _node(self, root: int, place: np.ndarray, name: str) -> str:
         """Node of a rigid body at a place; a new one of this name if there is none."""
@@ -225,19 +225,13 @@ class _MjcfTranslation:
                     self._note(what, "tendon", tendon)
                 yield tendon, sites
 
-    @functools.cached_property
-    def _tendons(self) -> np.ndarray:
-        """Tendon that each actuator drives (actuators,); -1 for an actuator of something else."""
-        is_on_tendon = self.model.actuator_trntype == self.mujoco.mjtTrn.mjTRN_TENDON
-        return np.where(is_on_tendon, self.model.actuator_trnid[:, 0], -1)
-
     def _law(self, tendon: int) -> tuple[float, float, float]:
         """Stiffness, damping and free length of a tendon, with the springs and dampers of its
         actuators."""
         model = self.model
         stiffness, damping = model.tendon_stiffness[tendon], model.tendon_damping[tendon]
         force = stiffness * model.tendon_lengthspring[tendon, 1]
-        for actuator in np.flatnonzero(self.is_linear & (self._tendons == tendon)):
+        for actuator in np.flatnonzero(self.is_linear & (self.driven == tendon)):
             gear = model.actuator_gear[actuator, 0]
             push, per_length, per_rate = model.actuator_biasprm[actuator, :3]
             stiffness, damping = stiffness - gear**2 * per_length, damping - gear**2 * per_rate
@@ -351,7 +345,7 @@ class _MjcfTranslation:
             first, second = joint["nodes"]
             place, node = self.nodes[first].place, self.nodes[second]
             gap = float(np.linalg.norm(place - node.place))
-            if self._near < gap <= _LARGEST_GAP * self._near:
+            if self.near < gap <= _LARGEST_GAP * self.near:
                 self.nodes[second] = node._replace(place=place)
                 self.notes.setdefault("joints with a gap, which is closed", []).append(name)
 
@@ -360,7 +354,7 @@ class _MjcfTranslation:
         names differ only by the names of their tendons are one oscillator."""
         actuated: Tree = {}
         keys: dict[str, str] = {}
-        for actuator, tendon in enumerate(self._tendons.tolist()):
+        for actuator, tendon in enumerate(self.driven.tolist()):
             if tendon not in cables or not self.is_linear[actuator]:
                 self._note("actuators of no cable, or its second ones", "actuator", actuator)
                 continue
@@ -372,11 +366,12 @@ class _MjcfTranslation:
     def _gravity(self) -> float:
         """Acceleration of gravity along -z."""
         option = self.model.opt
-        if option.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
-            return 0.0
-        x, y, z = option.gravity
+        is_off = option.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        x, y, z = np.zeros(3) if is_off else option.gravity
         if x or y or z > 0.0:
             self.notes["gravity that is not along -z, left out"] = [f"{x:g} {y:g} {z:g}"]
+        if option.density or option.viscosity:
+            self.notes["fluid around the robot, left out"] = ["density, viscosity, wind"]
         return max(0.0, -z)
 
 
