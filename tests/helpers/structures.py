@@ -83,6 +83,7 @@ def joined_nodes(given: StructureFile | Tetrahedra) -> dict[str, Any]:
         "body_of_node": blueprint.carriers,
         "segments": blueprint.segments,
         "held": blueprint.held,
+        "joints": blueprint.joints,
     }
 
 

@@ -42,11 +42,12 @@ _LENGTHS = {"minItems": "≥ {} items", "maxItems": "≤ {} items"}
 def schema_text(*, structure: bool = False) -> str:
     """JSON Schema of scenario files, or of structure files, for editors and other tools.
 
-    A quantity is a text with a pattern; `unit` is its SI unit. The title of a kind is its tag. The
-    schema is of draft 2020-12 of JSON Schema.
+    A quantity is a text with a pattern; its key `unit`, an addition to JSON Schema, has its SI
+    unit. The `title` of a section that has kinds is the kind's YAML tag, such as !Coulomb.
+    The schema is of draft 2020-12 of JSON Schema.
     """
     what = "structure" if structure else "scenario"
-    schema = {"$id": f"urn:tetra-drake:{what}:format-{FORMAT}.schema.json"}
+    schema: Tree = {"$id": f"urn:tetra-drake:{what}:format-{FORMAT}.schema.json"}
     schema |= (StructureFile if structure else Scenario).model_json_schema()
     schema["properties"].pop("file", None)  # a scenario's key, which names the structure's file
     for node in parts_in(schema):
@@ -91,7 +92,7 @@ def _table_of_keys(rows: Iterable[tuple[str, Tree]]) -> str:
 
 
 def _value(node: Tree) -> str:
-    """Text about the values that a node of the JSON Schema allows, with unit and limits."""
+    """Text about the values that a part of the JSON Schema allows, with unit and limits."""
     if "anyOf" in node:
         return " or ".join(_value(part) for part in node["anyOf"] if part != {"type": "null"})
     if "properties" in node:

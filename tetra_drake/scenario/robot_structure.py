@@ -144,8 +144,8 @@ class CableGroup(CableConstants):
         return self
 
     def law(self, distance: float) -> dict[str, float]:
-        """Constants of a cable whose nodes are at a distance (m) in the file, by the names of
-        laws.cable.CableLaw."""
+        """Constants (SI) of a cable's force law, by the names of laws.cable.CableLaw. `distance`
+        (m) is the distance of its nodes in the file; it gives the free length for a `tension`."""
         free_length = self.free_length
         if free_length is None:
             law = CableLaw(**self.constants(stiffness=self.stiffness, free_length=distance))
@@ -273,7 +273,8 @@ class StructureFile(Section):
         return self.blueprint().shortest
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """Further changes that follow from `changes` to a base scenario: none for structures."""
+        """Further changes that follow from `changes` to the robot `base`: none for structures, so
+        the mapping is empty. Rows of tetrahedra adapt their spacing."""
         return {}
 
     def blueprint(self) -> Blueprint:
@@ -384,10 +385,10 @@ class StructureFile(Section):
         return sum(float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(places))
 
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
-        """Radii, densities and contact radii (3, nodes) of the spheres at the nodes. A node has the
-        sphere of its first strut in the file, unless it has one of its own. `number` has the index
-        of each node; `held` (nodes, 3) is True along the axes of its anchor. Nodes that joints hold
-        together are held together."""
+        """Radii (m), densities (kg/m^3) and contact radii (m) of the spheres at the nodes: three
+        rows (3, nodes). A node has the sphere of its first strut in the file, unless it has one of
+        its own. `number` has the index of each node by name; `held` (nodes, 3) is True along the
+        axes of its anchor. Nodes that joints hold together are held together."""
         spheres: list[tuple[list[str], StrutGroup | SphereGroup, float, float]] = []
         for bar in reversed(self.struts.values()):
             ends = [node for pair in bar.pairs for node in pair]
@@ -409,7 +410,8 @@ class StructureFile(Section):
 
     def _nodes_of_bodies(self) -> list[list[str]]:
         """Names of the nodes of each rigid body. Struts that share a node are one body, and so are
-        the parts of an entry of `bodies`."""
+        the parts of an entry of `bodies`. A node with a mass or sphere and without struts is a body
+        of its own, unless it is fixed."""
         ends = (strut.nodes for strut in members("struts", self.struts))
         bodies = components([*ends, *self._nodes_of_joined().values()])
         of_struts = {node for nodes in bodies for node in nodes}
@@ -447,9 +449,14 @@ class StructureFile(Section):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _prepare(cls, tree: Any) -> Any:
-        """Refuses a group without pairs: most often a change of a group of another name. Replaces
-        `pinned` by joints. Applies the key `unit` to all coordinates without a unit. Only mm is
-        kept: other units of a robot follow from its lengths."""
+        """Checks the content of a structure file before its fields are read, and completes it.
+
+        Raises InputError if a group of struts or cables has no key `pairs`. Then most often a
+        scenario meant to change a group of the file, but misspelled its name. Replaces `pinned` by
+        joints. Nodes get the unit of the key `unit` where their coordinates are bare numbers.
+        Afterwards `unit` is "mm" or None: a robot in mm is shown in mm, for others Scenario.units
+        chooses the unit by size.
+        """
         if not isinstance(tree, dict):
             return tree
         for kind in ("struts", "cables"):
@@ -591,7 +598,8 @@ class StructureFile(Section):
             refuse(key, "has length 0 between nodes of a joint, expected nodes at two places")
 
     def _check_actuated(self, cable_names: Sequence[str]) -> None:
-        """Refuses an unknown cable, or one that has an oscillator already."""
+        """Raises InputError if `actuated` names a cable that is not among `cable_names`, the names
+        of all cables, or gives a cable to a second oscillator."""
         numbers, drivers = _cable_numbers(cable_names), dict[int, str]()
         for oscillator, names in self.actuated.items():
             for i, name in enumerate(names):

@@ -25,7 +25,8 @@ FORMAT = 1
 
 
 def parse_yaml(content: str, source: object) -> Any:
-    """Content of a YAML text. Raises InputError if it is not YAML."""
+    """Content of a YAML text. A tag such as `!Coulomb` becomes a key of its mapping. Raises
+    InputError, naming `source`, if the text is not YAML."""
     # The file may be a private one, so errors show neither its lines nor its names.
     try:
         return yaml.load(content, _Loader)
@@ -41,8 +42,8 @@ def parse_yaml(content: str, source: object) -> Any:
 
 
 def read_mapping(file: Path, what: str, *, keys: Collection[str]) -> Tree:
-    """Content of a YAML file: a mapping with some of `keys`. `what` is the kind of file, such as
-    "scenario file", for error messages.
+    """Content of a YAML file: a mapping with at least one of `keys`; it may have others. `what` is
+    the kind of file, such as "scenario file", for error messages.
 
     Raises InputError for another content, or for another version of the format. The file may be a
     private one, so the error does not show its content.
@@ -112,8 +113,9 @@ class _Loader(yamlcore.CoreLoader):
 
 
 def _expanded(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Number of values in a node, with the values of the nodes that its aliases name. `sizes` has
-    the numbers of the nodes that are counted already, by id."""
+    """Number of values in a YAML node: itself and all values in it. What an alias names counts at
+    every use. `sizes` has the numbers of the nodes counted already, by Python's id(), and gets the
+    new ones."""
     if id(node) not in sizes:
         sizes[id(node)] = 1  # for an alias of what holds it
         inner = node.value if isinstance(node, yaml.CollectionNode) else []

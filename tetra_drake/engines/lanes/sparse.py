@@ -22,7 +22,8 @@ BLOCK = 6
 
 
 class Schedule(NamedTuple):
-    """Positions of the blocks of a sparse matrix, in the order of elimination."""
+    """Positions of the 6 x 6 blocks of a sparse symmetric matrix in the table `blocks` (blocks, 6,
+    6), in the order of elimination. Block i of the first ones is body i's own."""
 
     first: Table
     """Index of the first block of each body with a later body (bodies + 1,); the last number is the
@@ -35,7 +36,8 @@ class Schedule(NamedTuple):
 
     @classmethod
     def of(cls, bodies: int, pairs: Iterable[tuple[int, int]]) -> Self:
-        """The schedule for a number of bodies and the coupled pairs among them."""
+        """The schedule for a number of bodies, `bodies`, and the pairs of bodies that are coupled,
+        by their indices."""
         coupled: list[set[int]] = [set() for _ in range(bodies)]
         for pair in pairs:
             coupled[min(pair)].add(max(pair))
@@ -53,7 +55,8 @@ class Schedule(NamedTuple):
 
     @property
     def blocks(self) -> dict[tuple[int, int], int]:
-        """Index of the block of each coupled pair of bodies, directly or by fill-in."""
+        """Index of the block of each pair of bodies (earlier, later) that is coupled, directly or
+        by fill-in, the blocks that only the elimination fills."""
         bodies = len(self.first) - 1
         rows = np.repeat(np.arange(bodies), np.diff(self.first)).tolist()
         pairs = zip(rows, self.later[bodies:].tolist(), strict=True)
@@ -62,7 +65,8 @@ class Schedule(NamedTuple):
 
 @inlined
 def factorise(blocks: Table, schedule: Schedule) -> None:
-    """Factorises `blocks` in place: L D Lᵀ with 1 / D on the diagonal.
+    """Factorises the matrix `blocks` (blocks, 6, 6) in place: L D Lᵀ, with 1 / D in place of D, and
+    D Lᵀ above the diagonal.
 
     A number stays in a variable while all products of a body are subtracted. A loop over the pivots
     would read and write it once per pivot.
@@ -86,8 +90,8 @@ def factorise(blocks: Table, schedule: Schedule) -> None:
 
 @inlined
 def reduce_block(blocks: Table, i: int, a: int) -> None:
-    """Applies the factors of body i's own block to block `a`, which couples it to a later body: the
-    first part of the elimination of body i in factorise()."""
+    """Applies the factors of body i's own block to block number `a`, in place. Block `a` couples
+    body i to a later body. This is the first part of the elimination of body i in factorise()."""
     f_01, _, _, _, _, _ = factors(blocks, i, i, 1)
     f_02, f_12, _, _, _, _ = factors(blocks, i, i, 2)
     f_03, f_13, f_23, _, _, _ = factors(blocks, i, i, 3)
@@ -106,8 +110,9 @@ def reduce_block(blocks: Table, i: int, a: int) -> None:
 
 @inlined
 def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, product: int) -> None:
-    """Eliminates body i from the rows of the later body that block `a` couples it to; part of
-    factorise(). `product` is the index in `schedule.target` of the first product of block `a`."""
+    """Eliminates body i from the rows of the later body that block number `a` couples it to; part
+    of factorise(). Changes `blocks` in place. `product` is the index in `schedule.target` of the
+    first product of block `a` with a later block of body i."""
     j = schedule.later[a]
     for t in range(BLOCK):
         column = factors(blocks, i, a, t)
@@ -121,8 +126,8 @@ def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, product: int) -
 
 @inlined
 def factors(blocks: Table, i: int, k: int, c: int) -> tuple[Real, ...]:
-    """Column c of block k in the row of body i, each number divided by the pivot of its row. The
-    inverse pivots are on the diagonal of block i."""
+    """Column c (6 numbers) of block number k, which is in the row of body i, each number divided by
+    the pivot of its row. The inverse pivots are on the diagonal of block i."""
     return (
         blocks[k, 0, c] * blocks[i, 0, 0],
         blocks[k, 1, c] * blocks[i, 1, 1],
@@ -135,7 +140,8 @@ def factors(blocks: Table, i: int, k: int, c: int) -> tuple[Real, ...]:
 
 @inlined
 def reduced(x: Real, column: tuple[Real, ...], blocks: Table, k: int, c: int) -> Real:
-    """x minus the scalar product of `column`, a column of factors(), and column c of block k."""
+    """x minus the scalar product of `column`, six numbers of factors(), and column c of block
+    number k."""
     x = x - column[0] * blocks[k, 0, c] - column[1] * blocks[k, 1, c] - column[2] * blocks[k, 2, c]
     return (
         x - column[3] * blocks[k, 3, c] - column[4] * blocks[k, 4, c] - column[5] * blocks[k, 5, c]
