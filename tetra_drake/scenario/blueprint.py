@@ -256,12 +256,11 @@ class Blueprint:
     def check(self) -> None:
         """Raises InputError, naming the key of the robot's settings, if it cannot be simulated."""
         self.check_sizes()
+        self._check_joints()
         self._check_bodies()
         self._check_cables()
 
         sizes = np.diff(self.first_node)
-        self._check_joints()
-
         is_bent = sizes[self.carriers[self.struts[:, 0]]] > 2
         for strut in np.flatnonzero(is_bent & np.isfinite(self.strut_stiffness)):
             _, group, _ = self.strut_keys[strut].split(".")
@@ -341,7 +340,10 @@ class Blueprint:
         """Raises InputError for cables that do not join two bodies, or a body and the world; for
         bodies that no cables, joints or anchors join to the others; and for a tension in the
         settings so high that the free length of the cable would be negative."""
-        pairs = self.carriers[self.segments.ends]
+        places, pairs = self.places[self.segments.ends], self.carriers[self.segments.ends]
+        for piece in np.flatnonzero(places[:, 0] == places[:, 1]):
+            problem = "has length 0 between nodes of a joint, expected nodes at two places"
+            refuse(self.cable_keys[self.segments.cable[piece]], problem)
         for cable, key in enumerate(self.cable_keys):
             first, *others = {*pairs[self.segments.cable == cable].ravel().tolist()}
             if first == WORLD and not others:

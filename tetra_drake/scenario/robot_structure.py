@@ -25,6 +25,7 @@ from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_graph import (
     Member,
+    Pair,
     components,
     members,
     struts_by_name,
@@ -70,7 +71,6 @@ Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
 BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
 """A length that needs no unit where the structure has one."""
 Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
-Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
 CablePath = Annotated[list[str], Field(min_length=2, max_length=MOST_NODES)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
@@ -579,8 +579,7 @@ class StructureFile(Section):
                 refuse(f"nodes.{node}", "is on no strut and no cable, expected a cable to it")
 
     def _check_joined(self, blueprint: Blueprint) -> None:
-        """Refuses two entries of `bodies` for one body, two bodies of one name, and cables between
-        nodes that joints hold at one place."""
+        """Refuses two entries of `bodies` for one body, and two bodies of one name."""
         entries: dict[int, str] = {}
         body_of = dict(zip(blueprint.node_names, blueprint.carriers.tolist(), strict=True))
         for name, (node, *_) in self._nodes_of_joined().items():
@@ -592,10 +591,6 @@ class StructureFile(Section):
         if count > 1:
             key = f"bodies.{name}" if name in self.bodies else f"nodes.{name}"
             refuse(key, f"found {count} bodies of this name, expected another name for one of them")
-        places = blueprint.places[blueprint.segments.ends]
-        for piece in np.flatnonzero(places[:, 0] == places[:, 1])[:1]:
-            key = blueprint.cable_keys[blueprint.segments.cable[piece]]
-            refuse(key, "has length 0 between nodes of a joint, expected nodes at two places")
 
     def _check_actuated(self, cable_names: Sequence[str]) -> None:
         """Raises InputError if `actuated` names a cable that is not among `cable_names`, the names

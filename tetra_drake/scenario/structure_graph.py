@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from tetra_drake.settings.quantities import Keyed
 from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Tree, tree_value
 
 NodeT = TypeVar("NodeT", bound=Hashable)
+
+Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
+"""Names of two nodes."""
 
 
 class HasPairs(Protocol):
@@ -69,7 +72,7 @@ def components(groups: Iterable[Sequence[NodeT]]) -> list[list[NodeT]]:
 
 
 class _Group(BaseModel):
-    pairs: list[list[str]]
+    pairs: list[Pair]
 
 
 class _Body(BaseModel):
@@ -109,8 +112,8 @@ class _Pinned(BaseModel):
             if node not in self.nodes:
                 found = f"found unknown node '{node}'; {hint(node, self.nodes)}"
                 refuse(f"pinned[{place}]", found)
-            here = [[lists[i] for i in sorted(body) if node in lists[i]] for body in bodies]
-            _, *others = here = [body for body in here if body] or [[]]
+            here = [[i for i in sorted(body) if node in lists[i]] for body in bodies]
+            others = sorted(body for body in here if body)[1:]
             if not others:
                 expected = "expected a node that struts of two bodies share"
                 refuse(f"pinned[{place}]", f"found '{node}', {expected}")
@@ -119,8 +122,8 @@ class _Pinned(BaseModel):
                 while (copy := f"{node}-{number}") in self.nodes or copy in self.joints:
                     number += 1
                 self.nodes[copy], self.joints[copy] = self.nodes[node], {"nodes": [node, copy]}
-                for nodes in body:
-                    nodes[:] = [copy if one == node else one for one in nodes]
+                for i in body:
+                    lists[i][:] = [copy if one == node else one for one in lists[i]]
 
         renamed = dict[str, str]()
         for old, new in zip(struts, members("struts", self.struts), strict=True):
@@ -133,8 +136,8 @@ def with_joints(tree: Tree) -> Tree:
     """Content of a structure file with joints in place of its pinned nodes.
 
     Struts that share a pinned node are one body there only if they also share another node, or if
-    `bodies` joins them. The first body keeps the node. Each other one has a copy of it, named
-    "l-2", "l-3" and so on for the node l, and a joint with the name of the copy.
+    `bodies` joins them. The body of the first strut at the node keeps it. Each other one has a copy
+    of it, named "l-2", "l-3" and so on for the node l, and a joint with the name of the copy.
 
     Raises InputError, naming the key, for a pinned node that no two bodies share.
     """
