@@ -52,8 +52,8 @@ def mjcf_tree(file: Path) -> Tree:
     if model.nsite > MOST_NODES:
         problem = f"found {model.nsite} sites, expected at most {MOST_NODES}"
         raise InputError(file, "worldbody", problem)
-    made = _MjcfTranslation(model)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
+        made = _MjcfTranslation(model)
         tree = made.tree()
     notes = {"settings of earlier versions of MuJoCo": removed, **made.notes}
     tree["ignored"] = [f"{what}: {', '.join(names)}" for what, names in notes.items() if names]
