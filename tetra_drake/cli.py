@@ -122,7 +122,7 @@ ResultOrGait = Annotated[Path, Option(metavar="RESULT_DIR|GAIT|RUN_DIR", type=Pa
 _SCENARIO = f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file"
 _GAIT = "a gait file (JSON), or a folder written by `evolve` for its best gait"
 _SEED = "a random gait of this seed instead (default: one that walks)"
-_STRUCTURE = f"a structure file, one of {', '.join(shipped_structures())}, or a scenario"
+_STRUCTURE = f"a structure or MJCF file, one of {', '.join(shipped_structures())}, or a scenario"
 _COMMAND = "a file of actuator commands (CSV) instead, as `export` writes"
 _ENGINE = "drake (the diagram), compiled (the same laws), or mujoco (default: the scenario's)"
 
@@ -567,13 +567,14 @@ def _structure(
 ) -> None:
     """Analyse a structure and its equilibrium.
 
-    Reads a structure file, one of NTRT, or the robot of a scenario, and computes its equilibrium
-    on flat ground without actuation. Prints bodies, cables, states of self-stress, infinitesimal
-    mechanisms, natural frequencies, tensions and heights.
+    Reads a structure file, one of NTRT, an MJCF file (.xml) with tendons, or the robot of a
+    scenario, and computes its equilibrium on flat ground without actuation. Prints bodies, cables,
+    states of self-stress, infinitesimal mechanisms, natural frequencies, tensions and heights.
 
     Args:
         unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
-        out: write an HTML page that shows the structure in equilibrium
+        out: write an HTML page that shows the structure in equilibrium; a name that ends in .yaml
+            writes a structure file instead, such as one converted from MJCF
         mjcf: write a model for MuJoCo, with tendons, motors and the key frame `rest`
         sdf: write a model in SDFormat: bodies, and nodes as frames, without cables
 
@@ -581,6 +582,7 @@ def _structure(
     """
     from tetra_drake.engines.mjcf import loose_remark, make_mjcf
     from tetra_drake.robot.sdf import make_sdf
+    from tetra_drake.scenario.structure_files import read_structure, save_structure
     from tetra_drake.study.equilibrium import (
         robot_of_file,
         save_structure_page,
@@ -588,6 +590,10 @@ def _structure(
         study_equilibrium,
     )
 
+    if out and out.suffix in (".yaml", ".yml"):
+        save_structure(read_structure(source, unit=unit), out, source=source)
+        _say(f"wrote {out}")
+        source, unit, out = str(out), None, None
     study = study_equilibrium(robot_of_file(source, unit=unit))
     text, robot = structure_text(study), study.robot
     rest = robot.equilibrium.state

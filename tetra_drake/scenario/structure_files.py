@@ -8,15 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import write_whole
 from tetra_drake.scenario.changes import merged
+from tetra_drake.scenario.mjcf import mjcf_tree
+from tetra_drake.scenario.mjcf_file import is_mjcf
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
 from tetra_drake.scenario.structure_graph import members
-from tetra_drake.scenario.yaml_text import read_mapping
+from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 from tetra_drake.settings.refusals import TAG, described, no_such
-from tetra_drake.settings.section import Tree, keys_of
+from tetra_drake.settings.section import Tree, keys_of, written
 from tetra_drake.settings.units import given_quantity
 
 _LOG = logging.getLogger("tetra_drake")
@@ -30,7 +33,8 @@ any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
-    """Reads a structure: a shipped one by name, or a structure file or file of NTRT by path.
+    """Reads a structure: a shipped one by name, or a structure file, file of NTRT or MJCF file by
+    path.
 
     `unit`, such as "dm", is the unit of length of coordinates without a unit. A file of NTRT (NASA
     Tensegrity Robotics Toolkit) needs it. Raises InputError that names file and key.
@@ -43,12 +47,22 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
     return _structure(content | ({"unit": unit} if unit else {}), file)
 
 
+def save_structure(structure: StructureFile, path: Path, *, source: str) -> None:
+    """Writes a structure file with all digits. Its first line names the `source` of the structure.
+    Raises InputError if the file cannot be written."""
+    text = dump_yaml({"format": 1} | written(structure.model_dump(exclude_defaults=True)))
+    name = " ".join(Path(source).name.split())
+    write_whole(path, f"# Converted from {name} by tetra-drake.\n{text}")
+
+
 def names_scenario(name_or_file: str | Path) -> bool:
     """True if a name or a file means a scenario. A name that a scenario and a structure share means
     the structure."""
     name = str(name_or_file)
     if name in shipped_structures() or not os.path.isfile(name):
         return name in shipped_scenarios() and name not in shipped_structures()
+    if is_mjcf(name):
+        return False
     keys = [*keys_of(StructureFile), *keys_of(NtrtFile), *SCENARIO_KEYS]
     content = read_mapping(Path(name), "structure file", keys=keys)
     return not SCENARIO_KEYS.isdisjoint(content)
@@ -95,8 +109,11 @@ def _structure(content: Any, file: Path) -> StructureFile:
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
-    """Content of a structure file, or of a file of NTRT converted to one. `unit` is the unit of
-    length of a file of NTRT. If it is missing or wrong, InputError names `source` and `key`."""
+    """Content of a structure file, or of a file of NTRT or MuJoCo converted to one. `unit` is the
+    unit of length of a file of NTRT. If it is missing or wrong, InputError names `source` and
+    `key`."""
+    if is_mjcf(file):
+        return mjcf_tree(file)
     keys = keys_of(StructureFile) | keys_of(NtrtFile)
     content = read_mapping(file, "structure file", keys=keys)
     if not KEYS_OF_NTRT & content.keys():

@@ -1,0 +1,450 @@
+"""Reader of MJCF models with tendons, as structures.
+
+Spatial tendons over sites become cables, routed ones where they have more than two sites. A body
+with a free joint becomes a rigid body, with the parts that are welded to it and with MuJoCo's mass,
+centre and inertia. Its sites are nodes. A capsule or a cylinder between two nodes is a strut. Sites
+of the world are fixed nodes. The places are those at MuJoCo's initial state, qpos0. Nodes where
+spheres and capsules touch a level plane are feet, and the plane becomes the ground at z = 0. A free
+robot that is lower is raised to it.
+Actuators of tendons become oscillators. The spring of a position actuator belongs to its cable.
+
+Tendons of MuJoCo push below their spring length, and their dampers also act where a cable is slack.
+Cables do neither. A scenario has its own friction, ground and solver. Cameras, lights, materials
+and sensors are no part of a structure. Everything else that is left out is told.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import logging
+import re
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.blueprint import TOLERANCE
+from tetra_drake.scenario.mjcf_file import compiled_model
+from tetra_drake.scenario.robot_structure import MOST_NODES
+from tetra_drake.settings.section import Tree
+
+SAME_HEIGHT = 1e-6
+"""Height (m) of a plane up to which nodes keep their coordinates and feet change their radii."""
+_LARGEST_GAP = 1000.0
+"""Largest gap of a joint that is closed, as a multiple of the distance that makes two nodes one."""
+_WORLD = 0
+
+_LOG = logging.getLogger("tetra_drake")
+
+
+def mjcf_tree(file: Path) -> Tree:
+    """Converts an MJCF file to the content of a structure file.
+
+    The log names what is left out, and the key `ignored` lists it. Names that structure files
+    refuse are changed: "_" takes the place of blanks, dots, commas and brackets. Raises InputError
+    that names the file.
+    """
+    model, removed = compiled_model(file)
+    if model.nsite > MOST_NODES:
+        problem = f"found {model.nsite} sites, expected at most {MOST_NODES}"
+        raise InputError(file, "worldbody", problem)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
+        made = _MjcfTranslation(model)
+        tree = made.tree()
+    notes = {"settings of earlier versions of MuJoCo": removed, **made.notes}
+    tree["ignored"] = [f"{what}: {', '.join(names)}" for what, names in notes.items() if names]
+    if not tree["cables"]:
+        problem = "has no spatial tendon that can be a cable, expected one"
+        raise InputError(file, "tendon", "; ".join([problem, *tree["ignored"]]))
+    for line in tree["ignored"]:
+        _LOG.warning("%s: %s", file, line)
+    return {key: part for key, part in tree.items() if part}
+
+
+class _MjcfNode(NamedTuple):
+    """Node of a rigid body."""
+
+    root: int
+    """First of the rigid body's bodies in MuJoCo; 0 for the world."""
+    place: np.ndarray
+    """Position (3,) in the world."""
+
+
+class _MjcfPart(NamedTuple):
+    """Cable, strut or foot."""
+
+    name: str
+    """Name of the tendon or geom."""
+    nodes: list[str]
+    settings: Tree
+
+
+class _MjcfTranslation:
+    """Conversion of a compiled model to the content of a structure file."""
+
+    def __init__(self, model: Any) -> None:
+        import mujoco
+
+        self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
+        mujoco.mj_kinematics(model, self.data)
+        self.nodes: dict[str, _MjcfNode] = {}
+        self.notes: dict[str, list[str]] = {}
+        """Names of elements that are changed or left out, by what is told of them."""
+        self.is_linear = _are_linear(mujoco, model)
+        is_on_tendon = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+        self.driven = np.where(is_on_tendon, model.actuator_trnid[:, 0], -1)
+        """Tendon that each actuator drives (actuators,); -1 for an actuator of something else."""
+        size = np.ptp(np.vstack([self.data.site_xpos, self.data.xpos]), axis=0)
+        self.near = TOLERANCE * float(np.linalg.norm(size))
+        """Distance up to which two points are one node."""
+        for what, kind, is_changed in _changes(mujoco, model):
+            for number in np.flatnonzero(is_changed).tolist():
+                self._note(what, kind, number)
+
+    def tree(self) -> Tree:
+        """Content of the structure file."""
+        model, paths = self.model, dict(self._paths())
+        connects = self._equalities(self.mujoco.mjtEq.mjEQ_CONNECT)
+        roots = self.roots[model.site_bodyid].tolist()
+        on_paths = {*itertools.chain(*paths.values())}
+        reached = {root for eq in connects for root, _ in self._ends_of(eq)}
+        used = sorted(({roots[site] for site in on_paths} | reached) - {_WORLD})
+        for root in sorted({*self.roots.tolist()} - {*used, _WORLD}):
+            self._note("bodies that no tendon and no connect reaches, left out", "body", root)
+        node_of = {}
+        for site, root in enumerate(roots):
+            if site in on_paths or root in used:
+                place = self._place(model.site_bodyid[site], model.site_pos[site])
+                node_of[site] = self._node(root, place, self._name("site", site))
+        joints, anchors = self._joints(connects)
+        floor, is_touching = self._floor()
+        level = 0.0
+        if floor is not None:
+            level = float(self._place(model.geom_bodyid[floor], model.geom_pos[floor])[2])
+        sunk = level if abs(level) < SAME_HEIGHT else 0.0
+        rods, feet = self._rods_and_feet(used, is_touching, sunk)
+        ground = level - sunk
+        if floor is None or not self._nodes_of(_WORLD):  # a free robot may stand in the soft floor
+            lows = [node.place[2] - feet.get(name, 0.0) for name, node in self.nodes.items()]
+            ground = min([ground, *lows])
+        struts, strut_names = _grouped(rods, "pairs")
+        nodes_of = {tendon: [node_of[site] for site in sites] for tendon, sites in paths.items()}
+        found = [self._cable(tendon, nodes) for tendon, nodes in nodes_of.items()]
+        cables, cable_names = _grouped(found, "pairs")
+        self._close(joints)
+        return {
+            "nodes": {n: _coordinates(node.place, ground) for n, node in self.nodes.items()},
+            "struts": struts,
+            "cables": cables,
+            "spheres": _spheres(feet),
+            "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground),
+            "joints": joints,
+            "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | anchors,
+            "actuated": self._actuated(dict(zip(paths, cable_names, strict=True))),
+            "contacts": [] if feet.keys() == {*self._nodes_of(*used)} else [*feet],
+            "gravity": _text(self._gravity(), "m/s^2"),
+        }
+
+    def _name(self, kind: str, number: int) -> str:
+        """Name of an element, such as a site; its kind and number if it has none."""
+        return getattr(self.model, kind)(number).name or f"{kind}{number}"
+
+    def _note(self, what: str, kind: str, number: int) -> None:
+        self.notes.setdefault(what, []).append(self._name(kind, number))
+
+    def _equalities(self, kind: Any) -> list[int]:
+        """Indices of the active equality constraints of a kind."""
+        is_active = self.model.eq_active0.astype(bool)
+        return np.flatnonzero(is_active & (self.model.eq_type == kind)).tolist()
+
+    @functools.cached_property
+    def roots(self) -> np.ndarray:
+        """First body of the rigid body that each body belongs to (bodies,); 0 for the world. Only a
+        free joint parts a body from its parent."""
+        model = self.model
+        free = model.jnt_bodyid[model.jnt_type == self.mujoco.mjtJoint.mjJNT_FREE].tolist()
+        self.roots = roots = np.zeros(model.nbody, dtype=int)  # _ends_of() reads it
+        for body in range(1, model.nbody):
+            roots[body] = body if body in free else roots[model.body_parentid[body]]
+        for eq in self._equalities(self.mujoco.mjtEq.mjEQ_WELD):
+            first, second = sorted(root for root, _ in self._ends_of(eq))
+            roots[roots == second] = first
+        return roots
+
+    def _place(self, body: int, p: np.ndarray) -> np.ndarray:
+        """Position (3,) in the world of the point p (3,) of a body of MuJoCo. MuJoCo's own position
+        of a site is the body's if it is less than 1e-6 m away."""
+        return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ p)
+
+    def _ends_of(self, eq: int) -> Iterator[tuple[int, np.ndarray]]:
+        """The two rigid bodies of a connect or weld, each with the point (3,) of the connect on it,
+        in the world."""
+        model = self.model
+        ends = [model.eq_obj1id[eq], model.eq_obj2id[eq]]
+        points = model.eq_data[eq, :6].reshape(2, 3)
+        if model.eq_objtype[eq] == int(self.mujoco.mjtObj.mjOBJ_SITE):
+            points, ends = model.site_pos[ends], model.site_bodyid[ends]
+        for body, p in zip(ends, points, strict=True):
+            yield int(self.roots[body]), self._place(body, p)
+
+    def _nodes_of(self, *roots: int) -> list[str]:
+        """Names of the nodes of rigid bodies."""
+        return [name for name, node in self.nodes.items() if node.root in roots]
+
+    def _found(self, root: int, place: np.ndarray) -> str | None:
+        """Node of a rigid body at a place (3,) in the world; None if there is none."""
+        of_body = ((name, self.nodes[name].place - place) for name in self._nodes_of(root))
+        return next((name for name, way in of_body if np.linalg.norm(way) <= self.near), None)
+
+    def _node(self, root: int, place: np.ndarray, name: str) -> str:
+        """Node of a rigid body at a place; a new one of this name if there is none."""
+        found = self._found(root, place) or _plain(name, self.nodes)
+        self.nodes.setdefault(found, _MjcfNode(root, place))
+        return found
+
+    def _paths(self) -> Iterator[tuple[int, list[int]]]:
+        """Spatial tendons that can be cables, each with its sites in order."""
+        model, wrap = self.model, self.mujoco.mjtWrap
+        for tendon, first in enumerate(model.tendon_adr):
+            own = slice(first, first + model.tendon_num[tendon])
+            kinds = model.wrap_type[own]
+            sites = model.wrap_objid[own][kinds == wrap.mjWRAP_SITE].tolist()
+            if np.isin(kinds, [wrap.mjWRAP_JOINT, wrap.mjWRAP_PULLEY]).any():
+                self._note("tendons over joints or pulleys, left out", "tendon", tendon)
+            elif len({*self.roots[model.site_bodyid[sites]].tolist()}) == 1:
+                self._note("tendons that join a body to itself, left out", "tendon", tendon)
+            elif self._law(tendon)[0] <= 0.0:
+                self._note("tendons without stiffness, left out", "tendon", tendon)
+            else:
+                if len(sites) < len(kinds):
+                    what = "tendons around surfaces, read as straight between sites"
+                    self._note(what, "tendon", tendon)
+                yield tendon, sites
+
+    def _law(self, tendon: int) -> tuple[float, float, float]:
+        """Stiffness, damping and free length of a tendon, with the springs and dampers of its
+        actuators."""
+        model = self.model
+        stiffness, damping = model.tendon_stiffness[tendon], model.tendon_damping[tendon]
+        force = stiffness * model.tendon_lengthspring[tendon, 1]
+        for actuator in np.flatnonzero(self.is_linear & (self.driven == tendon)):
+            gear = model.actuator_gear[actuator, 0]
+            push, per_length, per_rate = model.actuator_biasprm[actuator, :3]
+            stiffness, damping = stiffness - gear**2 * per_length, damping - gear**2 * per_rate
+            force += gear * push
+        return stiffness, damping, force / stiffness if stiffness else 0.0
+
+    def _cable(self, tendon: int, nodes: list[str]) -> _MjcfPart:
+        """Cable of a tendon, from the nodes at its sites."""
+        law = map(_text, self._law(tendon), ["N/m", "N*s/m", "m"])
+        settings = dict(zip(["stiffness", "damping", "free_length"], law, strict=True))
+        path = [node for node, _ in itertools.groupby(nodes)]
+        return _MjcfPart(self._name("tendon", tendon), path, settings)
+
+    def _floor(self) -> tuple[int | None, np.ndarray]:
+        """The first level plane, and a mask (geoms,) of what can touch it."""
+        model = self.model
+        kinds, others = model.geom_contype, model.geom_conaffinity
+        is_plane = model.geom_type == self.mujoco.mjtGeom.mjGEOM_PLANE
+        is_level = self.data.geom_xmat[:, 8] > 1.0 - TOLERANCE**2
+        floors = np.flatnonzero(is_plane & is_level).tolist()
+        is_solid = (self.roots[model.geom_bodyid] == _WORLD) & ((kinds | others) != 0)
+        for geom in np.flatnonzero(is_solid).tolist():
+            if geom not in floors[:1]:
+                self._note("shapes of the world, left out", "geom", geom)
+        if not floors:
+            return None, np.zeros(model.ngeom, dtype=bool)
+        floor = floors[0]
+        pairs = np.stack([model.pair_geom1, model.pair_geom2], axis=1)
+        paired = np.isin(np.arange(model.ngeom), pairs[(pairs == floor).any(axis=1)])
+        masks = (kinds & others[floor]) | (kinds[floor] & others)
+        return floor, paired | (masks != 0)
+
+    def _rods_and_feet(
+        self, used: list[int], is_touching: np.ndarray, sunk: float
+    ) -> tuple[list[_MjcfPart], dict[str, float]]:
+        """Capsules and cylinders between two nodes, and the radius (m) of each node that touches
+        the floor: spheres, and ends of capsules. `sunk` is added to the radii."""
+        model, data, kinds = self.model, self.data, self.mujoco.mjtGeom
+        rods: dict[frozenset[str], _MjcfPart] = {}
+        feet: dict[str, float] = {}
+        sphere, capsule = int(kinds.mjGEOM_SPHERE), int(kinds.mjGEOM_CAPSULE)
+        is_used = np.isin(self.roots[model.geom_bodyid], used)
+        for geom in sorted(np.flatnonzero(is_used).tolist(), key=model.geom_type.__getitem__):
+            kind, (radius, half, _) = model.geom_type[geom], model.geom_size[geom]
+            root, name = int(self.roots[model.geom_bodyid[geom]]), self._name("geom", geom)
+            axis = data.geom_xmat[geom].reshape(3, 3)[:, 2] * half  # 0 for a sphere
+            middle = self._place(model.geom_bodyid[geom], model.geom_pos[geom])
+            places = middle + np.outer([-1.0, 1.0], axis)
+            if is_touching[geom] and kind in (sphere, capsule):
+                for node in [self._node(root, place, name) for place in places]:
+                    feet[node] = max(feet.get(node, 0.0), radius + sunk)
+            elif is_touching[geom]:
+                self._note("shapes that touch the floor in MuJoCo, but not here", "geom", geom)
+            ends = [end for place in places if (end := self._found(root, place))]
+            if kind in (capsule, int(kinds.mjGEOM_CYLINDER)) and len({*ends}) == len(places):
+                settings = {"diameter": _text(2.0 * radius, "m"), "node_diameter": "0 m"}
+                settings["density"] = "0 kg/m^3"
+                given = self.model.geom(geom).name or "strut"
+                rods.setdefault(frozenset(ends), _MjcfPart(given, ends, settings))
+        for rod in rods.values():
+            rod.settings.update({"contact_radius": "0 m"} if feet else {})
+        return [*rods.values()], feet
+
+    def _bodies(self, used: list[int], struts: dict[str, _MjcfPart], ground: float) -> Tree:
+        """Mass, centre of mass and inertia of the rigid bodies, with their struts and nodes."""
+        model, data = self.model, self.data
+        bodies: Tree = {}
+        for root in used:
+            parts = np.flatnonzero(self.roots == root)
+            mass = model.body_mass[parts]
+            centres = np.array(
+                [self._place(part, model.body_ipos[part]) for part in parts.tolist()]
+            )
+            centre = mass @ centres / mass.sum()
+            inertia = np.zeros((3, 3))
+            for part, arm in zip(parts, centres - centre, strict=True):
+                axes = data.ximat[part].reshape(3, 3)
+                inertia += axes * model.body_inertia[part] @ axes.T
+                inertia += model.body_mass[part] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+            moments = np.append(inertia.diagonal(), inertia[[0, 0, 1], [1, 2, 2]])
+            moments[np.abs(moments) < TOLERANCE**2 * moments.max()] = 0.0
+            nodes = self._nodes_of(root)
+            own = [name for name, strut in struts.items() if strut.nodes[0] in nodes]
+            on_struts = {node for name in own for node in struts[name].nodes}
+            bodies[_plain(self._name("body", root), bodies)] = {
+                "struts": own,
+                "nodes": [node for node in nodes if node not in on_struts],
+                "mass": _text(mass.sum(), "kg"),
+                "centre": _coordinates(centre, ground),
+                "inertia": [f"{moment:.15g} kg*m^2" for moment in moments],
+            }
+        return bodies
+
+    def _joints(self, connects: list[int]) -> tuple[Tree, Tree]:
+        """Joints, from connects of two bodies, and anchors, from connects with the world."""
+        joints: Tree = {}
+        anchors: Tree = {}
+        for eq in connects:
+            ends = [(root, at) for root, at in self._ends_of(eq) if root != _WORLD]
+            name = _plain(self._name("equality", eq), joints)
+            nodes = [self._node(*end, f"{name}-{i}") for i, end in enumerate(ends, 1)]
+            if len(nodes) == 1:
+                anchors[nodes[0]] = "xyz"
+            elif len({*nodes}) > 1:
+                joints[name] = {"nodes": nodes}
+        return joints, anchors
+
+    def _close(self, joints: Tree) -> None:
+        """Moves the second node of each joint with a small gap to the first."""
+        for name, joint in joints.items():
+            first, second = joint["nodes"]
+            place, node = self.nodes[first].place, self.nodes[second]
+            gap = float(np.linalg.norm(place - node.place))
+            if self.near < gap <= _LARGEST_GAP * self.near:
+                self.nodes[second] = node._replace(place=place)
+                self.notes.setdefault("joints with a gap, which is closed", []).append(name)
+
+    def _actuated(self, cables: dict[int, str]) -> Tree:
+        """Oscillators: actuators of cables, from the name of each tendon's cable. Actuators whose
+        names differ only by the names of their tendons are one oscillator."""
+        actuated: Tree = {}
+        keys: dict[str, str] = {}
+        for actuator, tendon in enumerate(self.driven.tolist()):
+            if tendon not in cables or not self.is_linear[actuator]:
+                self._note("actuators of no cable, or its second ones", "actuator", actuator)
+                continue
+            name = self._name("actuator", actuator).removesuffix(f" {self._name('tendon', tendon)}")
+            key = keys.setdefault(name, _plain(name, actuated))
+            actuated.setdefault(key, []).append(cables.pop(tendon))
+        return actuated
+
+    def _gravity(self) -> float:
+        """Acceleration of gravity along -z."""
+        option = self.model.opt
+        is_off = option.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        x, y, z = np.zeros(3) if is_off else option.gravity
+        if x or y or z > 0.0:
+            self.notes["gravity that is not along -z, left out"] = [f"{x:g} {y:g} {z:g}"]
+        if option.density or option.viscosity:
+            self.notes["fluid around the robot, left out"] = ["density, viscosity, wind"]
+        return max(0.0, -z)
+
+
+def _are_linear(mujoco: Any, model: Any) -> np.ndarray:
+    """True for the actuators (actuators,) that are forces or linear springs; False for muscles."""
+    biases = [mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE]
+    has_fixed_gain = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
+    return np.asarray(has_fixed_gain & np.isin(model.actuator_biastype, biases))
+
+
+def _changes(mujoco: Any, model: Any) -> Iterator[tuple[str, str, Any]]:
+    """What is told of elements that are changed or left out, their kind, and a mask of them."""
+    is_joint = model.jnt_type != mujoco.mjtJoint.mjJNT_FREE
+    yield "joints that are not free, read as rigid", "joint", is_joint
+    kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
+    is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
+    yield "other equality constraints, left out", "equality", ~is_known
+    is_pushing = (model.tendon_lengthspring[:, 0] > 0.0) & (model.tendon_stiffness > 0.0)
+    yield "springs that push below their length, read as cables that go slack", "tendon", is_pushing
+    names = "limited actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
+    for name in names.split():  # earlier versions of MuJoCo have not all of them
+        values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
+        yield (
+            f"the setting '{name}' of tendons, left out",
+            "tendon",
+            [np.any(value) for value in values],
+        )
+    springs = _are_linear(mujoco, model) & model.actuator_biasprm.any(axis=1)
+    yield "actuators with springs, read at control 0", "actuator", springs
+    yield "gravity compensation, left out", "body", model.body_gravcomp
+    yield "key frames, left out", "key", np.ones(model.nkey)
+    yield "flexible parts, left out", "flex", np.ones(model.nflex)
+
+
+def _spheres(feet: dict[str, float]) -> Tree:
+    """Groups of spheres without mass, from the radius of each foot. A foot of radius 0 has none."""
+    found = []
+    for node, radius in feet.items():
+        settings = {"diameter": _text(2.0 * radius, "m"), "density": "0 kg/m^3"}
+        found += [_MjcfPart("foot", [node], settings)] if radius > 0.0 else []
+    return _grouped(found, "nodes")[0]
+
+
+def _grouped(parts: Iterable[_MjcfPart], key: str) -> tuple[Tree, list[str]]:
+    """Groups of the parts with equal settings and the same beginning of the name: its first word,
+    or what is before its first digit. Returns the groups, with the parts under `key`, and the full
+    name of each part, such as "side n1 n2". The same nodes are in a group only once."""
+    groups: Tree = {}
+    names: list[str] = []
+    group_of: dict[tuple[Any, ...], str] = {}
+    copies: Counter[frozenset[str]] = Counter()
+    for name, nodes, settings in parts:
+        word = name.split()[0] if " " in name else re.split(r"\d", name)[0].strip("_-") or "part"
+        alike = word, copies[frozenset(nodes)], *settings.values()
+        copies[frozenset(nodes)] += 1
+        group = group_of.setdefault(alike, _plain(word, groups))
+        groups.setdefault(group, settings | {key: []})[key] += [nodes] if key == "pairs" else nodes
+        names.append(" ".join([group, *nodes]))
+    return groups, names
+
+
+def _plain(name: str, taken: Collection[str]) -> str:
+    """Name without the characters that structure files refuse, numbered if it is taken."""
+    plain = re.sub(r"[\s.,\[\]]+", "_", name)
+    numbered = (f"{plain}-{number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain([plain], numbered) if one not in taken)
+
+
+def _text(number: float, unit: str) -> str:
+    return f"{number:.12g} {unit}"
+
+
+def _coordinates(place: np.ndarray, ground: float) -> list[str]:
+    """Coordinates in a structure file, from the position in MuJoCo's world and the height of the
+    ground there. They are rounded to 1e-12 m."""
+    return [_text(round(x, 12) + 0.0, "m") for x in (place - [0.0, 0.0, ground]).tolist()]
