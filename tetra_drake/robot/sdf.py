@@ -1,8 +1,10 @@
-"""Model of a structure in SDFormat, without its cables, which SDFormat does not know.
+"""Model of a structure in SDFormat, without its cables, which SDFormat does not know, and joints.
 
 Each body is a link, with a frame "node NAME" for each node: the ends of cables, for AddCables().
 Fixed nodes are frames of the link "fixed nodes", which is welded to the world. What can touch has
-collision shapes: struts, and the feet of contact nodes, unless their radius is 0.
+collision shapes: struts, and the feet of contact nodes, unless their radius is 0. Joints may make
+loops, which Drake's parser refuses, so they are left to the reader: both nodes of a joint have
+frames.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ FIXED = "fixed nodes"
 
 def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
     """SDFormat text of a model called `name`: the bodies of a structure at the poses of a `state`
-    [q; v] (13*bodies,), with a frame for each node. Cables are left out."""
+    [q; v] (13*bodies,), with a frame for each node. Cables and joints are left out."""
     root = Element("sdf", version="1.9")
     model = add_element(root, "model", name=name)
     shapes = [*shapes_of(structure)]
