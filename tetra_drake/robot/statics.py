@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.scenario.blueprint import Segments
@@ -58,7 +59,9 @@ def find_statics(
         apart = motions[joints[:, 0]] - motions[joints[:, 1]]
         constraints = np.concatenate([constraints, apart.reshape(-1, 6 * bodies)])
     allowed = null_space(constraints, TOLERANCE)
-    self_stresses = null_space(allowed.T @ wrenches, TOLERANCE)
+    felt = csr_array(allowed.T @ wrenches if len(constraints) else wrenches)
+    squares, stresses = np.linalg.eigh((felt.T @ felt).toarray())  # of the singular values
+    self_stresses = stresses[:, squares <= TOLERANCE**2 * squares.max(initial=0.0)]
     rank = wrenches.shape[1] - self_stresses.shape[1]
 
     idle = []  # spins of straight bodies about their axes; of points about all axes
