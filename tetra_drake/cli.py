@@ -31,7 +31,7 @@ _say = partial(print, flush=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one command; returns the exit status."""
+    """Runs one command with arguments `argv`, by default the process's. Returns the exit status."""
     command, options = make_parser().call_of(argv)
     units = options.pop("units")
     try:
@@ -402,7 +402,7 @@ def _robustness(
     """Test gaits under disturbances that were not used in evolution.
 
     Simulates a gait, or the best gait of each trial of a run, on the compiled engine: undisturbed,
-    in new draws of the scenario's disturbances (5 percent if it has none), and with each
+    in random draws of the scenario's disturbances (5 percent if it has none), and with each
     disturbance alone. Prints how far it walks, in how many draws it is robust (loses at most a
     tenth of its undisturbed distance), and which disturbance hurts most.
 
@@ -641,7 +641,8 @@ def _prepare() -> None:
 
 
 def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
-    """Size, fonts and files of printed figures. The width is in m, the font size in points."""
+    """Settings for the files of figures, from options of a command. The width is in m, the size of
+    letters `font` in points. `pdf` adds PDF to the file types."""
     from tetra_drake.figures.style import FILE_KINDS, Look, Print
 
     look = Look(width_in=width / INCH, font_size=font, title=title)
@@ -651,8 +652,9 @@ def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
 def _chosen_gait(
     scenario: str | None, gait: Path | None, seed: int | None, engine: str | None = None
 ) -> tuple[Scenario, Gait]:
-    """The scenario, on the engine, and the gait that a command simulates. Without a gait file, the
-    gait is random."""
+    """The scenario, with the named engine, and the gait that a command simulates, from its options.
+    `gait` is a gait file or the folder of a run. Without it, the gait is random, by `seed` or by a
+    seed that walks."""
     from tetra_drake.evolution.run import load_source
     from tetra_drake.robot.gait import WALKING_SEED, seeded_gait
     from tetra_drake.scenario.load import load_scenario

@@ -28,8 +28,8 @@ _IN_WORDS = {
 class InputError(ValueError):
     """Error of input that cannot be used. The message is one line.
 
-    `source` is the file, option or function, `key` the position in it. The message says what was
-    found and what was expected.
+    `source` is the file, option or function, `key` the position in it ("" for the whole).
+    `problem` says what was found and what was expected.
     """
 
     def __init__(self, source: object, key: str, problem: str) -> None:
@@ -45,12 +45,13 @@ class InputError(ValueError):
         super().__init__(_one_line(f"{origin}: {self.problem}"))
 
     def _render_traceback_(self) -> list[str]:
-        """The error in IPython and notebooks: its message alone."""
+        """The lines that IPython and notebooks show for the error: its message, no traceback."""
         return [f"{type(self).__name__}: {self}"]
 
 
 def _one_line(text: str) -> str:
-    """The text on one line. Control characters are escaped, because a terminal would obey them."""
+    """The text on one line: runs of spaces and line feeds become one space. Control characters are
+    escaped, because a terminal would obey them."""
     line = " ".join(text.split())
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in line)
 
@@ -62,7 +63,8 @@ def _cut(text: str, length: int) -> str:
 def check_whole(
     source: object, key: str, number: Any, *, least: int, most: int | None = None
 ) -> int:
-    """A number as int. Raises InputError unless it is a whole number from `least` to `most`."""
+    """A number as int. Raises InputError unless it is a whole number from `least` to `most` (None
+    for no limit). `source` and `key` tell the error where the number was given."""
     is_whole = isinstance(number, numbers.Integral) and not isinstance(number, bool)
     if not is_whole or number < least or (most is not None and number > most):
         limits = f"{least} or more" if most is None else f"{least} to {most}"
@@ -71,8 +73,8 @@ def check_whole(
 
 
 def check_type(source: object, key: str, value: object, *kinds: Any) -> None:
-    """Raises InputError unless a value has one of the types `kinds`. True and False are no
-    numbers."""
+    """Raises InputError unless a value has one of the types `kinds`. True and False do not count as
+    numbers. `source` and `key` tell the error where the value was given."""
     is_truth = isinstance(value, bool) and bool not in kinds
     if is_truth or not isinstance(value, kinds):
         expected = " or ".join(_IN_WORDS.get(kind, kind.__name__) for kind in kinds)
@@ -112,7 +114,7 @@ class Diverged(SimulationFailure):
 
     @classmethod
     def too_fast(cls, *, time: float, limit: float) -> Self:
-        """The failure of a robot that has a body beyond the speed limit (m/s)."""
+        """The failure of a robot that has a body faster than `limit` (m/s), at `time` (s)."""
         reason = f"a body moves faster than simulation.max_speed, {limit:.4g} m/s"
         return cls(time=time, reason=reason)
 
@@ -122,8 +124,8 @@ class StepBudgetExceeded(SimulationFailure):
 
 
 class TimeBudgetExceeded(Exception):
-    """Failure of a simulation that used up its wall time. It is not a RuntimeError, because engines
-    treat a RuntimeError as divergence."""
+    """Failure of a simulation that used up its limit of wall time. It is not a RuntimeError,
+    because engines treat a RuntimeError as divergence."""
 
     wall_time = 0.0
     """Wall time of the simulation in s; 0 if the engine does not measure it."""

@@ -60,7 +60,7 @@ def evolve(
     Args:
         scenario: A scenario, its name or its file. May be None with `resume`.
         out: The new directory.
-        seed: 0 by default. The record depends only on scenario, method and seed.
+        seed: Random seed; 0 by default. The record depends only on scenario, method and seed.
         workers: Number of worker processes; one per core by default. A Dask cluster uses all of its
             workers.
         resume: Continues the run in `out`. Scenario, seed, optimiser and objective must be the same
@@ -79,10 +79,10 @@ def evolve(
         progress: True shows bars on a terminal, and lines in notebooks and files. A Progress (see
             evolution.progress) is a display of your own.
         reevaluate: After the evolution, evaluates the best gaits on the Drake diagram if the engine
-            is another, and simulates the gaits of a map on disturbed robots. By default a new run
-            does so, and a resumed run does what it was begun with.
-        report: After the evolution, writes report.html, replay.html, figures/ and, for a map,
-            elites/.
+            is another, and simulates the gaits of a quality-diversity map on disturbed robots. By
+            default a new run does so, and a resumed run does what it was begun with.
+        report: After the evolution, writes report.html, replay.html, figures/ and, for a
+            quality-diversity map, elites/.
 
     Raises:
         InputError: An argument cannot be used. Also if a worker process dies, for example because
@@ -179,8 +179,8 @@ def fit(
         measurements: values of the kinds td.MotionCapture and td.Rest.
         parameters: the bounds, least and most, by scenario key. Texts have units; numbers are SI.
             Keys joined by commas get the same value.
-        search: searches all values within the bounds for a better start, by CMA-ES, for data that
-            several minima may fit.
+        search: before least squares, searches all values within the bounds for a better start, by
+            CMA-ES; for data that several minima may fit.
         out: a folder for the fitted scenario, tables, figure and page. It also keeps each
             evaluation, so that an interrupted fit goes on where it was.
         say: function that gets a line of text after each iteration.
@@ -219,8 +219,9 @@ def _simulate_again(
     executor: MakeExecutor | None,
     progress: Progress,
 ) -> None:
-    """Evaluates the best gaits on the Drake diagram, unless it was the engine of the run. Simulates
-    the gaits of a map on disturbed robots."""
+    """Evaluates the best gaits of a run on the Drake diagram, unless it was the run's engine.
+    Simulates the gaits of a quality-diversity map, if any, on disturbed robots. Records both in the
+    run's folder; an error becomes a warning."""
     from tetra_drake.study.elites import judge_elites
 
     directory = record.directory
@@ -247,9 +248,9 @@ def _completing(progress: Progress, failing: str) -> Iterator[None]:
 def _introduce(
     progress: Progress, record: RunRecord, workers: object, *, drawing: str, is_new: bool
 ) -> None:
-    """Shows the method, the scenario and the files to come; `drawing` is the command that draws
-    them, empty for none. Warns if versions differ, and of settings with which the robot hardly
-    works."""
+    """Shows a run's method, scenario and number of workers at its start, and the files to come;
+    `drawing` is the shell command that draws them, empty for none. Warns if versions differ, and of
+    settings with which the robot hardly works."""
     directory, manifest = record.directory, record.manifest
     text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
     text += str(manifest.scenario)

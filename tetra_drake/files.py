@@ -67,8 +67,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def writing(path: str | Path) -> Iterator[None]:
-    """Context manager: errors of the system become InputError, which says that `path` cannot be
-    written."""
+    """Context manager: an OSError or ValueError in the block becomes an InputError, which says that
+    `path` cannot be written."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -84,8 +84,8 @@ def given_path(path: str | Path, source: str, what: str) -> Path:
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """Valid file names for any texts, by text. They are different even where upper and lower case
-    are the same."""
+    """Valid file names for any texts: a dict from each text to its file name. The names are
+    different even where upper and lower case are the same."""
     found: dict[str, str] = {}
     for name in names:
         taken = {other.casefold() for other in found.values()}
@@ -98,8 +98,8 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def make_folder(folder: Path, *, source: Path | None = None) -> None:
-    """Makes a folder if it does not exist. Raises InputError if that fails; the error names
-    `source`, by default the folder."""
+    """Makes a folder and its parents if they do not exist. Raises InputError if that fails; the
+    error names `source`, by default the folder."""
     source = source or folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -124,7 +124,7 @@ def _check_name(path: str | Path) -> None:
 
 
 def _check_no_other(path: str | Path) -> None:
-    """Raises InputError if `path` exists and is no file. Writing by rename would replace a
+    """Raises InputError if `path` exists and is no regular file. Writing by rename would replace a
     device."""
     if os.path.lexists(path) and not os.path.isfile(path):
         what = "directory" if os.path.isdir(path) else "device, a pipe or a broken link"
@@ -146,17 +146,18 @@ def check_folder(folder: str | Path) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """Reason of an error, without the path: messages name the path already."""
+    """Text for the reason of an error, without the path: our messages name the path already."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def json_number(value: Any) -> Any:
-    """A value for JSON: None in place of a number that is not finite."""
+    """A value for JSON: None in place of a float that is not finite; any other value as it is."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def read_json(path: str | Path, what: str) -> Any:
-    """Content of a JSON file. Raises InputError like read_bytes(), and if a key is given twice."""
+    """Content of a JSON file. `what` names the expected content in errors. Raises InputError like
+    read_bytes(), if the file is not JSON, and if a key is given twice."""
     text = read_text(path, what)
     try:
         return json.loads(text, object_pairs_hook=_unique_keys)
@@ -172,7 +173,8 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
-    """Text of a UTF-8 file with at most `most` bytes. Raises InputError like read_bytes()."""
+    """Text of a UTF-8 file with at most `most` bytes. `what` names the expected content in errors.
+    Raises InputError like read_bytes(), and if the file is not UTF-8."""
     try:
         return read_bytes(path, what, most=most).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -182,8 +184,8 @@ def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
 def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
     """Content of a file with at most `most` bytes. `what` names the expected content in errors.
 
-    Raises InputError if the file cannot be read. Devices and pipes are refused, because they may
-    never end.
+    Raises InputError if the file cannot be read or has more than `most` bytes. Devices and
+    pipes are refused, because they may never end.
     """
     content = b""
     try:

@@ -19,11 +19,13 @@ _ROUNDING = 1e-12
 
 
 def silent(text: str) -> None:
-    """Shows nothing, in place of another Say."""
+    """Does nothing. It is the default where a function takes a Say, a function that shows a
+    text."""
 
 
 def fixed(value: float, digits: int = 2) -> str:
-    """A number with this many decimals, never "-0.00". "-" if it is not finite."""
+    """A number as text with this many decimals, never "-0.00". It is "-" if the number is not
+    finite."""
     if not math.isfinite(value):
         return "-"
     return f"{value:z.{digits}f}"
@@ -36,8 +38,8 @@ def signed(value: float, digits: int = 2) -> str:
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """A number with this many significant digits, without exponent. "-" if it is not finite, and 0
-    for a rounding error."""
+    """A number as text with this many significant digits, without exponent. It is "-" if the number
+    is not finite, and "0" if it is so small that it is a rounding error."""
     if abs(value) < _ROUNDING or not math.isfinite(value):
         return fixed(value, 0)
     magnitude = int(f"{value:.{digits - 1}e}".partition("e")[2])
@@ -45,7 +47,7 @@ def rounded(value: float, digits: int = 3) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time as h:mm:ss; "-" if it is not finite."""
+    """A time in s as text h:mm:ss; "-" if it is not finite."""
     if not math.isfinite(seconds):
         return "-"
     minutes, second = divmod(round(seconds), 60)
@@ -65,20 +67,22 @@ def sentence(remark: str) -> str:
 
 
 def ranged(value: float, low: float, high: float) -> str:
-    """A number and its range in brackets. An unknown range, or one without width, is left out."""
+    """A number and its range in brackets, such as "3 (2 to 4)". An unknown range (`low` is NaN), or
+    one without width, is left out."""
     if math.isnan(low) or low == high:
         return rounded(value)
     return f"{rounded(value)} ({rounded(low)} to {rounded(high)})"
 
 
 def percents(share: float, low: float, high: float) -> str:
-    """A share in percent and its range in brackets. A range without width is left out."""
+    """A share in percent and its range in brackets, such as "50 % (40 to 60)". Arguments are shares
+    from 0 to 1. A range without width is left out."""
     text = f"{100.0 * share:.0f} %"
     return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
 def heading_html(text: str) -> str:
-    """Lines of text as HTML above a table, the first in bold."""
+    """Lines of plain text as HTML, to stand above a table. The first line is in bold."""
     first, *others = html.escape(text).splitlines()
     return "<br>".join([f"<b>{first}</b>", *others])
 
@@ -91,7 +95,8 @@ _UNBROKEN = str.maketrans({" ": "\u00a0", "–": "–\u2060"})
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table of texts with headings."""
+    """A table of texts with a heading for each column. Methods give it as plain text, HTML or
+    Markdown."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -105,7 +110,7 @@ class TextTable:
 
     def text(self) -> str:
         """The table as aligned lines. If it is wider than the terminal, headings of numbers are
-        folded first, then texts; wide columns before narrow ones. Numbers never are."""
+        folded first, then texts; wide columns before narrow ones. Numbers are never folded."""
         columns, texts = list(zip(self.headings, *self.rows, strict=True)), self._holds_texts
         widths = [max(map(len, cells)) for cells in columns]
         least = [

@@ -82,7 +82,8 @@ class _Episodes:
         render_mode: str | None,
         most_steps: int | None = None,
     ) -> None:
-        """Makes robots on which no episode has begun. An episode has at most `most_steps` steps."""
+        """Takes the robots of a simulation, on which no episode has begun. An episode is truncated
+        after `most_steps` steps. For the other arguments, see TensegrityEnv."""
         check_type(_SOURCE, "grouped", grouped, bool)
         if render_mode is not None and str(render_mode) != _RENDERED:
             problem = f"found {render_mode!r:.60}, expected {_RENDERED!r} or None"
@@ -110,8 +111,9 @@ class _Episodes:
         self._steps, self._going = np.zeros(count, dtype=int), np.zeros(count, dtype=bool)
 
     def reset(self, places: np.ndarray, generators: Sequence[np.random.Generator]) -> np.ndarray:
-        """Begins episodes of the robots with the indices `places`. The generators of all robots
-        give the seeds. Returns the observations of all robots."""
+        """Begins episodes of the robots with the indices `places`. There is a generator for each
+        robot of the simulation; it draws the seed of the robot's disturbances. Returns the
+        observations of all robots (N, size)."""
         seeds = [int(generators[place].integers(2**31)) for place in places]
         readings = self.simulation.reset(seed=seeds, indices=places)
         self._steps[places], self._going[places] = 0, True
@@ -125,8 +127,10 @@ class _Episodes:
     def step(
         self, actions: np.ndarray, places: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Simulates a control period of the robots with the indices `places`. Returns observations,
-        rewards, and whether episodes are terminated and truncated, of all robots."""
+        """Simulates a control period of the robots with the indices `places`; the others pause.
+        `actions` (N, actions) are shares of the typical amplitude, see tetra_drake.gym. Returns
+        observations (N, size), rewards (N,), and whether episodes are terminated (N,) and truncated
+        (N,), of all robots. Raises InputError for a robot without an episode."""
         simulation = self.simulation
         if (over := places[~self._going[places]]).size:
             raise InputError(_SOURCE, "step", f"robot {over[0]} has no episode; reset() begins one")
@@ -156,7 +160,8 @@ class _Episodes:
         return self._observe(readings), rewards, terminated, truncated
 
     def _fitness(self, readings: Readings, place: int) -> float:
-        """Fitness of one robot up to now, without the metrics that are known only at the end."""
+        """Fitness of the robot with the index `place` up to now, without the metrics that are known
+        only at the end. `readings` is the state of all robots now."""
         scenario, structure = self._scenario, self.simulation.robot.structure
         nodes = np.stack([self._start[place], self._steady[place], readings.p_WN[place]])
         steady_time = scenario.simulation.duration - scenario.simulation.settling_time
@@ -168,7 +173,8 @@ class _Episodes:
         return fitness + objective.get("rolled", 0.0) * self._rolled[place]
 
     def _setpoints(self, actions: np.ndarray) -> np.ndarray:
-        """Setpoints (N, driven cables) of the actuators for actions of the environment."""
+        """Setpoints (N, driven cables) of the actuators, in SI units, for actions (N, actions) of
+        the environment. Each is a force, free length or tension, depending on the actuators."""
         shape = self.simulation.count, *self.action_space.shape
         actions = checked_actions(actions, shape, source="tetra_drake.gym")
         cpg = self._scenario.cpg
@@ -177,14 +183,15 @@ class _Episodes:
         return np.asarray(self._scenario.actuation.commands(self._cables._replace(signal=signals)))
 
     def pictures(self) -> tuple[np.ndarray, ...]:
-        """Pictures of all robots now; see visualization.picture."""
+        """Pictures (height, width, 3) of all robots now, in RGB; see visualization.picture."""
         from tetra_drake.visualization.picture import picture
 
         simulation = self.simulation
         return tuple(picture(simulation.robot, p_WN) for p_WN in simulation.state.p_WN)
 
     def _observe(self, readings: Readings) -> np.ndarray:
-        """Observations of all robots (N, size); see tetra_drake.gym."""
+        """Observations of all robots (N, size) from their state; the module's docstring lists the
+        parts of a row."""
         per_length, per_weight = 1.0 / self._start_lengths, 1.0 / self._weight
         parts = (
             readings.lengths * per_length - 1.0,
@@ -214,9 +221,10 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
         """Args:
             scenario: a scenario, its name or file, or a run.
             control_period: time (s) between actions; by default the scenario's.
-            grouped: an action for each oscillator, otherwise for each driven cable.
+            grouped: if True, an action has a number for each oscillator, which moves all cables of
+                the oscillator; otherwise for each driven cable.
             record: records the trajectories, for result().
-            render_mode: "rgb_array" for pictures by render().
+            render_mode: "rgb_array" for pictures by render(); None for no pictures.
 
         Raises:
             InputError: if an argument does not fit the scenario.
@@ -245,8 +253,9 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
         return self._episodes.pictures()[0] if self.render_mode else None
 
     def result(self) -> SimulationResult:
-        """The result of an episode that has reached `simulation.duration`, until the next reset.
-        Raises its failure if it failed, and InputError if it has not ended."""
+        """The result of the last episode, which must have reached `simulation.duration`; available
+        until the next reset(). Raises its SimulationFailure if the robot failed, and InputError if
+        the episode has not ended."""
         return self._episodes.simulation.result()
 
 
@@ -273,8 +282,9 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
     ) -> None:
-        """See TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes
-        are truncated after `max_episode_steps`. `autoreset_mode` is "NextStep", "SameStep" or
+        """Makes `num_envs` robots on a scenario. For the arguments not named here, see
+        TensegrityEnv. `workers` is the number of threads, one per core by default. Episodes are
+        truncated after `max_episode_steps`. `autoreset_mode` is "NextStep", "SameStep" or
         "Disabled"."""
         options: Info = {"grouped": grouped, "render_mode": render_mode}
         made: Info = {"control_period": control_period, "workers": workers}
@@ -300,9 +310,9 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[np.ndarray, Info]:
-        """Begins episodes of all robots, or where the option `reset_mask` (N,) is True. `seed` is
+        """Begins episodes of all robots, or where `options["reset_mask"]` (N,) is True. `seed` is
         the seed of the first robot, and the next integers are the seeds of the others; or it is a
-        list of seeds."""
+        list of seeds, one per robot. Returns the observations (N, size) and an empty info."""
         _check_options(options, _MASK)
         mask = (options or {}).get(_MASK, np.ones(self.num_envs, dtype=bool))
         is_mask = isinstance(mask, np.ndarray) and mask.dtype == bool and mask.any()
@@ -342,7 +352,7 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         return seen, rewards, terminated, truncated, info
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Pictures of the robots now; None without a `render_mode`."""
+        """Pictures (height, width, 3) of the robots now; None without a `render_mode`."""
         return self._episodes.pictures() if self.render_mode else None
 
 
@@ -351,7 +361,8 @@ def _checked_seed(seed: Any) -> int | None:
 
 
 def _check_options(options: Info | None, *known: str) -> None:
-    """Raises InputError for an option of reset() that is none of the known ones."""
+    """Raises InputError if `options`, the argument of reset(), is neither None nor a mapping whose
+    keys are all in `known`."""
     is_known = isinstance(options, Mapping) and set(options) <= set(known)
     if options is not None and not is_known:
         expected = " or ".join(["None", *known])

@@ -13,8 +13,9 @@ _AGAIN = 0.1
 
 
 class Interrupt(KeyboardInterrupt):
-    """Exception for Ctrl-C or SIGTERM. Python drops an exception that is raised in a destructor or
-    in a callback of a library, such as the compiler. A dropped interrupt is raised again."""
+    """Exception for Ctrl-C or SIGTERM in a block of heeding_interrupts(). Python drops an exception
+    that is raised in a destructor or in a callback of a library, such as the compiler. A dropped
+    interrupt is raised again shortly after."""
 
     heeded = True
     """False in a block of heeding_interrupts(): a dropped interrupt must be raised again."""
@@ -26,7 +27,8 @@ class Interrupt(KeyboardInterrupt):
 
 @contextlib.contextmanager
 def heeding_interrupts() -> Iterator[None]:
-    """Context manager: Ctrl-C and SIGTERM certainly end the block, by a KeyboardInterrupt."""
+    """Context manager: Ctrl-C and SIGTERM certainly end the block, by a KeyboardInterrupt. Outside
+    the main thread it does nothing, because only the main thread receives signals."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread receives signals
         return

@@ -17,22 +17,23 @@ def available_cores() -> int:
 
 
 def threads_for(workers: int | None, *, source: str) -> int:
-    """Number of threads for the argument `workers` of a function `source`: one per core by default.
-    Raises InputError unless it is a whole number, 1 or more."""
+    """Number of threads for the argument `workers` of the function named `source`: None means one
+    per core. Raises InputError unless it is a whole number, 1 or more."""
     if workers is None:
         return available_cores()
     return check_whole(source, "workers", workers, least=1)
 
 
 def check_package(name: str, *, extra: str, source: str) -> None:
-    """Raises InputError, naming `source`, if a package of one of this project's extras is
-    missing."""
+    """Raises InputError, naming `source`, if the package `name` is not installed. The message says
+    to install this project with its pip `extra`."""
     if importlib.util.find_spec(name) is None:
         raise InputError(source, "", f"needs {name}: pip install 'tetra_drake[{extra}]'")
 
 
 def versions(packages: Iterable[str] = ()) -> dict[str, str]:
-    """Versions of packages and kind of processor. The last digits of results depend on them.
+    """Versions of packages by name, with the keys python and processor (its kind) added. The last
+    digits of results depend on them.
 
     `packages` are additional ones, which only one engine needs.
     """

@@ -27,8 +27,8 @@ BAD_INPUT = 2  # exit status
 
 
 class Option:
-    """Annotation of a parameter's type: help and other arguments of argparse's add_argument().
-    Options with the same `group` exclude each other."""
+    """Annotation in the type of a command function's parameter: help and other arguments of
+    argparse's add_argument(). Options with the same `group` exclude each other."""
 
     def __init__(self, help: str = "", *, group: str = "", **arguments: Any) -> None:
         self.arguments = {"help": help, "group": group, **arguments}
@@ -43,10 +43,10 @@ class Parser(argparse.ArgumentParser):
 
     def add_commands(self, functions: Sequence[Callable[..., None]], *, common: Parser) -> None:
         """Adds a command for each function, by its name without an underscore in front. All have
-        the options of `common`.
+        the options of the parser `common`.
 
-        Its docstring has four paragraphs: a line for the list of commands, a description, `Args:`,
-        and an example.
+        A function's docstring has four paragraphs: a line for the list of commands, a description,
+        `Args:`, and an example. They become the command's help.
         """
         commands = self.add_subparsers(metavar="COMMAND", required=True)
         for function in functions:
@@ -73,7 +73,8 @@ class Parser(argparse.ArgumentParser):
                     groups[group].add_argument(f"--{name}", **named)
 
     def call_of(self, argv: Sequence[str] | None) -> tuple[Callable[..., None], dict[str, Any]]:
-        """The function of a command, and the values of its options."""
+        """Parses a command line, by default the process's: returns the function of its command, and
+        the values of the command's options by name. Bad options end the process with an error."""
         options, unknown = self.parse_known_args(argv)
         values = vars(options)
         function, parser = values.pop("function"), values.pop("parser")
@@ -87,7 +88,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[str, Any]]:
-    """Name, group, and arguments of add_argument() for a parameter. `text` is added to its help."""
+    """Name of a parameter's option, its group of exclusive options ("" for none), and keyword
+    arguments of add_argument(). `text` is added to its help."""
     name, kind, default = parameter.name, parameter.annotation, parameter.default
     more: dict[str, Any] = {"help": "", "group": ""}
     for part in (kind, *typing.get_args(kind)):
@@ -139,8 +141,9 @@ def number(text: str, *, least: float, most: float) -> float:
 
 
 def quantity(unit: str, example: str, *, least: str, most: str) -> Callable[[str], float]:
-    """Function that reads a quantity between limits as a number in an SI unit. Errors name the
-    `example`, or its unit."""
+    """Makes a function that reads a quantity from the text of an option, such as "100 Hz", and
+    returns it as a number in the SI unit `unit`. The limits `least` and `most` are texts with
+    units. Errors name the `example`, or its unit."""
 
     def read(text: str) -> float:
         if re.fullmatch(r"[\d.]+", text):

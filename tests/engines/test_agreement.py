@@ -15,6 +15,7 @@ import pytest
 from helpers.actuations import LIMITED, MOTOR, WINCH
 from helpers.anchored import HUNG, floating_prism, scenario_of, supported_prism
 from helpers.converged import CONVERGED, shortly
+from helpers.joined import with_arm
 from helpers.laws import COULOMB, FRICTIONS, RESET, UNEVEN
 
 from tetra_drake.engines.mujoco import INSTALL, installed
@@ -147,6 +148,8 @@ def rows() -> Iterable[Any]:
         ("supported", supported_prism(), (CONVERGE[0], Mujoco()), 1e-4),
         ("hung", bounces, (CONVERGE[0], Mujoco()), 1e-4),
         ("floating", floating_prism(), (CONVERGE[0], Mujoco()), 1e-4),
+        ("joint and ring", with_arm(), CONVERGE, 1e-6),
+        ("joint and ring", with_arm(), (CONVERGE[0], Mujoco()), 1e-4),
     ):
         yield row(name, scenario, 0.7, NO_BRISTLES, engines, {"p_WN": apart}, gait(3), 1e-3)
     for scenario, force in (("motors", 0.04), ("winch", 0.5)):

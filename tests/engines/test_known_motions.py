@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from helpers import joined
 from helpers.anchored import BAR, HUNG, SWINGING, scenario_of, supported_prism
 from helpers.bars import ACROSS, CROSSED, RADIUS, STIFFNESS, loose_bars
 from helpers.converged import CONVERGED, shortly
@@ -113,6 +114,10 @@ KNOWN = {
     "a point mass": (lambda: lowered(HANGING, 0.6), between_two_cables, 1e-6),
     # The anchor gives way by m g / k, 0.7 um, and by some more as the bar speeds up.
     "a pendulum": (leaning, as_a_pendulum, 1e-5),
+    "Atwood's machine": (joined.released, joined.as_atwood, 1e-6),
+    "a bead on a string": (joined.plucked, joined.as_a_string, 1e-5),
+    "a double pendulum": (joined.folded, joined.as_a_double_pendulum, 1e-4),
+    "a hinge": (joined.ajar, joined.as_a_flap, 1e-5),
 }
 
 

@@ -75,14 +75,15 @@ def unit_inertias(structure: Structure) -> np.ndarray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
 
 
-def joined_nodes(given: StructureFile | Tetrahedra) -> dict[str, np.ndarray]:
+def joined_nodes(given: StructureFile | Tetrahedra) -> dict[str, Any]:
     """The nodes of a robot and what joins them, as statics takes them."""
     blueprint = given.blueprint()
     return {
         "p_WN": blueprint.p_WN,
         "body_of_node": blueprint.carriers,
-        "cable_ends": blueprint.cable_ends,
+        "segments": blueprint.segments,
         "held": blueprint.held,
+        "joints": blueprint.joints,
     }
 
 

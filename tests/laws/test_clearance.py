@@ -21,7 +21,9 @@ from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 
 PAIR = Struts(
-    *map(np.array, ([0, 2], [1, 3], [0, 1, 2])), length=np.full(2, 2.0), radius=np.full(2, 0.1)
+    *map(np.array, ([0, 2], [1, 3], [0, 2], [1, 3], [0, 1, 2])),
+    length=np.full(2, 2.0),
+    radius=np.full(2, 0.1),
 )
 """Two struts of length 2, of two bodies."""
 

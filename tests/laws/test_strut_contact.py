@@ -32,9 +32,8 @@ def forces_between(first, second, v_WN=None) -> np.ndarray:
     if v_WN is not None:
         nodes[:, V_WN : V_WN + 3] = v_WN
     length = np.linalg.norm(p_WN[1::2] - p_WN[::2], axis=1)
-    struts = Struts(
-        np.array([0, 2]), np.array([1, 3]), np.array([0, 1, 2]), length, np.full(2, RADIUS)
-    )
+    ends = np.array([0, 2]), np.array([1, 3])
+    struts = Struts(*ends, *ends, np.array([0, 1, 2]), length, np.full(2, RADIUS))
     add_contact_force(struts, LAW, nodes, 0, 1)
     force = nodes[:, FORCE : FORCE + 3]
     wrenches = np.hstack([force, np.cross(p_WN, force)])

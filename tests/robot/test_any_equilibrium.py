@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers import joined
 from helpers.anchored import BAR, HUNG, SWINGING, floating_prism, scenario_of, supported_prism
 
 from tetra_drake.kernels.packed import Packed
@@ -161,6 +162,7 @@ def changes(resting: Unactuated, state: np.ndarray, size: float) -> Iterator[lis
 
 
 RESTING = [load_scenario("mast"), supported_prism(), floating_prism(), scenario_of(HUNG)]
+RESTING += [joined.with_arm(), scenario_of(joined.RHOMBUS)]
 
 
 @pytest.mark.parametrize("scenario", RESTING, ids=attrgetter("name"))

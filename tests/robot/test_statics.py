@@ -1,17 +1,23 @@
 """Self-stress states and mechanisms of structures for which they are known."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from helpers.structures import joined_nodes
 
 from tetra_drake.robot.statics import cable_wrenches, find_statics
+from tetra_drake.scenario.blueprint import Segments
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.structure_files import read_structure
 
-Joined = dict[str, np.ndarray]
+Joined = dict[str, Any]
 """Nodes and what joins them, as statics takes them."""
+
+
+def straight(ends: np.ndarray) -> Segments:
+    return Segments(ends, np.arange(len(ends)))
 
 
 def prism(n: int, twist: float, *, radius: float = 1.0, height: float = 1.5) -> Joined:
@@ -25,7 +31,7 @@ def prism(n: int, twist: float, *, radius: float = 1.0, height: float = 1.5) -> 
         "p_WN": np.stack([radius * np.cos(angles), radius * np.sin(angles), heights], axis=1),
         # A strut leads from each node below to the one above the next.
         "body_of_node": np.append(here, (here - 1) % n),
-        "cable_ends": np.concatenate([ends, n + ends, np.stack([here, n + here], axis=1)]),
+        "segments": straight(np.concatenate([ends, n + ends, np.stack([here, n + here], axis=1)])),
     }
 
 
@@ -43,15 +49,15 @@ def forces_on_bodies(joined: Joined, tensions: np.ndarray) -> np.ndarray:
     """(6 B, ...) about the nodes' centre, torques in N times the size of the structure."""
     p_WN = joined["p_WN"]
     scaled = (p_WN - p_WN.mean(axis=0)) / np.ptp(p_WN, axis=0).max()
-    ends, bodies = joined["cable_ends"], joined["body_of_node"]
-    return cable_wrenches(p_WN=scaled, body_of_node=bodies, cable_ends=ends) @ tensions
+    segments, bodies = joined["segments"], joined["body_of_node"]
+    return cable_wrenches(p_WN=scaled, body_of_node=bodies, segments=segments) @ tensions
 
 
 def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
     wrenches = cable_wrenches(
         p_WN=np.array([[0.0, 1.0, 2.0], [3.0, 1.0, 2.0]]),
         body_of_node=np.array([0, 1]),
-        cable_ends=np.array([[0, 1]]),
+        segments=straight(np.array([[0, 1]])),
     )
     assert wrenches.reshape(2, 6).tolist() == [[0, 2, -1, 1, 0, 0], [0, -2, 1, -1, 0, 0]]
 
@@ -67,7 +73,7 @@ KNOWN += [(shipped("mast"), 6, 0), (shipped("pair"), 2, 0)]
 def test_self_stress_states_and_mechanisms(joined, self_stress_states, mechanisms):
     statics = find_statics(**joined)
     assert statics.mechanisms == mechanisms
-    assert statics.self_stresses.shape == (self_stress_states, len(joined["cable_ends"]))
+    assert statics.self_stresses.shape == (self_stress_states, len(joined["segments"].ends))
     balance = forces_on_bodies(joined, statics.self_stresses.T)
     assert np.abs(balance).max(initial=0.0) < 1e-6
 
@@ -84,7 +90,7 @@ def test_tensions_of_a_prism() -> None:
 def test_the_shipped_spines_balance_without_weight(name: str) -> None:
     blueprint, joined = read_structure(name).blueprint(), shipped(name)
     laws = np.array([[law["stiffness"], law["free_length"]] for law in blueprint.cable_laws])
-    spans = joined["p_WN"][joined["cable_ends"]]
+    spans = joined["p_WN"][joined["segments"].ends]
     tensions = laws[:, 0] * (np.linalg.norm(spans[:, 1] - spans[:, 0], axis=1) - laws[:, 1])
     assert tensions.min() > 1.0
     assert np.abs(forces_on_bodies(joined, tensions)).max() < 0.02 * tensions.min()

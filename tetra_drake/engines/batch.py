@@ -24,8 +24,8 @@ class Viewer(Protocol):
     """Display of a simulation while it runs."""
 
     def wants(self, time: float) -> bool:
-        """True if the viewer wants to show the robot at this time (s). It is asked after each
-        step."""
+        """True if the viewer wants to show the robot at this simulated time (s). The engine asks
+        after each step, and calls show() if it is True."""
 
     def show(self, frame: xarray.Dataset) -> None:
         """Shows the robot. `frame` is a trajectory with a single sample; see
@@ -35,11 +35,13 @@ class Viewer(Protocol):
 class Batch:
     """Robots that an engine simulates side by side.
 
-    Each robot has a place: its index in the batch. A place without a robot is idle.
+    A batch has a fixed number N of places, numbered from 0. Each robot is in a place; a place
+    without a robot is idle.
     """
 
     def __init__(self, structure: Structure, places: int) -> None:
-        """Makes a batch with a number of idle places, for robots of one structure."""
+        """Makes a batch of robots of one structure. `places` is its number of places, which are
+        idle at first."""
         self.readings = Readings.empty(structure, places)
         """Readings of all robots at their last pause. At the start only the times are set."""
         self.failures: list[SimulationFailure | None] = [None] * places
@@ -48,8 +50,8 @@ class Batch:
         """Number m of actuator signals of each robot."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
-        """Puts robots in the first places. Raises InputError if one differs too much from the first
-        robot; see begin()."""
+        """Puts robots in the first places, in their order. Raises InputError if one differs too
+        much from the first robot; see begin()."""
         for place, robot in enumerate(robots):
             if not self.begin(place, robot):
                 problem = "a robot has another structure, kind of law, or size than the first"
@@ -101,7 +103,8 @@ class Batch:
         raise NotImplementedError
 
     def ended(self, place: int) -> bool:
-        """True if the robot in a place has failed, or reached the end of its simulation."""
+        """True if the robot in a place has failed, or reached the end of its simulation. False if
+        it has only paused, or the place is idle."""
         raise NotImplementedError
 
     def result(self, place: int) -> SimulationResult:
@@ -128,7 +131,8 @@ class Batch:
 
 
 class LoneRobot(Protocol):
-    """Simulation of a single robot, as a part of a SerialBatch."""
+    """Simulation of a single robot, as a part of a SerialBatch, which simulates one robot after
+    another."""
 
     driven: DrivenRobot
     wall_time: float
@@ -142,7 +146,7 @@ class LoneRobot(Protocol):
         """Simulates to a time (s). Raises Diverged or StepBudgetExceeded."""
 
     def readings(self) -> Readings:
-        """The readings of the robot now."""
+        """The readings of the robot at its present time, without the axis of robots."""
 
     def result(self) -> SimulationResult:
         """The result at the end of the simulation."""
@@ -152,13 +156,13 @@ class LoneRobot(Protocol):
 
 
 class SerialBatch(Batch):
-    """Robots that are simulated one after another."""
+    """Batch of robots that are simulated one after another, each by its own LoneRobot."""
 
     def __init__(
         self, start: Callable[[DrivenRobot], LoneRobot], robots: Sequence[DrivenRobot], places: int
     ) -> None:
-        """Starts each robot with the function `start`, in the first places. The other places are
-        idle."""
+        """Starts robots in the first of `places` places; the other places are idle. `start` puts a
+        robot at its start and returns its simulation."""
         super().__init__(robots[0].robot.structure, places)
         self._start = start
         self._robots: list[LoneRobot | None] = [None] * places

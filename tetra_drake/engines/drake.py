@@ -65,8 +65,8 @@ class DrakeEngine(Engine):
 
 
 class _DiagramRobot(LoneRobot):
-    """Simulation of one robot in its own Drake diagram. If the robot has no gait, the system
-    `controller` of the diagram holds the signals of a command or of a program."""
+    """Simulation of one robot in its own Drake diagram. If the robot has no gait, the diagram's
+    system `controller`, a HeldSignals, holds the signals of a command or of a program."""
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self.driven, self._record, self._viewer = driven, record, viewer
@@ -194,15 +194,14 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
 
     If the scenario sets no target accuracy, it is half the least damping ratio of a cable, but at
     least 2e-5 and at most 5e-3. The damping ratio c / (2 sqrt(k m)) is for the cable's damping c
-    and stiffness k, and the reduced mass m of the two bodies that it joins. A structure without
-    elastic cables has the finest accuracy.
+    and stiffness k, and the reduced mass m of the two bodies that it joins. For a structure
+    without elastic cables it is 2e-5.
     """
     structure = robot.structure
     is_elastic = structure.cables["stiffness"] > 0.0
-    cables, pieces = structure.cables[is_elastic], structure.segments
+    cables, carriers = structure.cables[is_elastic], structure.carriers[structure.segments.ends]
     per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
-    of_pieces = per_mass[structure.carriers[pieces.ends]].sum(axis=1)
-    per_reduced_mass = np.bincount(pieces.cable, of_pieces, minlength=is_elastic.size)[is_elastic]
+    per_reduced_mass = structure.along_cables(per_mass[carriers].sum(axis=1))[is_elastic]
     ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
     by_damping = min(_COARSEST, max(_FINEST, 0.5 * min(ratios, default=0.0)))
 
@@ -219,8 +218,8 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
 class _Work:
     """Counter of the steps and derivative evaluations of an integrator.
 
-    An integrator that is initialised again counts from zero. This counter continues if the work so
-    far is put into `before`.
+    An integrator that is initialised again counts from zero. This counter continues if total() was
+    put into `before` first.
     """
 
     def __init__(self, integrator: IntegratorBase) -> None:
@@ -247,8 +246,8 @@ class _Work:
 class _StepAimer:
     """Limits the next integrator step by the predicted time to the next change of contact mode.
 
-    A change is, for instance, that a node touches the ground. `max_step` and `look_ahead` are
-    settings of the engine, in s.
+    A change is, for instance, that a node touches the ground. Settings of the engine, in s, are
+    `max_step`, the longest step, and `look_ahead`, the shortest step that is aimed at a change.
 
     | predicted mode change   | longest step                                                     |
     |-------------------------|------------------------------------------------------------------|
@@ -296,8 +295,8 @@ class _StepAimer:
         self._integrator.set_maximum_step_size(other._integrator.get_maximum_step_size())
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
-        """Limits the length of the next step. Call it after each step, with the bodies' velocities
-        (6*bodies,) at its end."""
+        """Limits the length of the next step. Call it after each step, with the simulator's context
+        and the bodies' velocities v (6*bodies,), both at the end of the step."""
         longest = self._settings.max_step
         if self._struts is not None:
             here = self._struts.GetMyContextFromRoot(context)

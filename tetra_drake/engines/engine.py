@@ -57,6 +57,7 @@ class Engine:
         Args:
             robots: at least one robot; all have the same structure and kinds of laws.
             places: number of robots that the batch can hold; by default the number of `robots`.
+                Places without a robot are idle until Batch.begin().
             record: records the trajectories, for the results.
             viewer: observer that shows the robots, if the engine can be watched.
             threads: number of threads that share the robots, if the engine supports threads.
@@ -76,14 +77,15 @@ class Engine:
     def simulate(
         self, robot: DrivenRobot, *, record: bool = False, viewer: Viewer | None = None
     ) -> SimulationResult:
-        """Simulates a robot to its end. Raises the same errors as engines.simulate.simulate()."""
+        """Simulates a robot to the end of its simulation. Raises Diverged or StepBudgetExceeded if
+        it fails, and InputError if the engine cannot simulate it."""
         batch = self.start([robot], record=record, viewer=viewer)
         batch.advance()
         return batch.result(0)
 
 
 def engine_of(scenario: Scenario) -> Engine:
-    """Engine of a scenario. The engine's module is imported on demand."""
+    """Engine that the scenario's setting `engine` names. Its module is imported on demand."""
     engine: Engine = importlib.import_module(scenario.engine.module).ENGINE
     return engine
 

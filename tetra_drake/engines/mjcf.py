@@ -52,7 +52,8 @@ _SOFT = {"condim": "3", "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1]}
 
 
 def check_mjcf(scenario: Scenario) -> None:
-    """Raises InputError, naming the key, if MuJoCo does not know the terrain or the friction."""
+    """Raises InputError, which names the scenario's key, if MuJoCo cannot simulate the scenario's
+    terrain or its law of friction."""
     if scenario.terrain.plane_slope is None:
         kind = type(scenario.terrain).__name__
         problem = f"found !{kind}, but mujoco simulates only planes, or no ground"
@@ -64,15 +65,16 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     """MJCF text of a robot's MuJoCo model: a tendon for each cable and a motor for each driven one.
 
     If actuators bear the whole tension, tendons have no springs: a motor for each cable exerts its
-    tension. Motors are in the order of their cables. A motor has the name of its oscillator; if
-    this drives several cables, the name of the cable is added.
+    tension. Motors are in the order of their cables. The motor of a driven cable has the name of
+    the oscillator that drives the cable; if this drives several cables, the name of the cable is
+    added. The motor of another cable has the cable's name.
 
     Args:
         robot: the robot at its start.
-        rest: state (13*bodies,) of a key frame with the name `rest`; None for no key frame.
+        rest: state [q; v] (13*bodies,) whose poses become a key frame with the name `rest`; None
+            for no key frame.
         own_laws: True for an engine that computes contacts of struts by its own law, and tensions
-            where is_pulled() is true. The model then leaves these to the engine, and its joints are
-            springs, not rigid constraints.
+            where is_pulled() is true. The model then leaves these to the engine.
 
     Raises:
         InputError: if MuJoCo does not know the terrain or the friction.
@@ -106,10 +108,7 @@ def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = 
     if robot.model.strut_contact.acts and not own_laws:
         _add_strut_contacts(model, robot)
     _add_cables(model, robot, pulled=pulled)
-    if own_laws:
-        _add_joint_springs(model, structure)
-    else:
-        _add_connections(model, structure)
+    _add_joints(model, structure, step=step)
     _add_pushes(model, world, structure)
     return xml_text(model)
 
@@ -128,8 +127,8 @@ def is_pulled(robot: Robot) -> bool:
 
 
 def loose_remark(robot: Robot) -> str:
-    """Remark on differences of MuJoCo's tendons and the robot's cables, with the cables' names; ""
-    if there are none. See tendon_faults()."""
+    """Remark on differences between MuJoCo's tendons and the robot's cables, with names of such
+    cables; "" if there are none. See tendon_faults() of laws.cable."""
     structure, remarks = robot.structure, []
     if not robot.scenario.actuation.keeps_spring:
         return ""
@@ -150,7 +149,6 @@ def integrator_of(robot: Robot, *, pulled: bool) -> str:
     fixed: in steps of 0.125 ms, the mast would fall with 0.76 g.
     """
     has_dampers = robot.structure.cables["damping"].any() and not pulled
-    has_dampers |= len(robot.structure.joints) > 0
     return "Euler" if has_dampers else "implicitfast"
 
 
@@ -200,7 +198,7 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
 
 
 def _contact(robot: Robot, mass: float) -> dict:
-    """Contact settings for the floor and a body of this mass (kg)."""
+    """Attributes of an MJCF contact pair of the floor and a node of a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
     # Nodes that bear the weight are as in the blueprint, or in equilibrium.
@@ -242,8 +240,8 @@ def _add_strut_contacts(model: Element, robot: Robot) -> None:
 
 
 def _add_cables(model: Element, robot: Robot, *, pulled: bool) -> None:
-    """Adds a tendon for each cable and a motor for each driven cable, or for all cables if motors
-    exert their tensions."""
+    """Adds a tendon for each cable and a motor for each driven cable. With `pulled`, tendons exert
+    no force, and there is a motor for each cable, which exerts its whole tension."""
     structure, motors = robot.structure, {}
     for oscillator, group in zip(structure.oscillators, structure.groups, strict=True):
         for cable in (structure.cable_names[i] for i in group):
@@ -281,21 +279,30 @@ def _add_pushes(model: Element, world: Element, structure: Structure) -> None:
         _add_push(actuators, f"load {name}", of_axes, site=name, refsite=f"load {name}")
 
 
-def _add_joint_springs(model: Element, structure: Structure) -> None:
-    """Adds MuJoCo actuators that hold the nodes of joints together, by the law of this package."""
-    actuators, joints = add_element(model, "actuator"), structure.joint_springs
-    for first, second, _, _, stiffness, damping in zip(*joints, strict=True):
-        site, refsite = structure.node_names[first], structure.node_names[second]
-        laws = np.tile([0.0, -stiffness, -damping], (3, 1))
-        _add_push(actuators, f"joint {site} {refsite}", laws, site=site, refsite=refsite)
+def _add_joints(model: Element, structure: Structure, *, step: float) -> None:
+    """Adds a constraint for each joint that holds its nodes together with the joint's stiffness K
+    and damping C.
 
-
-def _add_connections(model: Element, structure: Structure) -> None:
-    """Adds MuJoCo's constraints that hold the nodes of joints together."""
-    constraints = add_element(model, "equality")
-    for first, second in structure.joints:
-        site1, site2 = structure.node_names[first], structure.node_names[second]
-        add_element(constraints, "connect", site1=site1, site2=site2)
+    MuJoCo's constraint with the constants k and b, the impedance d and the inverse mass A of both
+    bodies exerts the force -d / ((1 - d) A) (k x + b v + a), with the displacement x of the nodes,
+    its rate v and its acceleration a, which hardly acts in a stiff joint. Here k is a quarter of
+    the largest one that is stable in explicit steps.
+    """
+    constraints, joints = add_element(model, "equality"), structure.joint_springs
+    for first, second, body_a, body_b, stiffness, damping in zip(*joints, strict=True):
+        time_constant = damping / stiffness
+        k = 1.0 / (step * (step + 2.0 * time_constant))
+        per_mass = 1.0 / structure.mass[body_a] + 1.0 / structure.mass[body_b]
+        impedance = stiffness * per_mass / (k + stiffness * per_mass)
+        names = structure.node_names
+        add_element(
+            constraints,
+            "connect",
+            site1=names[first],
+            site2=names[second],
+            solref=[-k * impedance, -k * time_constant * impedance],
+            solimp=[impedance, impedance, 1, 0.5, 1],
+        )
 
 
 def _add_push(actuators: Element, name: str, laws: np.ndarray, *, site: str, refsite: str) -> None:

@@ -64,9 +64,10 @@ _STRETCH = 5000  # steps between two checks of stability
 
 
 class MujocoEngine(Engine):
-    """Engine `mujoco`: simulates with MuJoCo, in steps of `engine.step`.
+    """Engine `mujoco`: simulates with MuJoCo, in steps of the scenario's `engine.step` (s).
 
-    Other Python threads run meanwhile. Samples are taken at the nearest steps.
+    Other Python threads run meanwhile. Samples of the motion are taken at the ends of the steps
+    that are nearest to their times.
     """
 
     def check(self, scenario: Scenario) -> None:
@@ -83,27 +84,24 @@ class MujocoEngine(Engine):
 
 
 def is_stable(robot: Robot, step: float) -> bool:
-    """True if MuJoCo's steps (s) are stable for the springs and dampers of a robot at its start.
+    """True if MuJoCo's steps of length `step` (s) are stable for the springs and dampers of a robot
+    at its start.
 
     The steps are explicit for positions and cables. They are stable if step^2 K + 2 step C < 4 M
     with the stiffness K, the damping C and the mass M. So a damper c counts as a spring 2 c / step.
-    All cables count as taut. Struts that touch do not count, nor do anchors of a robot without
-    joints: there MuJoCo's steps are implicit for them.
+    All cables count as taut. Anchors and struts that touch do not count.
     """
     from scipy.linalg import eigvalsh
 
-    anchors, joints, cables = robot.model.anchors, robot.model.joints, robot.model.cables
-    held = anchors.stiffness + 2.0 / step * anchors.damping
-    anchors = anchors._replace(stiffness=held * (joints.node_a.size > 0))
-    joints = joints._replace(stiffness=joints.stiffness + 2.0 / step * joints.damping)
-    taut = Unactuated(robot.model._replace(slack=False, anchors=anchors, joints=joints))
+    anchors, cables = robot.model.anchors, robot.model.cables
+    free = anchors._replace(stiffness=np.zeros_like(anchors.stiffness))
+    taut = Unactuated(robot.model._replace(slack=False, anchors=free))
     force_at_rest(taut, robot.structure.initial_state)
     taut.forces.near_struts.count[:] = 0
-    law = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
-    taut.model = taut.model._replace(cables=cables._replace(law=law))
-    return bool(
-        eigvalsh(step**2 * stiffness_at_rest(taut).toarray(), mass_matrix(taut)).max() < 4.0
-    )
+    stiffer = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
+    taut.model = taut.model._replace(cables=cables._replace(law=stiffer))
+    stiffness = stiffness_at_rest(taut).toarray()
+    return bool(eigvalsh(step**2 * stiffness, mass_matrix(taut)).max() < 4.0)
 
 
 def installed() -> bool:
@@ -179,7 +177,8 @@ class _MujocoRobot(LoneRobot):
         self._is_held = True
 
     def advance_to(self, time: float) -> None:
-        """Simulates the steps that begin before a time (s). Raises Diverged."""
+        """Simulates the steps that begin before a time (s), from the present one on. Raises
+        Diverged."""
         from mujoco.rollout import Rollout
 
         last = min(self._steps, math.ceil(time / self._step - 1e-6))
@@ -216,7 +215,8 @@ class _MujocoRobot(LoneRobot):
         self.wall_time += perf_counter() - started
 
     def _signals_at(self, times: Array) -> Array:
-        """Signals (times, m) in N at simulated times (s), none before the latest pause."""
+        """Signals (times, m) in N at simulated times (s) (times,). No time may be before the latest
+        pause, at which the signals may have changed."""
         if not self._is_held:
             return self.driven.signals_at(times)
         change = self.driven.robot.scenario.cpg.listing_step
@@ -225,8 +225,8 @@ class _MujocoRobot(LoneRobot):
 
     def _stepped(self, rollout: Any, signals: Array) -> tuple[Array, Array]:
         """Simulates one step for each row of signals (steps, m) in N, from the present state.
-        Returns the results after each step: MuJoCo's states (time, qpos, qvel), and the actuators'
-        states (steps, drives)."""
+        Returns the results after each step: MuJoCo's states with the columns time, qpos and qvel
+        (steps, numbers), and the actuators' states (steps, drives)."""
         mujoco, model, data = self._mujoco, self._model, self._data
         if not (self._pulled or self._touches):
             controls = np.zeros((len(signals), model.nu))  # 0 for anchors and loads
@@ -262,8 +262,9 @@ class _MujocoRobot(LoneRobot):
         pull_cables(self._parts, lengths, rates, signals, step, drives, data.ctrl[: lengths.size])
 
     def _body_states(self, states: Array) -> Array:
-        """States [q; v] (rows, 13 bodies) from MuJoCo's states. MuJoCo's angular velocities are in
-        the body's frame."""
+        """States [q; v] (rows, 13*bodies), as Drake orders them, from MuJoCo's states (rows,
+        numbers). MuJoCo's angular velocities are in the body's frame, the returned ones in the
+        world's."""
         rows, end = len(states), 1 + self._model.nq
         pose = states[:, 1:end].reshape(rows, -1, 7)
         velocity = states[:, end:].reshape(rows, -1, 6)
@@ -274,8 +275,9 @@ class _MujocoRobot(LoneRobot):
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
     def _motion(self, times: Array, states: Array, signals: Array, drives: Array) -> Motion:
-        """Motion from MuJoCo's states (rows) at `times` (s), with MuJoCo's contact forces.
-        `signals` are in N, `drives` are the actuators' states."""
+        """Motion from MuJoCo's states (rows, numbers) at `times` (rows,) in s, with MuJoCo's
+        contact forces. `signals` (rows, m) are in N, `drives` (rows, drives) are the actuators'
+        states."""
         mujoco, model, data = self._mujoco, self._model, self._mujoco.MjData(self._model)
         ground, structure = self.driven.robot.ground, self.driven.robot.structure
         names = [structure.node_names[node] for node in structure.contacts]
@@ -347,7 +349,7 @@ def pull_cables(
     Advances the states of the actuators `drives` (drives,) in place by a step (s).
 
     `parts` has the robot's model. `lengths` (cables,) are in m, their `rates` in m/s, positive if a
-    cable becomes longer. `signals` (m,) are in N.
+    cable becomes longer. `signals` (m,) in N are the actuator signals.
     """
     robot, _ = unpacked(parts)
     drive, table = 0, np.zeros((drives.size, DRIVE_COLUMNS))

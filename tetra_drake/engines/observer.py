@@ -47,9 +47,9 @@ class Observer:
     def add(
         self, times: np.ndarray, states: np.ndarray, signals: np.ndarray, drives: np.ndarray
     ) -> None:
-        """Adds the steps that end at `times` (k,) in s to the tally. At the ends, the bodies have
-        `states` (k, 13 bodies), the signals (k, m) are in N, and the actuators have the states
-        `drives` (k, drives)."""
+        """Adds the k steps that end at `times` (k,) in s to the sums. At the ends, the bodies have
+        `states` [q; v] (k, 13*bodies), the signals (k, m) are in N, and the actuators have the
+        states `drives` (k, drives)."""
         self._observe(self._parts, times, states, signals, drives)
 
 
@@ -59,7 +59,7 @@ def observe_states(
 ) -> None:
     """Adds steps of a simulation to the sums in the tally of `parts`; see Observer.add().
 
-    The steps end at `times` (k,) in s. At the ends, the bodies have `states` (k, 13 bodies), the
+    The steps end at `times` (k,) in s. At the ends, the bodies have `states` (k, 13*bodies), the
     signals (k, m) are in N, and the actuators have the states `drives` (k, drives). The forces are
     computed again from these numbers; the tally does not need to know which nodes stick.
 

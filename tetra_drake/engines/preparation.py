@@ -37,8 +37,8 @@ def prepare(tell: Callable[[], None] = lambda: None) -> None:
     It takes half a minute on two cores: a second process compiles the kernel of the lanes.
 
     Args:
-        tell: function without arguments that is called for each compiled function, to show the
-            progress: about FUNCTIONS (380) times.
+        tell: function without arguments that is called after each compiled function, to show the
+            progress: about 380 times in all (FUNCTIONS), not at all if nothing is left to compile.
     """
     program = f"from {__name__} import *; compile_lanes(lambda: print(end='.', flush=True))"
     lanes: list[subprocess.Popen[bytes]] = []
@@ -86,7 +86,7 @@ def _prepare_engine(name: str, changes: Mapping[str, Any]) -> None:
 
 
 class _Count(event.Listener):
-    """Listener that calls a function at the end of each compilation."""
+    """Listener for numba's events that calls a function at the end of each compilation."""
 
     def __init__(self, tell: Callable[[], None]) -> None:
         self._tell = tell

@@ -36,14 +36,15 @@ class _Job:
 
 
 class SimulationQueue:
-    """Queue of gaits and commands that several threads simulate.
+    """Queue of simulations, each of a gait or a command, that several threads run.
 
-    Each thread simulates as many side by side as its engine has lanes. The end of the `with` block
-    cancels unfinished simulations.
+    Each thread simulates as many robots side by side as its engine has lanes. Use the queue in a
+    `with` block; its end cancels unfinished simulations.
     """
 
     def __init__(self, threads: int, *, record: bool = False) -> None:
-        """Starts the threads. Raises InputError if `threads` is less than 1."""
+        """Starts the threads, `threads` of them. With `record`, results have trajectories. Raises
+        InputError if `threads` is less than 1."""
         if threads < 1:
             raise InputError("workers", "", f"found {threads}, expected at least 1")
         self._record = record
@@ -72,7 +73,8 @@ class SimulationQueue:
     def submit(
         self, drivers: Iterable[tuple[Scenario, Driver]], *, time_budget: float = math.inf
     ) -> list[Future[SimulationResult]]:
-        """Queues gaits or commands with their scenarios. Returns futures of the results.
+        """Queues pairs of a scenario and a gait or command. Returns a future of each result, in the
+        same order.
 
         A future raises the same errors as simulate(). On the compiled engine it raises
         TimeBudgetExceeded if the simulation takes longer than `time_budget` (s of wall time); other
@@ -159,8 +161,9 @@ class _Crew:
         return True
 
     def advance(self) -> None:
-        """Simulates until a robot has ended, or for some 30 ms of wall time. Sets the futures of
-        finished jobs and removes these jobs."""
+        """Simulates until a robot has ended, or for some 30 ms of wall time; other engines than
+        `compiled` simulate all to their ends. Sets the futures of finished jobs and of jobs that
+        took too long, and removes these jobs."""
         batch = self.batch
         if batch is None or not self.jobs:
             return
@@ -185,7 +188,7 @@ class _Crew:
             self.idle.append(place)
 
     def give_up(self, error: Exception) -> None:
-        """Ends all jobs with the same error."""
+        """Ends all jobs: their futures get the same error, and all places become idle."""
         for job in self.jobs.values():
             job.future.set_exception(error)
         self.jobs, self.idle, self.batch = {}, [], None

@@ -24,7 +24,8 @@ class Sampler:
     """
 
     def __init__(self, diagram: Diagram, times: np.ndarray, *, max_step: float) -> None:
-        """`times` (s) of the samples ascend. Steps are at most `max_step` (s)."""
+        """Makes a sampler of a robot's diagram for a simulation that has not begun. `times`
+        (samples,) in s ascend. The integrator's steps are at most `max_step` (s)."""
         self._diagram, self._times = diagram, times
         self._ahead = 2.0 * max_step  # Drake may stretch a step to reach its end
         self._bodies = slice(diagram.GetOutputPort("state").size())
@@ -34,7 +35,7 @@ class Sampler:
         """Time (s) and continuous state at the end of the latest step."""
 
     def follow(self, other: Sampler) -> None:
-        """Copies the samples of another sampler."""
+        """Copies the samples of another sampler, so that this one continues from there."""
         self._samples, self._latest = other._samples.copy(), other._latest
 
     def after_step(self, context: Context) -> None:
@@ -67,7 +68,7 @@ class Sampler:
 
 
 def motion_at(diagram: Diagram, context: Context) -> Motion:
-    """Motion at a single time, from a robot's diagram in a context."""
+    """Motion at a single time, the time of `context`, from a robot's diagram."""
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
     modes = ground.get_discrete_state_vector().CopyToVector().reshape(-1, MODE_COLUMNS)
     return Motion(

@@ -106,7 +106,8 @@ def simulate_many(
         ['random gait 0', 'random gait 1', 'random gait 2']
 
     Returns a result for each gait, in the order of the gaits. For a simulation that fails, the list
-    has its Diverged or StepBudgetExceeded. Results and failures have scenario and gait.
+    has its Diverged or StepBudgetExceeded. Results and failures have the attributes scenario and
+    gait.
 
     The compiled engine simulates several gaits side by side in the registers of each core. The
     numbers are the same, bit for bit, and it is several times faster. Scenarios with the same

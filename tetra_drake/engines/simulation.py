@@ -265,7 +265,8 @@ class Simulation:
         return np.where(times > duration - 0.5 * step, duration, times)
 
     def _places(self, indices: Sequence[int] | np.ndarray | None) -> list[int]:
-        """Checked indices of robots. Raises InputError for an index without a robot."""
+        """The given indices of robots as a list, or all indices for None. Raises InputError for an
+        index without a robot."""
         if indices is None:
             return list(range(self.count))
         places = np.asarray(indices)
@@ -278,7 +279,7 @@ class Simulation:
 
 
 def is_list(values: object) -> TypeGuard[Sequence[Any]]:
-    """Whether a value is a list, a tuple, or an array of one dimension."""
+    """True if a value is a list, a tuple, or a NumPy array of one dimension."""
     return isinstance(values, list | tuple) or (isinstance(values, np.ndarray) and values.ndim == 1)
 
 

@@ -16,7 +16,8 @@ _deadline = ContextVar("deadline", default=(math.inf, math.inf))
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Context manager: simulations in the block raise TimeBudgetExceeded after this wall time."""
+    """Context manager: simulations in the block raise TimeBudgetExceeded when `seconds` (s) of wall
+    time have passed since its beginning."""
     token = _deadline.set((time.perf_counter() + seconds, seconds))
     try:
         yield
@@ -25,7 +26,8 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 def check_time() -> None:
-    """Raises TimeBudgetExceeded if the time is up. Engines call it often during a simulation."""
+    """Raises TimeBudgetExceeded if the wall time of time_limit() has passed in this thread. Engines
+    call it often during a simulation."""
     deadline, seconds = _deadline.get()
     if time.perf_counter() > deadline:
         raise TimeBudgetExceeded(f"not done after {seconds:g} s")

@@ -68,7 +68,8 @@ WholeNumber = Annotated[int, Field(ge=0, lt=2**31)]
 
 
 class Line(BaseModel):
-    """Content of a line in a record: keys with their types. Undeclared keys are kept."""
+    """Base class for the lines of a run's record files: the keys of a line with their types. A line
+    may have further keys, which are kept."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False, extra="allow")
     __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
@@ -77,7 +78,7 @@ class Line(BaseModel):
     """Keys that identify a line: no two lines of a file have the same values of them."""
 
     def content(self) -> dict[str, Any]:
-        """Content of the line as a dictionary, without the keys that the line lacks."""
+        """Content of the line as a dictionary. Optional keys that the line lacks are left out."""
         return self.model_dump(exclude_unset=True)
 
 
@@ -140,8 +141,8 @@ class EvaluationLine(Line):
 
 
 class IterationLine(Line):
-    """Line of a record for one iteration of an optimiser. The keys after `stop` are the optimiser's
-    report."""
+    """Line of a record for one iteration of an optimiser. What the optimiser reports about the
+    iteration, such as mean_fitness, is added as further keys."""
 
     identity = ("iteration",)
 
@@ -194,7 +195,8 @@ class RecordFile:
 
     @classmethod
     def of(cls, directory: Path, run: str, name: str, *, trial: int | None = None) -> RecordFile:
-        """The file `name` in the directory of a run, or in the folder of a trial."""
+        """The file `name` of a run, in the run's directory or in the folder of a trial (its
+        number). `run` is the name of the run, which each line has."""
         if trial is None:
             return cls(directory / name, {"run": run})
         return cls(trial_folder(directory, trial) / name, {"run": run, "trial": trial})

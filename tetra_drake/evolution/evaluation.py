@@ -64,9 +64,11 @@ class GaitEvaluation:
         self._draws = functools.lru_cache(_SEEDS_KEPT)(draws)
 
     def __call__(self, task: Task) -> Evaluation:
-        """Fitness and metrics of a task's vector, or the reason of its failure. With disturbances
-        there is one simulation per draw, one after another. The first that yields no metrics ends
-        the evaluation: the gait has failed."""
+        """Fitness and metrics of a task's vector, or the reason of its failure.
+
+        With disturbances there is one simulation per draw (randomly changed scenario), one after
+        another. The first that yields no metrics ends the evaluation: the gait has failed.
+        """
         started = time.perf_counter()
         limited = time_limit(self.scenario.evolution.time_budget)(simulate)
         draws = []
@@ -79,8 +81,8 @@ class GaitEvaluation:
         return dataclasses.replace(self._combined(task, draws), wall_time=wall_time)
 
     def on_queue(self, task: Task, queue: SimulationQueue) -> Future[Evaluation]:
-        """Future of the evaluation of a task. The queue simulates all its draws of disturbances
-        side by side."""
+        """Begins the evaluation of a task and returns its future. With disturbances, `queue`
+        simulates the gait in all draws (randomly changed scenarios) side by side."""
         simulations, ended = self._simulations(task), itertools.count(1)
         time_budget = self.scenario.evolution.time_budget
         results = queue.submit(simulations, time_budget=time_budget)
@@ -106,16 +108,16 @@ class GaitEvaluation:
         return GaitEvaluation, (self.scenario, self.objective)  # without the caches
 
     def _simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
-        """Scenario and gait of each simulation of a task: one, or with disturbances one per
-        draw."""
+        """Scenario and gait of each simulation that a task needs: one simulation, or with
+        disturbances one per draw (randomly changed scenario)."""
         gait = self._space.gait(task.vector, name=str(task))
         scenarios = [self.scenario] if task.seed is None else self._draws(task.seed)
         return [(scenario, gait) for scenario in scenarios]
 
     def _judged(self, scenario: Scenario, simulation: Callable[[], SimulationResult]) -> Evaluation:
-        """Calls `simulation` and evaluates its result. A simulation that fails, or an unmet
-        requirement, gives an evaluation with the reason. On a disturbed scenario an InputError
-        counts as a failure."""
+        """Calls `simulation`, which simulates a gait on `scenario`, and evaluates its result. A
+        simulation that fails, or an unmet requirement, gives an evaluation with the reason. An
+        InputError counts as a failure only if the scenario is disturbed; otherwise it is raised."""
         try:
             result = simulation()
         except (SimulationFailure, TimeBudgetExceeded) as error:
@@ -169,8 +171,9 @@ _KINDS: dict[type[Exception], str] = {
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
-    """Combines the evaluations of one gait in several draws of disturbances. Fitness is the mean
-    over the worst `share` (0 to 1) of the draws. The gait fails if it fails in one draw."""
+    """Combines the evaluations of one gait, one per draw of disturbances (randomly changed
+    scenario), into one. Fitness is the mean over the worst `share` (0 to 1) of the draws. The gait
+    fails if it fails in any draw."""
     wall_time = sum(draw.wall_time for draw in draws)
     failures = [f"draw {k}: {e.failure}" for k, e in enumerate(draws) if e.failure is not None]
     metrics = combine_metrics([draw.metrics for draw in draws])
@@ -182,9 +185,9 @@ def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
 
 
 def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Combines the metrics of one gait in several draws. A metric that is a minimum, such as
-    clearance, keeps its least value, a maximum its greatest; of others the mean is taken. Empty if
-    a draw has no metrics."""
+    """Combines the metrics of one gait, one mapping per draw of disturbances. A metric that is a
+    minimum, such as clearance, keeps its least value, a maximum its greatest; of others the mean is
+    taken. Empty if a draw has no metrics."""
     if not all(draws):
         return {}
     combined: dict[str, Any] = {}
@@ -202,8 +205,8 @@ def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def worst_mean(fitnesses: Sequence[float], share: float) -> float:
-    """Mean of the lowest `share` (0 to 1) of the fitnesses. If this is 2.5 values, the third lowest
-    has weight 0.5. At least one value counts."""
+    """Mean of the lowest `share` (0 to 1) of the fitnesses. If this share is 2.5 values, the third
+    lowest has weight 0.5. At least one value counts."""
     ranked, count = sorted(fitnesses), max(1.0, share * len(fitnesses))
     weights = [min(1.0, max(0.0, count - i)) for i in range(len(ranked))]
     return math.fsum(w * f for w, f in zip(weights, ranked, strict=True)) / count

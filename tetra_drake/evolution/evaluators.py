@@ -59,12 +59,18 @@ def evaluator_of(
     executor: MakeExecutor | None = None,
     warn: Say,
 ) -> Evaluator:
-    """The evaluator for a scenario's engine; the engine's code is compiled on return.
+    """The evaluator for the engine of a scenario: a context manager that yields a function, which
+    begins the evaluation of a task and returns its future.
 
     It uses the given executor. By default it uses SIMD lanes (compiled engine) or worker processes
-    (other engines) of this machine. `workers` is the number of threads or processes, one per core
-    by default. If the evaluation cannot be sent to worker processes, gaits are evaluated in this
-    process, and `warn` gets the reason.
+    (other engines) of this machine.
+
+    Args:
+        evaluate: the fitness function; its scenario names the engine.
+        workers: number of threads or processes, one per core by default.
+        executor: function that makes an executor with this number of workers.
+        warn: function that gets the reason if the evaluation cannot be sent to worker processes.
+            Then gaits are evaluated in this process.
     """
     from tetra_drake.engines.engine import engine_of
 
@@ -83,8 +89,8 @@ def evaluator_of(
 
 @contextlib.contextmanager
 def in_lanes(evaluate: GaitEvaluation, workers: int) -> Iterator[Submit]:
-    """Evaluator that simulates gaits side by side, in the SIMD lanes of the compiled engine.
-    `workers` is the number of threads."""
+    """Evaluator that simulates gaits side by side, in the SIMD lanes of the compiled engine. It
+    yields a function that begins the evaluation of a task. `workers` is the number of threads."""
     from tetra_drake.engines.queue import SimulationQueue
 
     with SimulationQueue(workers, record=evaluate.records) as queue:
@@ -93,11 +99,12 @@ def in_lanes(evaluate: GaitEvaluation, workers: int) -> Iterator[Submit]:
 
 @contextlib.contextmanager
 def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterator[Submit]:
-    """Evaluator on an executor of concurrent.futures, which make(workers) returns. It shuts the
-    executor down, unless it is a LentExecutor.
+    """Evaluator on an executor of concurrent.futures, which make(workers) returns. It yields a
+    function that begins the evaluation of a task. At its end it shuts the executor down, unless
+    `make` is a LentExecutor.
 
-    If a worker dies, its future raises the error of the executor, such as BrokenExecutor. A task
-    for an executor that is broken or shut down raises InputError.
+    If a worker dies, the future of its task raises the error of the executor, such as
+    BrokenExecutor. A task for an executor that is broken or shut down raises InputError.
     """
     executor, is_done = make(workers), False
     running: set[Future[Evaluation]] = set()
@@ -124,8 +131,8 @@ def on_executor(evaluate: Evaluate, make: MakeExecutor, workers: int) -> Iterato
 
 @dataclass(frozen=True)
 class LentExecutor:
-    """Wrapper of an executor that belongs to the user. A call returns this executor, so that the
-    wrapper serves as a MakeExecutor. An evaluator does not shut it down."""
+    """Wrapper of an executor that belongs to the user. Evaluators expect a function that makes an
+    executor; a call of the wrapper returns the user's. An evaluator does not shut it down."""
 
     executor: Executor
     workers: int | str = "its executor's"
@@ -136,8 +143,8 @@ class LentExecutor:
 
 
 class WorkerProcesses(Executor):
-    """Executor on processes that are spawned, not forked. They end with this process, and are
-    replaced after TASKS_PER_WORKER tasks."""
+    """Executor on processes that are spawned, not forked. They end with this process, and each is
+    replaced after TASKS_PER_WORKER (150) tasks."""
 
     def __init__(self, workers: int) -> None:
         self._lifeline, self._holder = multiprocessing.Pipe(duplex=False)
@@ -196,7 +203,7 @@ def deaf_to_ctrl_c() -> Iterator[None]:
 def finished(
     running: dict[Future[Evaluation], Task], timeout: float | None = None
 ) -> list[tuple[Task, Evaluation]]:
-    """Removes finished tasks from `running`; returns them with their evaluations.
+    """Removes finished tasks from `running` (task by future); returns them with their evaluations.
 
     Returns when at least one is finished, or after `timeout` seconds. If a task raised an error,
     the first call that finds no other finished task raises it. Raises InputError if a worker has
@@ -218,7 +225,8 @@ def finished(
 
 
 def evaluate_all(submit: Submit, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:
-    """Evaluates tasks. Yields each task with its evaluation as soon as it is finished."""
+    """Begins the evaluation of all tasks at once; `submit` begins one and returns its future.
+    Yields each task with its evaluation as soon as it is finished."""
     running = {submit(task): task for task in tasks}
     while running:
         yield from finished(running)
@@ -234,7 +242,7 @@ def check_guard() -> None:
 
 
 def _why_not_sent(evaluate: object) -> str:
-    """The reason why a function cannot be sent to worker processes; empty if it can."""
+    """The reason why a function cannot be sent (pickled) to worker processes; empty if it can."""
     try:
         pickled = pickle.dumps(evaluate)
     except Exception as error:

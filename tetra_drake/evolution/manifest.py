@@ -82,7 +82,8 @@ class Method:
 
     @property
     def given_from_python(self) -> list[str]:
-        """Names of what came from Python: "objective", "optimizer" or both."""
+        """What the caller of evolve() passed as a Python object of another package, so that the
+        command line cannot repeat the run: "objective", "optimizer", both or none of them."""
         return [part for part, name in vars(self).items() if "." in name]
 
 
@@ -130,8 +131,8 @@ class Manifest:
         return dataclasses.replace(gait, scenario=self.scenario.name)
 
     def task(self, vector: Vector, *, trial: int, index: int, iteration: int) -> Task:
-        """Task to evaluate a vector as number `index` of a trial. With disturbances it has the seed
-        of their draws, which all tasks of an iteration share."""
+        """Task to evaluate a vector: evaluation `index` of a trial. With disturbances the task has
+        the seed of their random draws, which all tasks of an iteration share."""
         draws = self.scenario.disturbances is not None
         seed = (self.seed, trial, iteration) if draws else None
         return Task(vector, trial, index, iteration, seed)
@@ -221,7 +222,8 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         reevaluate: bool = True,
     ) -> RunRecord:
         """A new run in a new or empty directory. With `overwrite` the directory may hold another
-        run, unless a process is working on it. begin() writes the first file."""
+        run, unless a process is working on it. begin() writes the first file. Raises InputError if
+        the directory cannot be used."""
         method, installed = method or Method.of(scenario), versions(scenario.engine.packages)
         definition = json.dumps((dump_scenario(scenario), seed, installed, vars(method)))
         name = _sha256(definition)[:_NAME]
@@ -244,8 +246,9 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         seed: int | None = None,
         method: Method | None = None,
     ) -> RunRecord:
-        """Opens a run to continue it. A given scenario, seed or method must be equal to the
-        run's."""
+        """Opens a run to continue it. A given scenario, seed or method must be equal to the run's.
+        Raises InputError if one is not, if most genomes were removed from the run (thinned), or if
+        another process is working on it."""
         manifest = read_manifest(directory)
         if manifest.thinned:
             raise InputError(directory, "", "is thinned: it lacks genomes that resuming needs")

@@ -61,7 +61,7 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
             self._bars.stop()
 
     def say(self, text: str) -> None:
-        """Prints information for the user, above the bars."""
+        """Prints information for the user, above the bars; nothing without a stream."""
         if self._bars is not None:
             self._bars.print(text, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
@@ -73,9 +73,10 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
             print(f"tetra-drake: {text}", file=sys.stderr, flush=True)
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Shows the stage "evaluations" of all trials, with the fittest gait and the numbers of
-        finished trials and failures. evolve() calls it whenever evaluations end, and about once per
-        second."""
+        """Shows how many evaluations are done, all trials together, as the stage "evaluations". Its
+        text has distance and fitness of the best gait, and the numbers of finished trials and of
+        failures. `statuses` are the states of all trials. evolve() calls this method whenever
+        evaluations end, and about once per second."""
         done = sum(status.evaluations for status in statuses)
         # A trial that ended early needs no more evaluations.
         total = sum(s.evaluations if s.stop else s.evaluations_at_most for s in statuses)
@@ -94,8 +95,9 @@ class Progress(contextlib.AbstractContextManager["Progress"]):
         self.stage("evaluations", done, total, ", ".join(parts))
 
     def stage(self, title: str, done: int, total: int, text: str = "") -> None:
-        """Shows that `done` of `total` steps of a stage are done, with `text` and the time left. A
-        terminal shows a bar per stage; another stream gets a line when one is due."""
+        """Shows that `done` of `total` steps of the stage `title` are done, with `text` and the
+        time left. A terminal shows a bar per stage. Another stream gets a line when the stage
+        begins and ends, and every ten seconds."""
         if self._bars is None:
             return
         self._bars.start()

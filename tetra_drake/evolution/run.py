@@ -129,7 +129,7 @@ class Run:
         return statuses
 
     def best(self, count: int = 1) -> pandas.DataFrame:
-        """The `count` fittest different gaits of each trial: rows of `evaluations`.
+        """Rows of `evaluations`: the `count` fittest gaits of each trial, without repeated gaits.
 
         Rows are sorted by trial, then from best to worst. The first row is the best gait of trial
         0. For the best gait of the run, see fittest().

@@ -194,8 +194,9 @@ class Trial:
         status.wall_time += evaluation.wall_time
 
     def _complete(self) -> None:
-        """Ends an iteration: tells the optimiser its evaluations, and records it. Raises InputError
-        if the report of a user's own optimiser cannot be written as JSON."""
+        """Ends an iteration: passes its evaluations to the optimiser, and writes the lines of the
+        iteration to the record. Raises InputError if the report of a user's own optimiser cannot be
+        written as JSON."""
         results, status = [self._results[index] for index in sorted(self._results)], self.status
         outcome = self._optimizer.tell([evaluation for _, evaluation in results])
         for task, evaluation in results:

@@ -116,15 +116,16 @@ def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Draw
 
 
 def _shown(result: SimulationResult, time: Span | None) -> xarray.Dataset:
-    """The part of the trajectory between the two times (s) of `time`, by default its last 4 s."""
+    """The part of a result's trajectory between the two times (s) of `time`, by default its last
+    4 s."""
     end = float(result.trajectory.time[-1])
     return shown_part(result.trajectory, time or (max(0.0, end - _SECONDS), end))
 
 
 def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
-    """Contact nodes to show, with the titles of their panels, by node. A node that touches the
-    ground is shown, unless it has the same normal force as the first touching node of its body;
-    that node's title then names both. If no node touches, the first node is shown."""
+    """Contact nodes to show: a dict from the node's name to the title of its panel. A node that
+    touches the ground is shown, unless it has the same normal force as the first touching node of
+    its body; that node's title then names both. If no node touches, the first node is shown."""
     feet: dict[str, str] = {}
     for body in dict.fromkeys(trajectory.contact_body.values):
         normal = trajectory.normal_force[:, (trajectory.contact_body == body).values]
@@ -147,8 +148,9 @@ def _panels_over_time(
     """A new figure, and its empty panels for forces over time, one per name, in columns.
 
     With 2 to 4 `groups` of panels, one per signal or body for example, there is a column for each.
-    `beside` is a text that the caller writes to the right of each name; the name gets a line of its
-    own if both do not fit.
+    `names` are the titles of the panels, `units` gives the unit of force in the label. `beside` is
+    a text that the caller writes to the right of each name; the name gets a line of its own if both
+    do not fit.
     """
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)

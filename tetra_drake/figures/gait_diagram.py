@@ -110,15 +110,16 @@ def _write_names(panel: Axes, names: Sequence[str], rows: Iterable[float]) -> No
 
 
 def foot_name(node: str) -> str:
-    """Name of a contact node as a foot, such as "T1 left"."""
+    """Name of a contact node as a foot, such as "T1 left" for the node "T1 bottom_left"."""
     return node.replace("bottom_", "").replace("_", " ")
 
 
 def _draw_signals(
     panel: Axes, trajectory: xarray.Dataset, names: Sequence[str], unit: Units
 ) -> None:
-    """Draws signals over time in one panel, one above the other, with `names` beside them. The last
-    signal, of the front body, is on top. All have the same scale."""
+    """Draws the actuation signals of a trajectory in one panel, one above the other, with `names`
+    beside them, one per signal. The last signal, of the front body, is on top. All have the same
+    scale; the panel's name has the largest, in the given unit of force."""
     signals, oscillators = trajectory.signal / unit.force, trajectory.oscillator.values
     largest = float(np.abs(signals.values).max())
     scale = 0.48 / largest if largest else 0.0  # signals do not touch each other

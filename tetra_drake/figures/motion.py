@@ -135,8 +135,8 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
 def path_of_the_centre(
     result: SimulationResult, *, time: Span | None = None, instants: int = 9
 ) -> Drawn:
-    """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
-    straight, its height along x is shown instead."""
+    """Path of the robot's centre of mass from above, to scale. Arrows show the heading at equally
+    spaced instants. If the path is straight, its height along x is shown instead."""
     structure, unit = result.robot.structure, result.scenario.units
     trajectory = shown_part(result.trajectory, time)
     path = measures.path_of_centre(trajectory, structure)
@@ -225,8 +225,8 @@ def one_step(result: SimulationResult, *, time: Span | None = None, instants: in
 
 
 def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[np.ndarray, float]:
-    """Flags (samples, bodies), True if all feet of a body are off the ground; and the least height
-    that counts as off the ground, in the unit of length."""
+    """Flags (samples, bodies), True if all feet of a body are off the ground; and the height above
+    the ground, in the scenario's unit of length, from which a foot counts as off the ground."""
     structure, ground = result.robot.structure, result.robot.ground
     start, contacts = node_positions(structure, structure.initial_state), structure.contacts
     feet, least = trajectory.p_WN.values[:, contacts], _CLEARANCE * float(np.ptp(start[:, Z]))
@@ -239,10 +239,12 @@ def _off_ground(trajectory: xarray.Dataset, result: SimulationResult) -> tuple[n
 def _draw_paths(
     page: Page, paths: np.ndarray, lifted: np.ndarray, result: SimulationResult
 ) -> None:
-    """Draws, enlarged, the paths in the x-z plane of one node per body, or of the centre of mass.
+    """Draws, enlarged, the paths in the x-z plane of one node per body, or of the centre of mass,
+    in panels on `page`.
 
-    `paths` (samples, paths, 3) are in the scenario's unit of length. A path is red where its body
-    is `lifted` (samples, bodies), off the ground; the centre's where all bodies are.
+    `paths` (samples, paths, 3) are positions in the scenario's unit of length. `lifted` (samples,
+    bodies) is True where a body is off the ground. There its path is red; the centre's path is red
+    where all bodies are off the ground.
     """
     names, length = result.robot.structure.bodies, result.scenario.units.length_name
     if not result.robot.structure.markers.size:
@@ -274,8 +276,8 @@ def _with_distance(result: SimulationResult) -> xarray.Dataset:
 
 
 def _heights_below(points: np.ndarray, result: SimulationResult) -> np.ndarray:
-    """Heights z of the ground (...) below points (..., 2 or 3), x and y first; all in the
-    scenario's unit of length."""
+    """Heights z (...) of the ground below points (..., 2 or 3), given by x and y first. Points and
+    heights are in the scenario's unit of length."""
     length = result.scenario.units.length
     return ground_heights(points[..., :2] * length, result.robot.ground) / length
 
@@ -292,8 +294,8 @@ def _margin(result: SimulationResult) -> float:
 
 
 def _range(values: np.ndarray, result: SimulationResult) -> Span:
-    """Range (least, greatest) of coordinates with a margin on both sides. All are in the scenario's
-    unit of length."""
+    """Range (least, greatest) of coordinates, with the margin of figures on both sides. `values`
+    and range are in the scenario's unit of length."""
     margin = _margin(result)
     return float(values.min()) - margin, float(values.max()) + margin
 
@@ -302,8 +304,8 @@ def _fit(count: int, wide: Span, high: Span, *, height_in: float) -> tuple[int, 
     """Number of columns for which `count` equal pictures are largest, and the height (in) of all
     rows together.
 
-    `wide` and `high` are the ranges of x and y that each picture shows. The pictures fill the
-    caller's figure, or a page of the height `height_in`.
+    `wide` and `high` are the ranges (least, greatest) of x and y that each picture shows, to scale.
+    The pictures fill the caller's figure, or a page of the height `height_in` (in).
     """
     page, columns = GIVEN.get(), np.arange(1, count + 1)
     width, rows = page_width(), np.ceil(count / columns)
@@ -315,8 +317,8 @@ def _fit(count: int, wide: Span, high: Span, *, height_in: float) -> tuple[int, 
 
 
 def _to_scale(panel: Axes, wide: Span, high: Span) -> None:
-    """Sets the ranges of the x axis (`wide`) and the y axis (`high`), with the same scale and
-    without numbers on the y axis."""
+    """Sets the ranges (least, greatest) of the x axis (`wide`) and the y axis (`high`), with the
+    same scale and without numbers on the y axis."""
     panel.set(xlim=wide, ylim=high, aspect="equal", yticks=[])
     panel.tick_params(axis="y", length=0.0)
     panel.grid(visible=False, axis="y")
@@ -326,8 +328,8 @@ def _to_scale(panel: Axes, wide: Span, high: Span) -> None:
 def _draw_struts(
     panel: Axes, points: np.ndarray, structure: Structure, colours: Sequence[str]
 ) -> None:
-    """Draws the struts of a robot whose nodes are at `points` (nodes, 2) of the panel. `colours`
-    has a colour per body."""
+    """Draws the struts of a robot whose nodes are at `points` (nodes, 2), in units of the panel's
+    axes. `colours` has a colour per body."""
     of_struts = [colours[body] for body in structure.carriers[structure.struts[:, 0]]]
     lines = LineCollection(list(points[structure.struts]), colors=of_struts, linewidths=1.2)
     panel.add_collection(lines, autolim=False)

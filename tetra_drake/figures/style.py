@@ -67,15 +67,16 @@ DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 
 @dataclass(frozen=True)
 class Look:
-    """Look of figures on paper: width in inches, size of letters in points, and whether they have a
-    title."""
+    """Look of figures on paper: width in inches, size of letters in points, and whether figures
+    have a title."""
 
     width_in: float = 7.0
     font_size: float = 9.0
     title: bool = True
 
     def __post_init__(self) -> None:
-        """Raises InputError if a figure is too wide, or its letters are too large for its width."""
+        """Raises InputError if a figure is wider than 40 in, or its letters are too large for its
+        width."""
         most = _MOST_PER_INCH * self.width_in
         if not 0.0 < self.font_size <= most <= _MOST_PER_INCH * _WIDEST:
             expected = f"a width up to {_WIDEST:g} in, and per inch letters up to {_MOST_PER_INCH}"
@@ -94,7 +95,8 @@ FILE_KINDS = ("svg", "png")
 
 @dataclass(frozen=True)
 class Print:
-    """Settings for the files of figures: their look, and their file types (svg, png, pdf)."""
+    """Settings for the files of figures: their look, and their file types `kinds` ("svg", "png",
+    "pdf")."""
 
     look: Look = USUAL
     kinds: Sequence[str] = FILE_KINDS
@@ -115,8 +117,8 @@ REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
 def shown_part(trajectory: xarray.Dataset, time: Span | None) -> xarray.Dataset:
-    """The part of a trajectory between two times (s); all of it without times. Raises InputError if
-    the part has fewer than two samples."""
+    """The part of a trajectory from the first to the second value (s) of `time`; all of it for
+    None. Raises InputError if the part has fewer than two samples."""
     if time is None:
         return trajectory
     part = trajectory.sel(time=slice(*time))
@@ -135,7 +137,8 @@ def line_style(index: int) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def common_style(look: Look = USUAL) -> Iterator[None]:
-    """Context manager for the common style of figures. It ignores the user's matplotlibrc."""
+    """Context manager: figures that are made in the block have the common style, with the width and
+    letters of `look`. It ignores the user's matplotlibrc."""
     sheet = Path(__file__).with_name("tetra_drake.mplstyle")
     cycle = cycler(color=LINE_COLOURS * len(DASHES), linestyle=DASHES * len(LINE_COLOURS))
     with matplotlib.style.context(["default", sheet, {"axes.prop_cycle": cycle}]):
@@ -200,8 +203,9 @@ class ShownFigure(Figure):
 
 
 def page_of(*, height_in: float) -> Page:
-    """The figure to draw on, inside a figure_function(): the caller's, from the keyword `figure`,
-    or a new one, `height_in` inches high with letters of the usual size. It gets the constrained
+    """The figure to draw on, for a function with the decorator figure_function(): the caller's,
+    from the keyword `figure`, or a new one. A new one is `height_in` inches high with letters of
+    the usual size, and higher with larger ones. The figure gets the constrained
     layout, unless the caller has set another layout."""
     figure = GIVEN.get()
     if figure is None:
@@ -228,8 +232,8 @@ def page_width(page: Page | None = None) -> float:
 
 
 def folded(text: str, width_in: float, *, size: float | None = None) -> str:
-    """A text in lines of at most `width_in` inches, in letters of a size (points), by default the
-    legend's."""
+    """Breaks a text into lines of at most about `width_in` inches, for letters of a `size`
+    (points), by default the legend's."""
     letters = int(_LETTERS_PER_SIZE * 72.0 * width_in / (size or rcParams["legend.fontsize"]))
     return textwrap.fill(text, max(letters, _FEWEST_LETTERS))
 
@@ -240,8 +244,8 @@ def most_lines(texts: Iterable[str]) -> int:
 
 
 def own_words(names: Sequence[str]) -> list[str]:
-    """Names without the words that occur in all of them, such as "T1-T2 left" for "T1-T2 outer
-    bottom_left". The first word of the first name is always kept."""
+    """Names without the words that occur in all of them: "T1-T2 left" for "T1-T2 outer bottom_left"
+    if "outer" and "bottom" are in each name. The first word of the first name is always kept."""
     split = [name.replace("_", " ").split() for name in names]
     common = set(split[0][1:]).intersection(*split) if len(names) > 1 else set()
     return [" ".join(word for word in words if word not in common) for words in split]
@@ -250,8 +254,8 @@ def own_words(names: Sequence[str]) -> list[str]:
 def panels_in_columns(
     page: Page, count: int, columns: int, *, x_label: str, **shared: Any
 ) -> list[Axes]:
-    """Makes `count` panels on a page in so many columns, with one common label of the x axes.
-    `shared` is passed to Figure.subplots(), such as sharex=True."""
+    """Makes `count` panels on a page, in so many columns, with one common label of the x axes.
+    Returns them row by row. `shared` is passed to Figure.subplots(), such as sharex=True."""
     inner = page.subfigures(squeeze=False)[0, 0]  # puts the label above a legend of the page
     inner.supxlabel(x_label)
     grid = inner.subplots(math.ceil(count / columns), columns, squeeze=False, **shared).ravel()
@@ -310,6 +314,9 @@ def save_findings(
     kinds: Sequence[str] = FILE_KINDS,
 ) -> list[str]:
     """Writes the results of an analysis to a folder: tables as CSV, summary.json, and the figure.
+
+    The keys of `tables` are names of files without .csv; `name` is the name of the figure's files.
+    `kinds` are the figure's file types.
 
     Returns the names of the files. Raises InputError if a file cannot be written.
     """

@@ -45,12 +45,13 @@ event.register("numba:compile", _TIMES)
 
 
 def compiling_time() -> float:
-    """Time (s) that this process has spent on compilations that are finished."""
+    """Wall time (s) that this process has spent on numba's compilations that are finished."""
     return _TIMES.duration if _TIMES.done else 0.0
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
-    """Decorator that compiles a kernel for calls from Python. The machine code is cached on disk.
+    """Decorator that compiles a kernel, a numerical function, for calls from Python. The machine
+    code is cached on disk.
 
     The cache is beside the source or in the user's cache folder. If neither can be written to (as
     in a read-only installation without a home), the kernel is compiled in each process.
@@ -63,15 +64,16 @@ def compiled(function: F, *, nogil: bool = False) -> F:
 
 
 def merged(function: F) -> F:
-    """Decorator of a large kernel that other kernels call. Its source becomes part of them. It is
-    compiled separately only if Python calls it."""
+    """Decorator of a large kernel that other kernels call. Numba inserts its source into them
+    before it compiles them. The kernel is compiled separately only if Python calls it."""
     return _kernel(function, inline="always")
 
 
 def inlined(function: F) -> F:
-    """Decorator of a function that becomes part of kernels that call it.
+    """Decorator of a small function that becomes part of the machine code of kernels that call it.
 
-    Python calls the plain function. To compile it for calls from Python would take as long again.
+    A call from Python runs the plain Python function, because another compilation for such calls
+    would take as long again.
     """
     options: Any = _OPTIONS | {"forceinline": True}
 
@@ -84,7 +86,8 @@ def inlined(function: F) -> F:
 
 
 def machine_code(kernel: F, *arguments: object) -> F:
-    """Machine code of a kernel for arguments of the same types as `arguments`.
+    """Machine code of a kernel for arguments of the same types as `arguments`: a function that
+    Python calls like the kernel. If compilation is switched off, the kernel itself.
 
     A call does not check types: with other types it fails or computes nonsense.
     """
@@ -101,7 +104,8 @@ def _kernel(function: F, **options: Any) -> F:
 
 
 class KernelCache(NullCache):
-    """Cache of a kernel's machine code, with a file for each signature.
+    """Cache of a kernel's machine code on disk, with a file for each signature, the types of the
+    arguments.
 
     Numba's own cache numbers its files in an index. The index is wrong after two processes have
     saved at the same time. Here the name of a file contains a digest of the signature. The file
@@ -112,7 +116,7 @@ class KernelCache(NullCache):
 
         load_overload(sig) ──→ machine code, read from the file of this signature
               │
-              ↓ None: there is no such file, and the timer of the announcement starts
+              ↓ None: there is no such file; a timer starts, for a log message after 2 s
         numba compiles
               ↓
         save_overload(sig, data): the timer stops, the file is written
@@ -134,7 +138,8 @@ class KernelCache(NullCache):
         return str(self._content.locator.get_cache_path()) if self._content else None
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
-        """The cached kernel for a signature; None if it must be compiled."""
+        """The machine code for a signature `sig` from the cache; None if it must be compiled.
+        `target_context` is numba's context of the processor."""
         target_context.refresh()
         if self._content:
             path, key = self._entry(sig, target_context.codegen())
@@ -153,7 +158,8 @@ class KernelCache(NullCache):
         return None
 
     def save_overload(self, sig: object, data: Any) -> None:
-        """Saves the compiled kernel for a signature, if the folder can be written to."""
+        """Saves `data`, numba's compiled kernel for a signature `sig`, if the folder can be written
+        to."""
         self._timers.pop(sig).cancel()
         if self._content and self._content.check_cachable(data):
             path, key = self._entry(sig, data.codegen)
@@ -162,7 +168,8 @@ class KernelCache(NullCache):
                 write_whole(path, _seal(key, content) + content)
 
     def _entry(self, sig: object, codegen: Any) -> tuple[Path, str]:
-        """Cache file for a signature, and a text with everything that its content depends on."""
+        """Path of the cache file for a signature, and a text with everything that the file's
+        content depends on."""
         variant = f"{sig} {codegen.magic_tuple()} {sys.implementation.cache_tag}"
         digest = hashlib.sha256(variant.encode()).hexdigest()[:16]
         return Path(str(self.cache_path), f"{self._kernel}.{digest}.nbc"), self._origin + variant
@@ -187,7 +194,8 @@ def announce(kept: bool) -> None:
 
 
 def source_stamp(file: str) -> str:
-    """Digest of the sources of a module and of all modules of this package that it imports."""
+    """Digest (hexadecimal) of the source of a module and of all modules of this package that it
+    imports, also indirectly. `file` is the path of the module's source."""
     sources: set[Path] = set()
     pending = [Path(file).resolve()]
     while pending:
@@ -200,7 +208,7 @@ def source_stamp(file: str) -> str:
 
 @functools.cache
 def _imported(path: Path) -> tuple[Path, ...]:
-    """Files of the modules of this package that a module imports.
+    """Files of the modules of this package that the module in the file `path` imports directly.
 
     A name imported from a package may be a module: `from tetra_drake.laws import contact`.
     """

@@ -80,7 +80,7 @@ _ALIGNMENT = 64  # bytes of the widest register
 
 
 class Lanes(types.Type):
-    """Numba type of a number in lanes: `width` doubles."""
+    """Numba type of a number in lanes: `width` doubles, one for each of `width` simulations."""
 
     element: ClassVar[Any] = _DOUBLE
     scalar: ClassVar[Any] = types.float64
@@ -92,12 +92,13 @@ class Lanes(types.Type):
         super().__init__(name=f"{type(self).__name__}({width})")
 
     def can_convert_from(self, context: Any, other: types.Type) -> Conversion | None:
-        """Allows numba to cast scalars. A variable that is sometimes a scalar becomes lanes."""
+        """Allows numba to cast the scalar type `other` to lanes; None for another type. So a
+        variable that is sometimes a scalar becomes lanes."""
         return Conversion.safe if isinstance(other, self.accepted) else None
 
 
 class Mask(Lanes):
-    """Numba type of a truth value in lanes: `width` bits."""
+    """Numba type of a truth value in lanes: `width` bits, one for each of `width` simulations."""
 
     element: ClassVar[Any] = _BIT
     scalar: ClassVar[Any] = types.boolean
@@ -134,8 +135,8 @@ def _operator(
     to: type = Lanes,
 ) -> None:
     """Registers functions of the module operator with numba, by their `names`. Operands have the
-    type `over`, but one of two may be a scalar; the result has the type `to`. `emit` writes the
-    LLVM instruction."""
+    type `over`, but one of two may be a scalar; the result has the type `to`. `operands` is their
+    number. `emit`, called with the LLVM builder and the operands, writes the instruction."""
 
     def generic(self: Any, args: tuple[Any, ...], kws: Any) -> Any:
         vector: Any = next((kind for kind in args if type(kind) is over), None)
@@ -174,7 +175,8 @@ _operator(["xor", "ixor"], ir.IRBuilder.xor, over=Mask, to=Mask)
 
 
 def _call(builder: Any, name: str, x: Any) -> Any:
-    """Emits the call of an LLVM function of one number or vector, such as llvm.sqrt.v8f64."""
+    """Emits the call of the LLVM function `name` for `x`, a number or a vector: for "llvm.sqrt" and
+    8 doubles, llvm.sqrt.v8f64."""
     is_vector = isinstance(x.type, ir.VectorType)
     count = f"v{x.type.count}" if is_vector else ""
     element = x.type.element if is_vector else x.type
@@ -185,8 +187,8 @@ def _call(builder: Any, name: str, x: Any) -> Any:
 
 
 def _llvm_function(name: str) -> Any:
-    """Function for kernels that calls an LLVM function of one number or one vector, such as
-    llvm.sqrt."""
+    """Function for kernels that calls the LLVM function `name`, such as "llvm.sqrt", with one
+    number or one vector."""
 
     @_intrinsic
     def function(context: Any, x: types.Type) -> Any:
@@ -210,7 +212,7 @@ overload(floor)(lambda x: lambda x: _floor(x))
 
 
 def select(mask: Truth, x: Real, y: Real) -> Real:
-    """x in lanes where the mask is true, y in other lanes."""
+    """x in lanes where the mask is true, y in other lanes. Both are computed in all lanes."""
     return x if mask else y
 
 
@@ -297,7 +299,7 @@ overload(inverse_sqrt)(lambda x: _inverse_sqrt_by_newton)
 
 def gather(numbers: Table, index: Real, offset: int) -> Real:
     """Reads numbers[index + offset], with a separate index for each lane. `numbers` (size,) has no
-    lanes. `index` has whole numbers as floats."""
+    lanes: all simulations share it. `index` has whole numbers, as floats."""
     return numbers[int(index) + offset]
 
 
@@ -327,8 +329,8 @@ overload(gather)(
 
 
 def named(kind: type[NamedTupleT], table: Table) -> NamedTupleT:
-    """Converts the rows of a table (fields, ...) to a NamedTuple of the class `kind`, in the order
-    of its fields."""
+    """NamedTuple of the class `kind` from a table (fields, ...): row i of the table is the value of
+    the i-th field."""
     return kind(*table)
 
 
@@ -353,7 +355,7 @@ overload(named)(lambda kind, table: lambda kind, table: _named(kind, table))
 
 
 class Field(types.Type):
-    """Numba type of an array in kernels. Its numbers are in lanes, or single numbers.
+    """Numba type of an array in kernels. Each of its numbers is in lanes, or single.
 
     `number` is the numba type of a number. `lengths` has the length of each dimension; None if the
     type does not fix it.
@@ -367,10 +369,12 @@ class Field(types.Type):
 class FieldArray:
     """Wrapper that passes a contiguous array to kernels, which see a Field.
 
-    With `width`, the last axis of the array has this length: it is the lanes of a number.
+    With `width`, the last axis of the array has this length: it is the lanes of a number. Without
+    `width`, the numbers have no lanes.
 
-    Numbers are float64, or int64 without lanes. The numba type fixes all lengths but the first, or
-    none with `any_size`. Raises ValueError for another array.
+    Numbers are float64, or int64 without lanes. The numba type `kind` contains all lengths but the
+    first, so that a kernel is compiled anew for other lengths; with `any_size` it contains none.
+    Raises ValueError for another array, or if it is not contiguous.
     """
 
     def __init__(
@@ -391,7 +395,8 @@ def _field(dtype: np.dtype, width: int | None, lengths: tuple[int | None, ...]) 
 
 
 def lane_table(shape: tuple[int, ...], width: int, *, any_size: bool = False) -> FieldArray:
-    """A table of zeros in lanes. Its `array` has the shape (*shape, width)."""
+    """Table of zeros in lanes, for kernels. `shape` is the shape that kernels see; the attribute
+    `array` has the shape (*shape, width). For `any_size` see FieldArray."""
     size = math.prod(shape) * width
     buffer = np.zeros(size + _ALIGNMENT // 8)
     first = -buffer.ctypes.data % _ALIGNMENT // 8
@@ -424,7 +429,8 @@ def _unbox(kind: Field, value: Any, c: Any) -> NativeValue:
 
 
 def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
-    """Lengths of a field; constants if the type fixes them."""
+    """Emits the lengths of the dimensions of the field `value`; constants if the type `kind` fixes
+    them."""
     field = cgutils.create_struct_proxy(kind)(context, builder, value)
     lengths = cgutils.unpack_tuple(builder, field.lengths)
     for axis, length in enumerate(kind.lengths):
@@ -434,8 +440,8 @@ def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
 
 
 def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> Any:
-    """Emits the address of field[index]. The flag nsw promises LLVM that the arithmetic does not
-    overflow."""
+    """Emits the address of value[index], where `value` is a field of the type `kind`. The flag nsw
+    promises LLVM that the arithmetic of integers does not overflow."""
     indices = [index] if len(kind.lengths) == 1 else cgutils.unpack_tuple(builder, index)
     lengths = _lengths(context, builder, kind, value)
     offset = indices[0]
@@ -446,7 +452,8 @@ def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> A
 
 
 def _index_kind(kind: types.Type, index: Any) -> types.Type | None:
-    """Type of an index after the cast; None if it is no valid index of a field."""
+    """Numba type that an index of the type `index` is cast to; None if it is no valid index of an
+    array of the type `kind`, or if that is no Field."""
     if not isinstance(kind, Field):
         return None
     count = len(kind.lengths)
@@ -493,7 +500,8 @@ def _lower_setitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
 
 @_intrinsic
 def by_lane(context: Any, field: Any) -> Any:
-    """View of a field of lanes as a field of floats (..., W), whose last axis is the lanes."""
+    """View of a field of lanes (...) as a field of floats (..., W), whose last axis is the lanes.
+    Kernels use it to read and write the numbers of a single lane."""
     width = field.number.width
     floats = Field(types.float64, (*field.lengths, width))
 

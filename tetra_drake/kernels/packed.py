@@ -61,10 +61,10 @@ def allocate(kind: type[NamedTupleT], sizes: Mapping[str, int]) -> NamedTupleT:
 
     Args:
         kind: class of the NamedTuple. The annotation of a table has a length per dimension: a
-            number, the name of a size, or a product. With `int`, the table has integers. With a
-            float, all numbers have this value; otherwise they are 0. A field without annotation is
-            a NamedTuple of tables.
-        sizes: sizes by name.
+            number, the name of a size, or a product such as "6 * bodies". With `int` in it, the
+            table has integers. With a float in it, all numbers start with this value; otherwise
+            with 0. A field whose annotation is only a class is a NamedTuple of tables.
+        sizes: sizes by name, such as {"bodies": 5}.
     """
     fields = []
     for hint in _hints(kind).values():
@@ -93,10 +93,10 @@ def write_tables(to: NamedTupleT, source: NamedTupleT) -> None:
 
 
 class PackedKind(types.Type):
-    """Numba type of packed values: the address of their 64-bit words.
+    """Numba type of a Packed in a kernel: the address of the 64-bit words that hold its values.
 
     `members` are the numba types of the values, and `names` their names. In a plain tuple, the
-    names are numbers.
+    names are "0", "1" and so on.
     """
 
     def __init__(self, names: tuple[str, ...], members: tuple[types.Type, ...]) -> None:
@@ -120,7 +120,8 @@ def _words(kind: types.Type) -> int:
 class Packed(Generic[Values]):
     """A nested tuple of arrays, fields, integers and booleans, as one argument of a kernel.
 
-    The arrays are not copied, so a kernel sees later changes. Packing takes half a millisecond.
+    The kernel gets one address in place of all values; unpacked() gives the values back. The arrays
+    are not copied, so a kernel sees later changes. Packing takes half a millisecond.
     Raises ValueError for an array that cannot be a Field.
     """
 
@@ -133,7 +134,8 @@ class Packed(Generic[Values]):
 
 
 def _pack(value: Any, words: list[int]) -> types.Type:
-    """Appends the words of a value to `words`. Returns the numba type of the value."""
+    """Appends the 64-bit words of a value (addresses, lengths and numbers) to `words`. Returns the
+    numba type that kernels see."""
     if isinstance(value, tuple):
         names = getattr(value, "_fields", None) or tuple(map(str, range(len(value))))
         return _kind(names, tuple(_pack(item, words) for item in value))
@@ -147,7 +149,8 @@ def _pack(value: Any, words: list[int]) -> types.Type:
 
 
 def unpacked(values: Packed[Values] | Values) -> Values:
-    """The values of a Packed, in a kernel or in Python. A tuple is returned as it is."""
+    """The tuple of values of a Packed, in a kernel or in Python. A plain tuple is returned as it
+    is."""
     return values.values if isinstance(values, Packed) else values
 
 
@@ -177,7 +180,8 @@ class _Attributes(AttributeTemplate):
 
 
 def _member(context: Any, builder: Any, packed: PackedKind, words: Any, place: int) -> Any:
-    """Emits code that reads member number `place` of packed values. `words` is their address."""
+    """Emits code that reads member number `place` of values of the type `packed`. `words` is the
+    address of their words."""
     kind: Any = packed.members[place]
     first = sum(map(_words, packed.members[:place]))
 

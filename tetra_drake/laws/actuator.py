@@ -63,7 +63,8 @@ class Actuator(NamedTuple):
 
 
 class ActuatorForce(NamedTuple):
-    """Tension of a driven cable, and the rate of its actuator's state (drive)."""
+    """Result of an actuator's law: tension of a driven cable, and rate of the actuator's state. The
+    state (drive) is the free length (m) of a winch, or the tension (N) of a tension motor."""
 
     tension: Real
     """Tension in N."""
@@ -79,7 +80,8 @@ class ActuatorForce(NamedTuple):
 
 
 class Exertion(NamedTuple):
-    """Forces of an actuator and length of its cable at an instant, to compute work and power."""
+    """Forces of an actuator and length of its cable at an instant. Work and power are computed from
+    them."""
 
     load: Real
     """Force (N) that the actuator bears. An ideal actuator counts as bearing the whole tension."""
@@ -100,8 +102,9 @@ def has_drive(actuator: Actuator) -> bool:
 
 @inlined
 def wound(actuator: Actuator, drive: Any, otherwise: Any) -> Any:
-    """Selects `drive` if the actuators are winches, whose state is the free length (m) of the
-    cable, and `otherwise` for other actuators. Both may be numbers or arrays, and also rates."""
+    """Selects `drive` if the actuators are winches, whose state is the free length of the cable,
+    and `otherwise` for other actuators. Both may be lengths (m) or their rates (m/s), as numbers or
+    arrays."""
     if actuator.kind == WINCH:
         return drive
     return otherwise
@@ -113,8 +116,9 @@ def exertion(
 ) -> Exertion:
     """Forces of an actuator whose cable has a tension (N), a length (m) and a signal (N).
 
-    `drives` is the table of the actuators' states. `drive` is the actuator's row in it; ideal
-    actuators have none.
+    `drives` is the table (drives, DRIVE_COLUMNS) of the actuators' states, rates and limits.
+    `drive` is the actuator's row in it. Ideal actuators, which add a force to the tension, have no
+    row: `drive` is not used then.
     """
     if not has_drive(actuator):
         return Exertion(load=tension, pull=signal, left=length, limited=0.0 * length)
@@ -126,11 +130,12 @@ def exertion(
 def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
 ) -> ActuatorForce:
-    """Force of a winch or tension motor on a cable with a length (m) that grows at a rate (m/s).
+    """Tension that a winch or tension motor gives a cable with a length (m) that grows at a rate
+    (m/s), and the rate of its state.
 
     `drive` is the actuator's state: the free length (m) of a winch, the tension (N) of a motor.
-    `signal` is in N, `law` has the constants of the cable. Raises ValueError for ideal actuators,
-    which have no state.
+    `signal` (N) is the actuation that the controller wants, `law` has the constants of the cable.
+    Raises ValueError for ideal actuators (kind DIRECT), which have no state.
     """
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
@@ -144,16 +149,18 @@ def actuator_force(
 def winch_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a winch on a cable with a length (m) that grows at a rate (m/s).
+    """Tension that a winch gives a cable with a length (m) that grows at a rate (m/s), and the rate
+    of its state.
 
     The winch's state `drive` is the free length (m). Its command is the free length l0 - signal /
-    k, with l0 and k from `law`. The cable goes slack as a passive one does; see laws.cable. The
-    winch follows its command with a lag. It pays out with at most max_speed, and winds with at most
-    max_speed (1 - tension / max_force). Above max_force the cable pulls it backward. The tension
-    depends on the winding speed because of the cable's damping, and the winding speed depends on
-    the tension because of the force-speed line. Both equations are linear, within limits, and are
-    solved together. A command below least_length counts as least_length, so the winch slows down
-    before it. A sudden stop would be a jump of the tension, which an integrator cannot handle.
+    k, with l0 and k from `law` and the signal in N. The cable goes slack as a passive one does; see
+    laws.cable. The winch follows its command with a lag. It pays out with at most max_speed, and
+    winds with at most max_speed (1 - tension / max_force). Above max_force the cable pulls it
+    backward. The tension depends on the winding speed because of the cable's damping, and the
+    winding speed depends on the tension because of the force-speed line. Both equations are linear,
+    within limits, and are solved together. A command below least_length counts as least_length, so
+    the winch slows down before it. A sudden stop would be a jump of the tension, which an
+    integrator cannot handle.
     """
     elastic = elastic_tension(length - drive, law)
     wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
@@ -179,12 +186,14 @@ def winch_force(
 def motor_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """Force of a tension motor on a cable with a length (m) that grows at a rate (m/s).
+    """Tension that a tension motor gives a cable with a length (m) that grows at a rate (m/s), and
+    the rate of its state.
 
     The motor's state `drive` is the tension (N). Its command is the tension of Eq. 6 of the thesis,
     spring plus damper plus `signal` (N): software imitates the cable, but the motor does not push.
     The motor keeps its cable taut at any length. It follows its command with a lag. Its tension is
-    at most max_force (1 - winding speed / max_speed).
+    at most max_force (1 - winding speed / max_speed). The winding speed is the speed at which the
+    cable gets shorter.
     """
     left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
     most = limits.max_force * left
@@ -205,7 +214,8 @@ def motor_force(
 
 
 class DrivenCables(NamedTuple):
-    """Properties of the driven cables: arrays (..., driven cables), in SI units."""
+    """Properties of the driven cables at one or several instants: arrays (..., driven cables), in
+    SI units."""
 
     law: CableLaw
     signal: Any
@@ -218,7 +228,8 @@ class DrivenCables(NamedTuple):
 
     @classmethod
     def at_rest(cls, law: CableLaw, length: Any, signal: Any) -> Self:
-        """Cables of these lengths (m) at rest, with signals (N), at their original free lengths."""
+        """Cables of these lengths (m) at rest, with signals (N) and their original free lengths.
+        `length` and `signal` are arrays (driven cables,)."""
         rate: Any = np.zeros(len(length))
         tension = np.maximum(cable_tension(length, rate, signal, law), 0.0)
         return cls(law, signal, length, rate, tension, law.free_length)
@@ -246,30 +257,32 @@ class ActuatorKind(Section):
     effect."""
 
     def actuator(self) -> Actuator:
-        """Kind and limits of the actuators for the kernels. Settings with the names of limits give
-        the limits."""
+        """Kind and limits of the actuators for the kernels. The limits are the settings of this
+        section: their names are the fields of Limits."""
         return Actuator(self.kind, np.array(Limits(**dict(self))))
 
     def excess(self, signal: float, *, free_length: float) -> str:
-        """Error text if signals up to `signal` (N) exceed the actuator's limits, otherwise empty.
+        """Text for a message if signals up to `signal` (N) exceed the actuator's limits, such as
+        "ask for 90 N, a motor pulls with 50 N at most"; otherwise empty.
 
         `free_length` (m) is the least free length that the signals command.
         """
         return ""
 
     def drives(self, cables: DrivenCables) -> Any:
-        """States of the actuators (..., driven cables) that fit cables in a given condition: free
-        lengths (m) or tensions (N). Empty if actuators have no state."""
+        """States that the actuators (..., driven cables) have if their cables are as given: free
+        lengths (m) of winches, or tensions (N) of tension motors. Empty if actuators have no
+        state."""
         return cables.signal[..., :0]
 
     def commands(self, cables: DrivenCables) -> Any:
-        """Setpoints of the actuators (..., driven cables) for cables in a given condition, in SI
+        """Setpoints of the actuators (..., driven cables) for the signals of given cables, in SI
         units: force, free length or tension, depending on the kind."""
         return cables.signal
 
     def signals(self, commands: Any, law: CableLaw) -> Any:
-        """Signals (N) with the same effect as setpoints (..., driven cables). `law` has the
-        constants of the cables."""
+        """Signals (N) with the same effect as the setpoints `commands` (..., driven cables), which
+        are forces, free lengths or tensions in SI units. `law` has the constants of the cables."""
         return commands
 
 

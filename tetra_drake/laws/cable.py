@@ -35,13 +35,15 @@ class CableConstants(Section):
     """Damping coefficient of a cable: tension divided by the rate of its length."""
 
     def constants(self, *, stiffness: float, free_length: float) -> dict[str, float]:
-        """Constants of one cable as keyword arguments of CableLaw, in SI units."""
+        """Constants of one cable as keyword arguments of CableLaw, in SI units. `stiffness` is in
+        N/m, `free_length` in m."""
         own = {name: getattr(self, name) for name in CableConstants.model_fields}
         return own | {"stiffness": stiffness, "free_length": free_length}
 
 
 class CableLaw(NamedTuple):
-    """Constants of a cable, or tables (cables,) of the constants of all cables; SI units."""
+    """Constants of a cable, or tables (cables,) of the constants of all cables: stiffness (N/m),
+    damping (N s/m) and free length (m)."""
 
     stiffness: Real
     damping: Real
@@ -49,7 +51,8 @@ class CableLaw(NamedTuple):
 
     @classmethod
     def of(cls, cables: Table) -> Self:
-        """Constants of the cables in an array of dtype CABLE."""
+        """Constants of all cables as tables (cables,), from an array (cables,) of the NumPy record
+        type CABLE."""
         tables: Any = (cables[name].copy() for name in cls._fields)
         return cls(*tables)
 
@@ -85,8 +88,8 @@ class Cables(NamedTuple):
 
     @classmethod
     def of(cls, cables: Table, rings: Mapping[int, Sequence[int]] | None = None) -> Self:
-        """Cables from an array of dtype CABLE. `rings` has the inner nodes of each routed cable, by
-        the cable's index."""
+        """Cables from an array (cables,) of the NumPy record type CABLE. `rings` has the inner
+        nodes of each routed cable, by the cable's index."""
         node_a, node_b, signal = (cables[name].copy() for name in ("node_a", "node_b", "signal"))
         paths = [
             [node_a[i], *rings[i], node_b[i]] if rings and i in rings else []
@@ -110,7 +113,7 @@ class Cables(NamedTuple):
 
 @inlined
 def law_of(cables: Cables, i: int) -> CableLaw:
-    """Constants of cable i."""
+    """Constants of cable i, from the tables of the constants of all cables."""
     law = cables.law
     return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i])
 
@@ -123,7 +126,8 @@ dT/d(dl/dt) (N s/m), and the rate dl/dt (m/s)."""
 
 @inlined
 def elastic_tension(stretch: Real, law: CableLaw) -> Real:
-    """Tension (N) of a cable at rest. `stretch` (m) is its length minus its free length."""
+    """Tension (N) of a cable's spring at rest. `stretch` (m) is the cable's length minus its free
+    length. The tension is negative if the stretch is; slack_tension() takes it as 0 then."""
     return law.stiffness * stretch
 
 
@@ -144,7 +148,8 @@ def elastic_energy(stretch: Real, law: CableLaw) -> Real:
 
 @inlined
 def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
-    """Tension (N) of a cable by Eq. 6 of the thesis: spring plus damper plus actuation force.
+    """Tension (N) of a cable by Eq. 6 of the thesis: spring plus damper plus actuation force. A
+    negative tension pushes.
 
     `length` is in m, `rate` (m/s) is the rate of the length, `signal` (N) is the actuation force.
     """
@@ -162,7 +167,7 @@ def most_tension(elastic: Real) -> Real:
 def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]:
     """Tension (N) of a cable that goes slack, and its derivative by the rate (N s/m).
 
-    It is elastic + damping rate, limited to 0 ... 2 max(0, elastic). `elastic` (N) is
+    The tension is elastic + damping rate, limited to 0 ... 2 max(0, elastic). `elastic` (N) is
     elastic_tension(), `rate` (m/s) the rate of the length.
     """
     linear = elastic + law.damping * rate
@@ -171,7 +176,8 @@ def slack_tension(elastic: Real, rate: Real, law: CableLaw) -> tuple[Real, Real]
 
 
 def tendon_faults(cables: Table, *, slack: bool) -> dict[str, Table]:
-    """Cables that MuJoCo's tendons cannot imitate: a mask (cables,) for each reason.
+    """Cables that MuJoCo's tendons cannot imitate: for each reason a mask (cables,), True where it
+    holds.
 
     The keys are the reasons as sentences. `cables` is an array of dtype CABLE. `slack` is true if
     cables go slack.

@@ -98,8 +98,8 @@ class StrutContactLaw(NamedTuple):
 
 
 class NearStruts(NamedTuple):
-    """List of the pairs of struts that are near each other; empty if struts pass through each
-    other."""
+    """List of the pairs of struts that are near each other, with the positions of the nodes when it
+    was made; empty if struts pass through each other."""
 
     p_WN: Annotated[Table, "strut_nodes", 3, math.inf]
     """Positions (nodes, 3) in m of the nodes at the latest search; infinite before the first."""
@@ -115,8 +115,9 @@ class NearStruts(NamedTuple):
 
 
 def near_sizes(struts: Struts) -> dict[str, int]:
-    """Sizes of the tables of NearStruts by name, for allocate(), which makes them. There is room
-    for all pairs of struts of different bodies."""
+    """Numbers of rows of the tables in NearStruts, by name, for allocate(), which makes the tables:
+    "strut_nodes", up to the last node of a strut, and "strut_pairs". There is room for all pairs of
+    struts of different bodies."""
     of_bodies = np.diff(struts.first_strut)
     pairs = (of_bodies.sum() ** 2 - (of_bodies**2).sum()) // 2
     return {
@@ -138,8 +139,8 @@ def find_near_struts(
     (each lane is a robot), except struts with a common joint. Also stores the positions of the
     nodes there.
 
-    `radius` (bodies,) are radii of spheres around the bodies. `nodes` is the table of
-    laws.kinematics for a `state` [q; v] (13*bodies,).
+    `contact` has the distance below which a pair is near. `radius` (bodies,) are radii of spheres
+    around the bodies. `nodes` is the table of laws.kinematics for a `state` [q; v] (13*bodies,).
     """
     limit, count = named(StrutSearch, contact.search).near, 0
     for first in range(radius.size):
@@ -166,7 +167,8 @@ def find_near_struts(
 
 
 class Touch(NamedTuple):
-    """Geometry of a contact of two struts."""
+    """Geometry of a contact of two struts: its position on both axes, its depth, and how the depth
+    changes as the ends move."""
 
     s: Real
     """Position of the contact along the first axis: 0 at its start, 1 at its end."""
@@ -183,16 +185,17 @@ class Touch(NamedTuple):
 def time_to_pass(
     struts: Struts, law: StrutContactLaw, nodes: Table, near: NearStruts, horizon: Real
 ) -> Real:
-    """Longest step (s), at most `horizon`, that cannot carry a strut through another.
+    """Longest step (s), at most `horizon` (s), that cannot carry a strut through another.
 
     The step also ends before the next collision begins, unless it is short compared with the
-    collision. The forces must have been computed for the same `nodes`.
+    collision. `nodes` has the nodes' positions and velocities. `near` has the near pairs; the
+    forces must have been computed for the same `nodes`, because add_strut_forces() updates `near`.
 
     Struts approach at most by the largest difference of the nodes' velocities. Two struts of a near
-    pair may move by their gap and the search's `passage`. Struts of other pairs are apart by at
-    least half of the difference of `near` and the largest distance that touches. This bound does
-    not depend on the time of the latest search. So the motion of a robot does not depend on the
-    robots in other lanes.
+    pair may move by their gap and by the distance `passage` of StrutSearch, by which struts may
+    overlap. Struts of other pairs are apart by at least half of the difference of `near` in
+    StrutSearch and the largest distance of axes that touch. This bound does not depend on the time
+    of the latest search. So the motion of a robot does not depend on the robots in other lanes.
     """
     if not law.acts:
         return horizon
@@ -221,7 +224,8 @@ def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
     """Weight w (m²) that makes nearly parallel struts count as thicker in the middle, and its first
     and second derivative with respect to uv, the scalar product of the axes.
 
-    `reach` (m) is the sum of the radii.
+    The weight is (BARREL reach)² for parallel struts and 0 for perpendicular ones; see
+    laws.capsules. `reach` (m) is the sum of the radii.
     """
     most = (PARALLEL * BARREL * reach) * (PARALLEL * BARREL * reach)
     uu_vv, flat = axes.uu * axes.vv, (1.0 - PARALLEL * PARALLEL) * axes.uv * axes.uv
@@ -232,8 +236,8 @@ def barrel(axes: Axes, reach: Real) -> tuple[Real, Real, Real]:
 
 @inlined
 def find_touch(struts: Struts, nodes: Table, i: int, j: int) -> Touch:
-    """Position, depth and gradient of the contact of struts i and j; the depth is negative if they
-    are apart. `nodes` is the table with the positions of the nodes."""
+    """Position, depth and gradient of the contact of struts i and j; see Touch. The depth is
+    negative if they are apart. `nodes` is the table with the positions of the nodes."""
     axes, reach = axes_of(struts, nodes, i, j), struts.radius[i] + struts.radius[j]
     weight, weight_rate, _ = barrel(axes, reach)
     half, uu, vv = 0.5 * weight, axes.uu + weight, axes.vv + weight
@@ -260,10 +264,12 @@ def add_strut_forces(
     nodes: Table,
     near: NearStruts,
 ) -> None:
-    """Adds the forces between struts that touch to the forces on the nodes, in `nodes`.
+    """Adds the forces between struts that touch to the forces on the nodes, in `nodes`, which has
+    the nodes' positions and velocities.
 
     Finds the near pairs anew, into `near`, if a node has moved far since the latest search; see
-    find_near_struts().
+    find_near_struts(). `radius` (bodies,) are radii of spheres around the bodies, `state` is [q; v]
+    (13*bodies,).
     """
     if not law.acts:
         return
@@ -281,7 +287,7 @@ def add_strut_forces(
 @inlined
 def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j: int) -> None:
     """Adds the force between struts i and j, if they touch, to the forces on their nodes, in
-    `nodes`."""
+    `nodes`, which has the nodes' positions and velocities. `law` has the constants of the force."""
     touch = find_touch(struts, nodes, i, j)
     if not any_lane(touch.depth > 0.0):
         return
@@ -291,8 +297,8 @@ def add_contact_force(struts: Struts, law: NormalForce, nodes: Table, i: int, j:
 
 @inlined
 def push_ends(struts: Struts, nodes: Table, i: int, j: int, touch: Touch, force: Real) -> None:
-    """Adds a force (N) that pushes struts i and j apart to the forces on their nodes, in `nodes`.
-    The gradient of `touch` says how the ends share it."""
+    """Adds a force (N) that pushes struts i and j apart to the forces on their nodes, in `nodes`. A
+    positive `force` pushes. The gradient of `touch` says how the ends share it."""
     start_i, end_i, start_j, end_j = touch.gradient
     add_vector(scaled(force, start_i), struts.node_a[i], kinematics.FORCE, nodes)
     add_vector(scaled(force, end_i), struts.node_b[i], kinematics.FORCE, nodes)
@@ -302,7 +308,8 @@ def push_ends(struts: Struts, nodes: Table, i: int, j: int, touch: Touch, force:
 
 @inlined
 def depth_rate(struts: Struts, nodes: Table, i: int, j: int, touch: Touch) -> Real:
-    """Rate (m/s) of the depth of the contact of struts i and j, positive as they approach."""
+    """Rate (m/s) of the depth of the contact `touch` of struts i and j, positive as they approach.
+    `nodes` has the velocities of their ends."""
     start_i, end_i, start_j, end_j = touch.gradient
     rate_i = dot(start_i, vector_at(nodes, struts.node_a[i], kinematics.V_WN))
     rate_i += dot(end_i, vector_at(nodes, struts.node_b[i], kinematics.V_WN))

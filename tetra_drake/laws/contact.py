@@ -65,15 +65,16 @@ class GroundSection(Section):
 
 
 class NormalForce(NamedTuple):
-    """Constants of the normal force (Table 1 of the thesis); SI units."""
+    """Constants of the law of the normal force (Table 1 of the thesis): stiffness in N/m, damping
+    in N s/m²."""
 
     stiffness: Real
     damping: Real
 
 
 class Ground(NamedTuple):
-    """Ground for the kernels: its laws and surface, and the nodes that may touch it (contact
-    nodes)."""
+    """Ground as an argument of kernels: its laws and surface, and the nodes that may touch it
+    (contact nodes) with the spheres about them (feet)."""
 
     contacts: Table
     """Rows (contacts,) of the table `nodes` on which the ground acts. The row of a foot without
@@ -142,10 +143,12 @@ def meet_ground(ground: Ground, state: Table, nodes: Table, frames: Table) -> No
     feet.
 
     A frame is a row of `frames` (contacts, FRAME_COLUMNS): gap, normal and tangents. The lowest
-    points are written to rows of the table `nodes` of laws.kinematics, after all nodes.
+    points are written to rows of the table `nodes` of laws.kinematics, after all nodes. The forces
+    on them become zero.
 
-    The velocity of a lowest point is the one of the body there. The gap in the frame of a round
-    foot is the distance of its lowest point from the surface. On flat ground, `frames` is not used.
+    The velocity of a lowest point is the velocity of the body's material there. The gap in the
+    frame of a round foot is the distance of its lowest point from the surface. On flat ground,
+    `frames` is not used.
     """
     if not ground.flat:
         grid = named(terrain.SurfaceGrid, ground.grid)
@@ -179,10 +182,10 @@ def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
 @inlined
 def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
     """Normal force (N) on a node by Eq. 1 of the thesis with the exponent n = 1: stiffness depth +
-    damping depth depth_rate.
+    damping depth depth_rate, but never below 0.
 
     `depth` (m) is the node's depth in the ground, `depth_rate` (m/s) its rate, positive as it sinks
-    in. The ground never pulls.
+    in. In the air, where `depth` is negative, the force is 0.
     """
     force = law.stiffness * depth + law.damping * depth * depth_rate
     return select(depth > 0.0, maximum(force, 0.0), 0.0)
@@ -193,7 +196,11 @@ def sliding(
     state: Table, nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
 ) -> tuple[friction.Slide, Real]:
     """Motion of foot i along the ground, with its normal force (N), and the rate (m/s) of its
-    distance from the ground, positive upward. `modes` is only read."""
+    distance from the ground, positive upward.
+
+    `state` is [q; v] (13*bodies,), `nodes` the table of node motions. `frames` has the tangents of
+    the ground, `modes` the friction modes, stick points and headings; both are only read.
+    """
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     v_WN = vector_at(nodes, ground.contacts[i], kinematics.V_WN)
     deflection = difference(p_WN, vector_at(modes, i, STICK_POINT))
@@ -213,13 +220,13 @@ def sliding(
 
 @inlined
 def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, modes: Table) -> Truth:
-    """Updates the contact and friction modes in `modes` for a state [q; v] and its `nodes` and
-    `frames`.
+    """Updates the contact and friction modes in `modes` (contacts, 12) for a state [q; v] and its
+    `nodes` and `frames`.
 
     Returns True in lanes where a mode changed; each lane is a robot. A node that lands sticks where
-    it lands. A node that sticks again does so at its present position; this is the reset of the
-    reset integrator, unless the deflection is kept. The stick point of a node in the air is where
-    it has left the ground.
+    it lands. A sliding node that sticks again does so at its present position, so the deflection of
+    its bristle becomes 0; some settings of friction keep the deflection. The stick point of a node
+    in the air is where it has left the ground.
     """
     changed = False
     for i in range(ground.contacts.size):
@@ -263,11 +270,11 @@ def move_stick_point(
     modes: Table,
 ) -> None:
     """Moves the stick point of foot i, in `modes`, so that the deflection of its bristle becomes
-    `bend` (m). `along` says, for t1 and t2, whether the stick point moves along this tangent.
-    `slide` is the foot's present motion.
+    `bend` (m, along t1 and t2), but only along the tangents for which `along` is true. Along the
+    others the deflection stays. `slide` is the foot's present motion.
 
-    With round feet, also stores the body's orientation in `modes`. Along the other tangents the
-    stick point then moves so that the deflection stays.
+    With round feet, also stores the body's orientation in `modes`, from which the foot's later turn
+    counts in the deflection.
     """
     p_WN = vector_at(nodes, ground.centres[i], kinematics.P_WN)
     if ground.is_round:

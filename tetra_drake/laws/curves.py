@@ -14,11 +14,12 @@ def curvature(points: np.ndarray, *, scale: float = 1.0) -> float:
     """Curvature (1/m) of the circle that fits the points (k, 2) of a path in m.
 
     The curvature is positive if the path bends to the left, and 0 on a line. Taubin's fit (IEEE
-    Trans. PAMI 13, 1991, 1115), with p relative to the mean of the points: the circle is
-    bend / (2 size) (p . p - size^2) + normal . p = 0. The unit vector (bend, normal) minimises the
-    mean square of the left side. A term is added that keeps the curvature of a path small if the
-    path is hardly larger than _SWAY times `scale`. At a scale of 1 it has no effect on a path of
-    10 cm.
+    Trans. PAMI 13, 1991, 1115): the circle is bend / (2 size) (p . p - size^2) + normal . p = 0,
+    with points p relative to the mean of all, and their root mean square length `size`. The unit
+    vector (bend, normal) of three numbers minimises the mean square of the left side. A path that
+    is hardly larger than 2 mm (_SWAY) times `scale`, the ratio of the robot's size to a usual one,
+    counts as almost straight: a term is added that keeps its curvature small. At a scale of 1 it
+    has no effect on a path of 10 cm.
     """
     sway = scale * _SWAY
     (x, y), count = points.T, len(points)
@@ -42,9 +43,10 @@ def curvature(points: np.ndarray, *, scale: float = 1.0) -> float:
 def travelling_index(waves: np.ndarray) -> float:
     """Travelling index of waves (samples, positions): 0 for standing waves, 1 for travelling waves.
 
-    It is the ratio of the singular values of the real and imaginary parts of the strongest complex
-    orthogonal mode (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Samples must be evenly
-    spaced. The index of fewer than two positions is 0.
+    A column of `waves` is the time series at one position, in evenly spaced samples. The index is
+    the ratio of the singular values of the real and imaginary parts of the strongest complex
+    orthogonal mode (B. F. Feeny, Journal of Sound and Vibration 310, 2008). The index of fewer than
+    two positions is 0.
     """
     if waves.shape[1] < 2:
         return 0.0

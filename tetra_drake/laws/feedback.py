@@ -26,9 +26,10 @@ from tetra_drake.settings.section import Section
 
 
 class Gains(Section):
-    """Gain of each pathway of feedback in a gait, in units of the input u0.
+    """Gain of each pathway of feedback in a gait, in units of the tonic input u0 of the neurons.
 
-    The *body in front* is the last body that the oscillator's cables join.
+    The *body in front* of an oscillator is the last body, in the robot's order, that its cables
+    join.
     """
 
     length: float = 0.0
@@ -56,8 +57,9 @@ else:
 class Senses(NamedTuple):
     """Constants of a robot from which the feedback to its m oscillators is computed.
 
-    All tables have one axis. The types of tables contain all lengths but the first (see
-    kernels.lanes). With two axes, kernels would be compiled again for robots of another size.
+    All tables have one axis. Numba would compile the kernels again for robots of another size if a
+    table had two, because the type of a table contains all lengths but the first; see
+    kernels.lanes.
     """
 
     drivers: Table
@@ -79,10 +81,11 @@ def sense(
     senses: Senses, gains: Table, state: Table, modes: Table, forces: Forces, feedback: Table
 ) -> None:
     """Writes the feedback f of each neuron to `feedback` (2m,), for m oscillators: extensor and
-    flexor in turn.
+    flexor in turn. The unit is the unit of the tonic input u0.
 
-    It is computed from the state [q; v] of the bodies, the modes of laws.contact, and `forces`,
-    which must hold the cable and ground forces. `gains` are in the order of PATHWAYS.
+    It is computed from the `state` [q; v] (13*bodies,) and from `forces`, which must hold the cable
+    and ground forces. `gains` are in the order of PATHWAYS. `modes` (contacts, 12) are the contact
+    modes, for further pathways; no present one uses them.
     """
     gain = named(NamedGains, gains)
     for i in range(feedback.size):
@@ -118,7 +121,9 @@ def compute_feedback(
     """Computes the forces of a robot, then writes the feedback of each neuron to `feedback` (2m,);
     see sense().
 
-    The robot has signals (m,) in N, and actuator states `drives` (drives,).
+    `parts` is a Model, its Forces and its Senses. `gains` are in the order of PATHWAYS, `state` is
+    [q; v] (13*bodies,), `modes` (contacts, 12) are contact and friction modes, `signals` (m,) are
+    in N, `drives` (drives,) are the actuators' states. Also writes the forces to the Forces.
     """
     robot, forces, senses = unpacked(parts)
     compute_forces_at(robot, state, modes, signals, drives, forces)

@@ -27,7 +27,8 @@ from tetra_drake.laws.vectors import (
 
 
 class Forces(NamedTuple):
-    """Arrays for the forces on a robot in one state. Kernels write to them."""
+    """Tables to which kernels write the motions of the nodes of a robot and the forces on it, in
+    one state."""
 
     nodes: Annotated[Table, "nodes", kinematics.NODE_COLUMNS]
     frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]
@@ -45,13 +46,13 @@ class Forces(NamedTuple):
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """New arrays for the forces on a robot."""
+        """New tables for a robot's motions and forces."""
         return allocate(cls, sizes_of(robot))
 
 
 def sizes_of(robot: Model) -> dict[str, int]:
-    """Lengths of a robot's tables by name, such as "bodies" and "cables", for allocate(), which
-    makes the arrays."""
+    """Numbers of a robot's bodies, nodes, contacts and so on, by name, such as {"bodies": 3, ...}.
+    allocate() makes tables of these lengths."""
     drivers, has_drive = robot.cables.signal, actuator.has_drive(robot.actuator)
     near = capsules.near_sizes(robot.struts)
     if not robot.strut_contact.acts:
@@ -74,8 +75,12 @@ Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
 
 @inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
-    """Writes motions of nodes and feet, ground frames and inertia for a state [q; v] (13*bodies,)
-    to `forces`. Sets the forces on the nodes to zero."""
+    """Writes what depends only on the state to `forces`: positions and velocities of the nodes and
+    of the lowest points of round feet, ground frames, and inertia along the world's axes.
+
+    `state` is [q; v] (13*bodies,). A ground frame is the gap, normal and tangents of the ground
+    below a contact node. Sets the forces on nodes and feet to zero.
+    """
     move_contacts(robot, state, forces)
     if not robot.isotropic:
         turn_inertia(state, robot.bodies.inertia, forces.inertia)
@@ -83,8 +88,12 @@ def move_robot(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
-    """Writes motions of nodes and feet, and ground frames, for a state [q; v] (13*bodies,) to
-    `forces`. Sets the forces on them to zero."""
+    """Writes positions and velocities of the nodes and of the lowest points of round feet, and
+    ground frames, for a state [q; v] (13*bodies,) to `forces`.
+
+    A ground frame is the gap, normal and tangents of the ground below a contact node. Sets the
+    forces on nodes and feet to zero.
+    """
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     contact.meet_ground(robot.ground, state, forces.nodes, forces.frames)
 
@@ -93,14 +102,15 @@ def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
 def pull_of_cable(
     robot: Model, i: int, drive: int, length: Real, rate: Real, signals: Table, drives: Table
 ) -> tuple[Real, Real, int]:
-    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the next row of
-    `drives`.
+    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the row of
+    `drives` for the next cable.
 
-    `drives` has a row for each actuator with a state, such as a winch: its state, then what is
-    computed here, such as the state's derivative. `drive` is the row of this cable's actuator. The
-    next row is `drive` + 1 if the actuator has a state, otherwise `drive`.
-    The length is in m, its rate in m/s, `signals` (signals,) in N. An actuation force
-    also acts on a cable that is slack.
+    `length` is in m, `rate`, the rate of the length, in m/s, `signals` (signals,) in N. An
+    actuation force also acts on a cable that is slack.
+
+    `drives` has a row for each actuator with a state, such as a winch. Its state is read; the
+    state's rate and the other columns are written. `drive` is the row of this cable's actuator. The
+    returned row is `drive` + 1 if the cable has such an actuator, otherwise `drive`.
     """
     driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:
@@ -124,10 +134,12 @@ def pull_of_cable(
 
 @inlined
 def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
-    """Adds the forces of all cables to the forces on the nodes, in `forces.nodes`.
+    """Adds the forces of all cables to the forces on the nodes, in `forces.nodes`, which has the
+    nodes' positions and velocities.
 
-    `signals` (signals,) are in N. Also writes the rates of the actuators' states, and with
-    `write_parts` the table `forces.cable_forces`.
+    `signals` (signals,) are in N. Also writes the rates of the actuators' states to
+    `forces.drives`, and with `write_parts` direction, length and tension of each cable to
+    `forces.cable_forces`.
     """
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
     routes, drive = robot.cables.routes, 0
@@ -197,9 +209,9 @@ def add_ground_forces(
 ) -> None:
     """Adds the forces of the ground to the forces on nodes and round feet, in `forces.nodes`.
 
-    `state` is [q; v] (13*bodies,). `modes` says which nodes touch and stick, and is only read; see
-    laws.contact. With `write_parts`, also writes friction and normal force of each contact to
-    `forces.ground_forces`.
+    `state` is [q; v] (13*bodies,). `modes` (contacts, 12) says which nodes touch and stick, and is
+    only read; see laws.contact. With `write_parts`, also writes friction and normal force of each
+    contact to `forces.ground_forces`. move_contacts() must have been called for the same state.
     """
     ground, nodes, frames, parts = robot.ground, forces.nodes, forces.frames, forces.ground_forces
     for i in range(parts.shape[0]):
@@ -227,12 +239,13 @@ def compute_forces(
     forces: Forces,
     generalized: Table,
 ) -> None:
-    """Writes the generalized force (6*bodies,) of cables, ground, touching struts, anchors, loads,
-    gravity and gyroscopic torques to `generalized`.
+    """Writes the generalized force of cables, ground, touching struts, anchors, loads, gravity and
+    gyroscopic torques to `generalized` (6*bodies,): torque and force [t_W; f_W] at each body's
+    origin.
 
-    move_robot() must have been called for the same `state`. `modes` are the contact and friction
-    modes, `signals` are in N. With `write_parts`, also writes `forces.cable_forces` and
-    `forces.ground_forces`.
+    move_robot() must have been called for the same `state`. `modes` (contacts, 12) are the contact
+    and friction modes, and are only read. `signals` are in N. With `write_parts`, also writes
+    `forces.cable_forces` and `forces.ground_forces`.
     """
     add_cable_forces(robot, signals, write_parts, forces)
     add_ground_forces(robot, state, modes, write_parts, forces)
@@ -252,8 +265,8 @@ def compute_forces(
 
 @inlined
 def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
-    """Sums the forces on nodes and round feet to `generalized` (6*bodies,): torque and force [t_W;
-    f_W] at each body's origin."""
+    """Sums the forces on the nodes and round feet of each body, and writes them to `generalized`
+    (6*bodies,): torque and force [t_W; f_W] at each body's origin. `nodes` has the forces."""
     kinematics.gather_forces(nodes, robot.first_node, generalized)
     ground = robot.ground
     if not ground.is_round:
@@ -271,8 +284,9 @@ def gather_forces(robot: Model, nodes: Table, generalized: Table) -> None:
 
 @inlined
 def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
-    """Adds the forces of touching struts, anchors, joints and loads to the forces on the nodes, in
-    `forces.nodes`. They need neither signals nor modes."""
+    """Adds the forces of touching struts, anchors (springs to the world), joints and loads
+    (constant forces) to the forces on the nodes, in `forces.nodes`. They need neither signals nor
+    modes. `state` is [q; v] (13*bodies,)."""
     nodes, anchors, joints, loads = forces.nodes, robot.anchors, robot.joints, robot.loads
     radius, law, near = robot.bodies.radius, robot.strut_contact, forces.near_struts
     capsules.add_strut_forces(robot.struts, law, radius, state, nodes, near)
@@ -305,12 +319,13 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
 
 @compiled
 def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> float:
-    """Writes the generalized force of all cables to `generalized` (6*bodies,): [t_W; f_W] at each
-    body's origin.
+    """Writes the generalized force of all cables to `generalized` (6*bodies,): torque and force
+    [t_W; f_W] at each body's origin.
 
-    `state` is [q; v] (13*bodies,), `signals` are in N. Also writes nodes, `cable_forces` and the
-    rates of the actuators' states to the Forces of `parts`. Returns the sum of `generalized`, which
-    is finite only if all forces are.
+    `parts` is a Model and its Forces. `state` is [q; v] (13*bodies,), `signals` are in N. Also
+    writes `nodes`, `cable_forces` and the rates of the actuators' states to the Forces. Returns the
+    sum of all numbers in `generalized`: it is finite only if all forces are, and so serves as a
+    check.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
@@ -327,9 +342,9 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
     """Writes the generalized force of the ground to `generalized` (6*bodies,): torque and force
     [t_W; f_W] at each body's origin.
 
-    `state` is [q; v] (13*bodies,). `modes` (contacts, 12) says which nodes touch the ground and
-    stick; it is only read. Also writes nodes, ground frames and `ground_forces` to the Forces of
-    `parts`.
+    `parts` is a Model and its Forces. `state` is [q; v] (13*bodies,). `modes` (contacts, 12) says
+    which nodes touch the ground and stick; it is only read. Also writes nodes, ground frames and
+    `ground_forces` to the Forces.
     """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
@@ -339,10 +354,12 @@ def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized:
 
 @compiled
 def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None:
-    """Writes the generalized force of touching struts, anchors, joints and loads to `generalized`
-    (6*bodies,): [t_W; f_W] at each body's origin.
+    """Writes the generalized force of touching struts, anchors (springs to the world), joints and
+    loads (constant forces) to `generalized` (6*bodies,): torque and force [t_W; f_W] at each body's
+    origin.
 
-    `state` is [q; v] (13*bodies,). Also writes nodes to the Forces of `parts`.
+    `parts` is a Model and its Forces. `state` is [q; v] (13*bodies,). Also writes nodes to the
+    Forces.
     """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
@@ -352,11 +369,12 @@ def compute_state_forces(parts: Parts, state: Table, generalized: Table) -> None
 
 @compiled
 def compute_strut_forces(parts: Parts, state: Table, horizon: float, generalized: Table) -> float:
-    """Writes the generalized force of touching struts to `generalized` (6*bodies,): [t_W; f_W] at
-    each body's origin.
+    """Writes the generalized force of touching struts to `generalized` (6*bodies,): torque and
+    force [t_W; f_W] at each body's origin.
 
-    Returns the longest step (s), at most `horizon`, that cannot carry a strut through another; see
-    capsules.time_to_pass(). Also writes nodes to the Forces of `parts`.
+    `parts` is a Model and its Forces. `state` is [q; v] (13*bodies,). Returns the longest step (s),
+    at most `horizon` (s), that cannot carry a strut through another; see capsules.time_to_pass().
+    Also writes nodes to the Forces.
     """
     robot, forces = unpacked(parts)
     nodes, law, near = forces.nodes, robot.strut_contact, forces.near_struts
@@ -371,10 +389,10 @@ def forces_of_motion(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Node motions, cable forces and ground forces at each of the k times of a recorded motion.
 
-    The motion has states [q; v] (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m)
-    in N, and actuator states `drives` (k, drives). Returns the tables `nodes` (k, nodes,
-    NODE_COLUMNS), without the rows of feet, `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and
-    `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
+    The motion has states [q; v] (k, 13*bodies), contact and friction modes (k, contacts,
+    MODE_COLUMNS), signals (k, m) in N, and actuator states `drives` (k, drives). Returns the tables
+    `nodes` (k, nodes, NODE_COLUMNS), without the lowest points of round feet, `cable_forces` (k,
+    cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
     """
     forces, samples = Forces.of(robot), len(states)
     nodes = np.empty((samples, len(robot.p_BN), kinematics.NODE_COLUMNS))
@@ -396,11 +414,13 @@ def forces_along(
     cable_forces: Table,
     ground_forces: Table,
 ) -> None:
-    """Writes `nodes`, `cable_forces` and `ground_forces` at each of the k times of a recorded
-    motion; see forces_of_motion().
+    """Writes the last three arguments, the tables of forces_of_motion(), at each of the k times of
+    a recorded motion.
 
-    The motion has states (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m) in N,
-    and actuator states `drives` (k, drives).
+    `parts` is a Model and its Forces. The motion has states [q; v] (k, 13*bodies), contact and
+    friction modes (k, contacts, MODE_COLUMNS), signals (k, m) in N, and actuator states `drives`
+    (k, drives). Written are `nodes` (k, nodes, NODE_COLUMNS), `cable_forces` (k, cables,
+    CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
     """
     robot, forces = unpacked(parts)
     for k in range(states.shape[0]):
@@ -414,8 +434,8 @@ def forces_along(
 def compute_forces_at(
     robot: Model, state: Table, modes: Table, signals: Table, drives: Table, forces: Forces
 ) -> None:
-    """Computes all tables of `forces` for a state (13*bodies,), contact and friction modes, signals
-    (N) and actuator states `drives` (drives,)."""
+    """Writes all tables of `forces` for a state [q; v] (13*bodies,), contact and friction modes
+    (contacts, 12), signals (N) and actuator states `drives` (drives,)."""
     generalized = np.empty(6 * robot.bodies.mass.size)
     move_robot(robot, state, forces)
     for i in range(drives.size):
@@ -425,7 +445,8 @@ def compute_forces_at(
 
 @inlined
 def copy_rows(table: Table, rows: Table) -> None:
-    """Copies the first rows of `table` to `rows`, as many as `rows` has."""
+    """Copies the first rows of `table` to the table `rows`, as many as `rows` has. Copies the first
+    columns only, if `rows` has fewer."""
     for i in range(rows.shape[0]):
         for c in range(rows.shape[1]):
             rows[i, c] = table[i, c]

@@ -83,8 +83,8 @@ MUJOCO_FRICTION = 0.5
 
 @dataclass(frozen=True)
 class Cone:
-    """Constants of MuJoCo's friction: against the velocity, and at most `coefficient` times the
-    load."""
+    """Constants of MuJoCo's friction: a force against the velocity of a node, whose size is at most
+    `coefficient` times the normal force."""
 
     coefficient: float
     damping: float
@@ -92,7 +92,7 @@ class Cone:
 
 
 class FrictionKind(Section):
-    """Base class for the settings of friction."""
+    """Base class for the settings of friction between the nodes and the ground."""
 
     modes: ClassVar[str]
     """Meaning of the signs of friction modes in recorded trajectories."""
@@ -101,27 +101,29 @@ class FrictionKind(Section):
     same."""
 
     def law(self) -> FrictionLaw:
-        """The law of friction for the kernels."""
+        """The law of friction with these settings as constants, as an argument of kernels."""
         raise NotImplementedError
 
     def without_bristles(self) -> FrictionKind:
-        """This law without stiffness of bristles, for MuJoCo: nodes that stick creep."""
+        """This law with a bristle stiffness of 0, for MuJoCo: nodes that stick creep."""
         return self
 
     @property
     def text(self) -> str:
-        """Description of the law for pages."""
+        """Description of the law for pages that show a robot or its results, such as "the thesis's
+        friction"."""
         raise NotImplementedError
 
     def cone(self, source: object) -> Cone:
-        """MuJoCo's friction for this law. Raises InputError, naming `source` and key, if there is
-        none."""
+        """MuJoCo's friction in place of this law. Raises InputError, naming `source` (the scenario)
+        and the key, if MuJoCo cannot simulate it."""
         problem = f"found !{type(self).__name__}, which mujoco cannot simulate"
         raise InputError(source, "friction", problem)
 
 
 class FrictionLaw(NamedTuple):
-    """Kind and constants of a friction law for the kernels."""
+    """Kind and constants of the law of friction between the nodes and the ground, for the
+    kernels."""
 
     kind: int
     """RESET_INTEGRATOR or COULOMB."""
@@ -130,7 +132,8 @@ class FrictionLaw(NamedTuple):
 
 
 class TangentSlide(NamedTuple):
-    """Motion of a node along one tangent of the ground."""
+    """Motion of a node along one tangent of the ground, and its friction mode along it: 0 if it
+    sticks, otherwise the direction of slip."""
 
     velocity: Real
     """Velocity in m/s."""
@@ -140,7 +143,8 @@ class TangentSlide(NamedTuple):
 
 
 class Slide(NamedTuple):
-    """Motion of a node along the ground's tangents t1 and t2, and the normal force on it."""
+    """Motion of a node along the ground's tangents t1 and t2, the normal force on it, and the
+    heading of its body."""
 
     t1: TangentSlide
     t2: TangentSlide
@@ -165,7 +169,8 @@ class NextMode(NamedTuple):
 def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
     """First time t (s) in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero.
 
-    Returns the horizon if there is no such time, or if `value` is not positive.
+    `value` has any unit; `rate` and `rate_rate` are its first and second derivative by time.
+    Returns the horizon (s) if there is no such time, or if `value` is not positive.
     """
     reach = horizon * (abs(rate) + 0.5 * horizon * abs(rate_rate))
     if not any_lane((value > 0.0) & (value <= reach)):
@@ -183,8 +188,9 @@ def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
 class ResetIntegrator(FrictionKind):
     """Friction of the thesis (Table 2, Eq. 3-5), independent of the load.
 
-    A bristle holds a node until it is bent by `stiction_range`. See laws.friction. The keys from
-    `stiffness` on are other readings of the thesis's text.
+    A bristle holds a node until it is bent by `stiction_range`. See laws.friction. The thesis's
+    text can be read in other ways: the settings `stiffness`, `reset`, `breaks_free` and `load`
+    choose them.
     """
 
     modes = "0 sticks, +1 or -1 slips in that direction along the tangent"
@@ -230,7 +236,8 @@ class ResetIntegrator(FrictionKind):
 
 
 class ResetConstants(NamedTuple):
-    """Constants of the reset integrator (Table 2 of the thesis); SI units."""
+    """Constants of the reset integrator (Table 2 of the thesis), the law with which friction comes
+    from a bristle; SI units."""
 
     stiction_range: Real
     stiction_damping: Real
@@ -250,7 +257,8 @@ class ResetConstants(NamedTuple):
 
 @inlined
 def reset_force(slide: Slide, law: ResetConstants) -> Vector2:
-    """Friction (N) along both tangents by the reset integrator (Eq. 3-5 of the thesis)."""
+    """Friction (N) along both tangents by the reset integrator (Eq. 3-5 of the thesis). `slide` is
+    the node's motion and normal force."""
     force_1, force_2 = tangent_force(slide.t1, law), tangent_force(slide.t2, law)
     if not any_lane(law.per_load > 0.0):
         return force_1, force_2
@@ -271,10 +279,12 @@ def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
 
 @inlined
 def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, Real, Real]:
-    """Damping matrix (kg) of the friction F for an implicit step of length `time` (s).
+    """Damping matrix of the friction F for an implicit step of length `time` (s): time times a
+    damping, so in kg.
 
     Returns the components 11, 12 and 22, along t1 and t2, of the stiff part of -(time dF/dv + time²
-    dF/dx). For the reset integrator this part is the damping and stiffness in stick.
+    dF/dx), with the velocity v and the deflection x. For the reset integrator this part is the
+    damping and stiffness in stick.
     """
     stiffness = time * law.stiffness * (1.0 + law.stiction_switch)
     by_load = select(law.per_load > 0.0, law.per_load * slide.normal, 1.0)
@@ -287,7 +297,8 @@ def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, 
 @inlined
 def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
     """Mode of the reset integrator along each tangent after a step: 0 sticks, otherwise the
-    direction of slip."""
+    direction of slip. `slide` is the node's motion at the end of the step, with the modes of the
+    step."""
     slips = law.restarts == 0.0
     ends_1, ends_2 = at_range(slide.t1, law), at_range(slide.t2, law)
     breaks_1, breaks_2 = ends_1 & slips, ends_2 & slips
@@ -307,8 +318,8 @@ def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
 
 @inlined
 def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
-    """True if a node sticks, its bristle is bent by the stiction range or more, and it moves
-    outward: it breaks free."""
+    """True if a node that sticks breaks free along this tangent: its bristle is bent by the
+    stiction range or more, and it moves outward, so that the bend grows."""
     forward = (slide.deflection >= law.stiction_range) & (slide.velocity > 0.0)
     backward = (slide.deflection <= -law.stiction_range) & (slide.velocity < 0.0)
     return (slide.mode == STICK) & (forward | backward)
@@ -319,10 +330,10 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
     """Mode of the reset integrator along one tangent after a step: 0 sticks, otherwise the sign of
     slip.
 
-    If the node `breaks` free along this tangent, it slips in the direction of its velocity. If it
-    breaks free along the other tangent only, its mode here is `share`, a fraction of slip: the
-    deflection along this tangent divided by the stiction range. `share` is 0 if the node holds. A
-    slipping node sticks again when its velocity changes sign.
+    `breaks` is true if the node breaks free along this tangent: it then slips in the direction of
+    its velocity. If it breaks free along the other tangent only, its mode here is `share`, a
+    fraction of slip: the deflection along this tangent divided by the stiction range. `share` is 0
+    otherwise. A slipping node sticks again when its velocity changes sign.
     """
     from_stick = select(breaks, select(slide.velocity > 0.0, 1.0, -1.0), share)
     mode = select(slide.mode == STICK, from_stick, slide.mode)
@@ -333,8 +344,8 @@ def next_tangent_mode(slide: TangentSlide, breaks: Truth, share: Real) -> Real:
 def reset_margin(slide: Slide, law: ResetConstants) -> float:
     """Mode margin of the reset integrator: positive until the mode changes along a tangent.
 
-    It is the smaller margin of the two tangents. A node that sticks may be at the stiction range as
-    long as it moves inward.
+    It is the smaller margin of the two tangents, in m in stick and in m/s in slip; only the sign
+    has a meaning. A node that sticks may be at the stiction range as long as it moves inward.
     """
     margin = math.inf
     for tangent in (slide.t1, slide.t2):
@@ -352,10 +363,10 @@ def time_to_reset_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: ResetConstants
 ) -> Real:
     """Time (s) to the next mode change of the reset integrator along either tangent, at most
-    `horizon`.
+    `horizon` (s).
 
-    `acceleration` (m/s²) along the tangents is taken as constant. `normal_rate` is not used: the
-    other law needs it.
+    `acceleration` (m/s²) along t1 and t2 is taken as constant. `normal_rate` is not used: it is an
+    argument because the Coulomb law needs it.
     """
     return minimum(
         time_to_tangent_change(slide.t1, acceleration[0], law, horizon),
@@ -367,8 +378,8 @@ def time_to_reset_change(
 def time_to_tangent_change(
     slide: TangentSlide, acceleration: Real, law: ResetConstants, horizon: Real
 ) -> Real:
-    """Time (s) to the next mode change of the reset integrator along one tangent, at most
-    `horizon`, with a constant acceleration (m/s²)."""
+    """Time (s) to the next mode change of the reset integrator along one tangent, at most `horizon`
+    (s). The acceleration (m/s²) along the tangent is taken as constant."""
     velocity, stuck = slide.velocity, slide.mode == STICK
     # first_zero() ignores a value of 0, so 0 stands for no mode change.
     to_front = select(stuck, law.stiction_range - slide.deflection, 0.0)
@@ -383,7 +394,8 @@ def time_to_tangent_change(
 
 
 class Coulomb(FrictionKind):
-    """Friction that grows with the load, and may depend on the direction of travel.
+    """Friction that grows with the load, and may depend on the direction of slip relative to the
+    heading of the node's body.
 
     A bristle holds a node until its force exceeds `static` times the load. See laws.friction.
     """
@@ -486,12 +498,12 @@ def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
 
 @inlined
 def coulomb_size(u_1: Real, u_2: Real, heading: Vector2, law: CoulombConstants) -> Real:
-    """Size (N) of a force (u_1, u_2) along the tangents, for friction that depends on the
-    direction.
+    """Size (N) of a force (u_1, u_2) along the tangents, weighted by direction. A node slips if it
+    exceeds the coefficient of friction times the normal force.
 
-    Forces of the same size lie on an ellipse. Its half-axes are the directional factors: `forward`
-    or `backward` along the heading, depending on the sign, and `lateral` across it. `heading` is a
-    unit vector.
+    Forces of the same size lie on an ellipse. Its half-axes are proportional to the directional
+    factors: `forward` or `backward` along the heading, depending on the sign, and `lateral` across
+    it. `heading` is a unit vector along t1 and t2.
     """
     along = u_1 * heading[0] + u_2 * heading[1]
     across = u_2 * heading[0] - u_1 * heading[1]
@@ -511,11 +523,12 @@ def coulomb_force(slide: Slide, law: CoulombConstants) -> Vector2:
 
 @inlined
 def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Real, Real, Real]:
-    """Damping matrix (kg) of the friction F for an implicit step of length `time` (s).
+    """Damping matrix of the friction F for an implicit step of length `time` (s): time times a
+    damping, so in kg.
 
     Returns the components 11, 12 and 22, along t1 and t2, of the stiff part of -(time dF/dv + time²
-    dF/dx). Beyond the limit only the direction of the force changes. This is exact without
-    directional factors.
+    dF/dx), with the velocity v and the deflection x. Where friction is at its limit, only the
+    direction of the force changes. This is exact without directional factors.
     """
     bristle = bristle_force(slide, law)
     stiffness = select(bristle.stuck, time * law.stiffness, 0.0)
@@ -528,10 +541,11 @@ def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Re
 
 @inlined
 def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
-    """Mode of Coulomb friction after a step: (0, 0) sticks, otherwise the direction of slip.
+    """Mode of Coulomb friction after a step: (0, 0) sticks, otherwise the direction of slip, a unit
+    vector along t1 and t2.
 
-    A node breaks free beyond the static limit if it moves outward. It sticks again when the
-    bristle's damping alone can hold it.
+    A node breaks free if its bristle's force is beyond the static limit and it moves outward, along
+    this force. It sticks again when the bristle's damping alone can hold it.
     """
     bristle = bristle_force(slide, law)
     u_1, u_2 = bristle.u_1, bristle.u_2
@@ -551,8 +565,9 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> NextMode:
 def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
     """Mode margin (N) of Coulomb friction: positive until the mode changes.
 
-    In slip it is the size of the bristle's force less its limit. In stick it is the limit less the
-    size, but stays positive beyond the limit while the node moves inward.
+    If the node slips, it is the size of the bristle's force less its limit. If the node sticks, it
+    is the limit less the size. It stays positive beyond the limit while the node moves inward, so
+    that u . v < 0 with the bristle's force u and the velocity v.
     """
     bristle = bristle_force(slide, law)
     if not bristle.stuck:
@@ -565,8 +580,8 @@ def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
 def time_to_coulomb_change(
     slide: Slide, acceleration: Vector2, normal_rate: Real, horizon: Real, law: CoulombConstants
 ) -> Real:
-    """Time (s) until the bristle's force crosses its limit, at most `horizon`. Both are taken to
-    change at their present rates.
+    """Time (s) until the size of the bristle's force crosses its limit, at most `horizon` (s). Both
+    are taken to change at their present rates.
 
     `acceleration` (m/s²) is along the tangents, `normal_rate` (N/s) is the rate of the normal
     force.
@@ -588,8 +603,12 @@ def time_to_coulomb_change(
 
 
 def by_law(reset: F, coulomb: F) -> F:
-    """Combines a function of each friction law into one whose first argument is a FrictionLaw. It
-    calls the function of this law with the other arguments and the law's constants."""
+    """Combines the functions of the two friction laws into one function whose first argument is a
+    FrictionLaw.
+
+    It calls the function of this law with the remaining arguments, then the law's constants.
+    `reset` is for the reset integrator, `coulomb` for Coulomb friction.
+    """
 
     @inlined
     def call(friction: FrictionLaw, *more: Any) -> Any:

@@ -39,8 +39,12 @@ class HeightFile(str):
 
     @classmethod
     def read(cls, path: Any) -> HeightFile:
-        """Reads the height file of a setting. Raises InputError for what is not a path, for a file
-        without heights, and for a file whose name has the digest of other heights."""
+        """Reads the height file of a setting, which is its path; a HeightFile is returned as it is.
+
+        Raises InputError for what is not a path, for a file without heights, for fewer than 3 x 3
+        or more than 4 million heights, for heights above 1e6 m, and for a file of a record whose
+        heights do not fit the digest in its name.
+        """
         if isinstance(path, HeightFile):
             return path
         if not isinstance(path, str):
@@ -61,7 +65,7 @@ class HeightFile(str):
         return file
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Writes the heights to a folder. The file has this string as its name."""
+        """Writes the heights to a file in a folder. The file's name is this string."""
         content = io.BytesIO()
         np.lib.format.write_array(content, self.heights, version=(1, 0))
         write_whole(os.path.join(folder, self), content.getvalue())
@@ -76,7 +80,8 @@ HeightPath = Annotated[
 
 
 def _read_heights(path: str) -> np.ndarray:
-    """Content of a height file, as an array of floats."""
+    """Content of a height file, as an array of floats in m. Raises InputError if it cannot be
+    read."""
     try:
         content = read_bytes(path, "height file")
         if path.endswith(".npy"):

@@ -35,7 +35,8 @@ def turn_inertia(state: Table, inertia_B: Table, inertia_W: Table) -> None:
 
 @inlined
 def times_inertia(inertia: Table, body: int, a: Vector3) -> Vector3:
-    """Inertia of a body times a vector."""
+    """Inertia of a body times a vector, both in the same frame. `inertia` (bodies, 6) has the
+    inertias of all bodies."""
     xx, yy, zz = inertia[body, XX], inertia[body, YY], inertia[body, ZZ]
     xy, xz, yz = inertia[body, XY], inertia[body, XZ], inertia[body, YZ]
     return dot((xx, xy, xz), a), dot((xy, yy, yz), a), dot((xz, yz, zz), a)
@@ -43,7 +44,8 @@ def times_inertia(inertia: Table, body: int, a: Vector3) -> Vector3:
 
 @inlined
 def over_inertia(inertia: Table, body: int, a: Vector3) -> Vector3:
-    """Inverse of a body's inertia times a vector. For a torque, it is the angular acceleration."""
+    """Inverse of a body's inertia times a vector, both in the same frame. For a torque, it is the
+    angular acceleration. `inertia` (bodies, 6) has the inertias of all bodies."""
     xx, yy, zz = inertia[body, XX], inertia[body, YY], inertia[body, ZZ]
     xy, xz, yz = inertia[body, XY], inertia[body, XZ], inertia[body, YZ]
     # The inverse of a 3 x 3 matrix, by its cofactors.

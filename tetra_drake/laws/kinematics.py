@@ -68,7 +68,8 @@ nodes on a line have no angular velocity about the line."""
 
 @inlined
 def pitch_rate(nodes: Table, moving: int) -> Real:
-    """Angular velocity (rad/s) about the world's y axis of the structure as a whole.
+    """Angular velocity (rad/s) about the world's y axis of the structure as a whole, positive if it
+    rolls forward (+x).
 
     It is the angular velocity of the rigid motion that fits the velocities of the nodes best (least
     squares): their angular momentum about their centre, divided by their inertia, with a unit mass
@@ -117,8 +118,8 @@ def rotation(state: Table, body: int) -> tuple[Vector3, Vector3, Vector3]:
 def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
     """Writes the positions and quaternions of the bodies after a time (s) to `moved` (13*bodies,).
 
-    The bodies move from `state` with constant `velocities` (6*bodies,), which are not written to
-    `moved`. Quaternions get the length 1.
+    The bodies move from `state` [q; v] with constant `velocities` v (6*bodies,). The last 6*bodies
+    numbers of `moved`, the velocities, are not written. Quaternions get the length 1.
     """
     half = 0.5 * time
     for body in range(velocities.size // 6):
@@ -146,8 +147,8 @@ def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> No
 
 @inlined
 def put_orientation(state: Table, body: int, row: int, column: int, table: Table) -> None:
-    """Writes the inverse of a body's quaternion (w first) to four columns of a table, from `column`
-    on. turn_from() reads it."""
+    """Writes the inverse of a body's quaternion (w first) to a row of a table, in four columns from
+    `column` on. turn_from() reads it. `state` is [q; v] of all bodies."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
     scale = 1.0 / (w * w + x * x + y * y + z * z)
@@ -159,7 +160,7 @@ def put_orientation(state: Table, body: int, row: int, column: int, table: Table
 def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> Vector3:
     """Rotation vector (rad) in the world frame from an earlier orientation of a body to its present
     one in `state`, to third order in the angle. put_orientation() has stored the earlier
-    orientation in the table."""
+    orientation in this row of the table, from `column` on."""
     w, x, y, z = state[7 * body], state[7 * body + 1], state[7 * body + 2], state[7 * body + 3]
     i_w, i = table[row, column], vector_at(table, row, column + 1)
     turned = sum_of(sum_of(scaled(w, i), scaled(i_w, (x, y, z))), cross((x, y, z), i))
@@ -169,7 +170,8 @@ def turn_from(table: Table, row: int, column: int, state: Table, body: int) -> V
 
 @inlined
 def angular_velocity(state: Table, body: int) -> Vector3:
-    """Angular velocity w_WB (rad/s) of a body in the world frame."""
+    """Angular velocity w_WB (rad/s) of a body in the world frame. `state` is [q; v] of all bodies
+    (13*bodies,)."""
     v = 7 * (state.size // 13) + 6 * body
     return state[v], state[v + 1], state[v + 2]
 
@@ -178,8 +180,9 @@ def angular_velocity(state: Table, body: int) -> Vector3:
 def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int, body: int
 ) -> Vector3:
-    """Acceleration (m/s²) in the world frame of a node that is fixed to `body`. `acceleration` is
-    dv/dt of all bodies, 6 numbers per body."""
+    """Acceleration (m/s²) in the world frame of a node that is fixed to `body`. `state` is [q; v]
+    (13*bodies,), `acceleration` is dv/dt of all bodies, 6 numbers per body. `nodes` has the vector
+    from the body's origin to the node."""
     a = 6 * body
     w_x, w_y, w_z = angular_velocity(state, body)
     p_x, p_y, p_z = vector_at(nodes, node, P_BN_W)
@@ -194,8 +197,9 @@ def node_acceleration(
 
 @inlined
 def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> None:
-    """Sums the forces on the nodes, and writes torque and force [t_W; f_W] at each body's origin to
-    `generalized_force` (6*bodies,), as in Drake's applied_generalized_force."""
+    """Sums the forces on the nodes of each body, and writes torque and force [t_W; f_W] at the
+    body's origin to `generalized_force` (6*bodies,), as in Drake's applied_generalized_force.
+    `first_node` is the index of each body's first node (bodies + 1,)."""
     for body in range(generalized_force.size // 6):
         torque = total = (0.0, 0.0, 0.0)
         for node in range(first_node[body], first_node[body + 1]):
@@ -209,11 +213,11 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
 
 @compiled
 def interpolate_state(before: Table, after: Table, step: float, part: float) -> Table:
-    """State (13*bodies,) between the states at the beginning and end of a step of `step` seconds.
+    """State [q; v] (13*bodies,) between the states `before` and `after` a step of `step` seconds.
 
-    `part` (0 to 1) is the time since the beginning, divided by `step`. Positions are cubic
-    polynomials that fit positions and velocities at both ends. Velocities are linear. If `part` is
-    1, the state equals `after`.
+    `part` (0 to 1) is the time since the beginning of the step, divided by `step`. Positions and
+    quaternions are cubic polynomials that fit values and velocities at both ends; quaternions then
+    get the length 1. Velocities are linear. If `part` is 1, the state equals `after`.
     """
     bodies = before.size // 13
     between = after.copy()

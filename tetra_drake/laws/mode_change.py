@@ -17,10 +17,10 @@ from tetra_drake.laws.vectors import cross, difference, sum_of, vector_at
 
 @compiled
 def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
-    """Updates `modes`, the contact and friction modes, for the state at the end of a step. Returns
-    True if a mode changed; see contact.update_modes().
+    """Updates `modes` (contacts, 12), the contact and friction modes, for the state [q; v]
+    (13*bodies,) at the end of a step. Returns True if a mode changed; see contact.update_modes().
 
-    Also writes nodes and ground frames to the Forces of `parts`.
+    `parts` is a Model and its Forces. Also writes nodes and ground frames to the Forces.
     """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
@@ -29,12 +29,13 @@ def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
 
 @compiled
 def mode_margin(parts: Parts, state: Table, modes: Table) -> float:
-    """Mode margin of the robot: positive until the first mode changes, zero at the change. `modes`
-    is only read.
+    """Mode margin of the robot: positive until the first contact or friction mode changes, zero at
+    the change.
 
-    It is the least of the gaps of nodes in the air, the depths of nodes in the ground (m), and the
-    margins of friction. Only the sign has a meaning. Also writes nodes and frames to the Forces of
-    `parts`.
+    It is the least of the gaps (m) of nodes in the air, the depths (m) of nodes in the ground, and
+    the margins of friction, which have other units. So only the sign has a meaning. `parts` is a
+    Model and its Forces. `state` is [q; v] (13*bodies,). `modes` (contacts, 12) is only read. Also
+    writes nodes and ground frames to the Forces.
     """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
@@ -55,11 +56,12 @@ def mode_margin(parts: Parts, state: Table, modes: Table) -> float:
 def time_to_mode_change(
     robot: Model, state: Table, acceleration: Table, modes: Table, forces: Forces, horizon: Real
 ) -> Real:
-    """Predicted time (s) to the next change of a contact or friction mode, at most `horizon`.
+    """Predicted time (s) to the next change of a contact or friction mode, at most `horizon` (s).
 
     The prediction assumes constant accelerations of the nodes, and the tangent plane in place of
-    the ground. `acceleration` is dv/dt, 6 numbers per body. `modes` are the present modes. `forces`
-    has the nodes and frames of the state.
+    the ground. `state` is [q; v] (13*bodies,). `acceleration` is dv/dt, 6 numbers per body. `modes`
+    (contacts, 12) are the present modes, and are only read. `forces` has the nodes and ground
+    frames of the state.
     """
     ground, nodes, frames = robot.ground, forces.nodes, forces.frames
     time, law = horizon, named(contact.NormalForce, ground.normal)
@@ -92,11 +94,12 @@ def time_to_mode_change(
 def next_mode_change(
     parts: Parts, state: Table, acceleration: Table, modes: Table, horizon: float
 ) -> tuple[bool, float]:
-    """Updates `modes`, the contact and friction modes, for a state. Returns whether a mode changed,
-    and the predicted time (s) to the next change, at most `horizon`; see time_to_mode_change().
+    """Updates `modes` (contacts, 12), the contact and friction modes, for a state [q; v]. Returns
+    whether a mode changed, and the predicted time (s) to the next change, at most `horizon` (s);
+    see time_to_mode_change().
 
-    `acceleration` is dv/dt, 6 numbers per body. Also writes nodes and frames to the Forces of
-    `parts`.
+    `parts` is a Model and its Forces. `acceleration` is dv/dt, 6 numbers per body. Also writes
+    nodes and ground frames to the Forces.
     """
     robot, forces = unpacked(parts)
     due = modes_after_step(parts, state, modes)

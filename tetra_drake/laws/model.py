@@ -80,7 +80,7 @@ class Joints(NamedTuple):
 
 
 class NodeLoads(NamedTuple):
-    """Constant forces on nodes."""
+    """Constant forces (N) on nodes, in the world frame."""
 
     nodes: Table
     """Indices of the loaded nodes (loads,)."""
@@ -127,7 +127,8 @@ class Model(NamedTuple):
 
         It gives forces on nodes; the masses of its bodies are 0. `p_BN` (nodes, 3) are positions of
         the nodes (m) in the frames of their bodies, `first_node` (bodies + 1,) the index of each
-        body's first node. With `slack`, cables go slack instead of pushing.
+        body's first node, then the number of nodes on bodies. With `slack`, cables go slack instead
+        of pushing.
         """
         bodies, none = first_node.size - 1, np.zeros(0)
         no_index, no_vectors = np.zeros(0, dtype=np.int64), np.zeros((0, 3))

@@ -31,7 +31,8 @@ rates (1/s), output y, u and v at the beginning of a step, sums of their rates."
 
 
 class CpgSection(Section):
-    """The Matsuoka oscillators (Table 4) and how their signal reaches the cables."""
+    """Settings of the Matsuoka oscillators (Table 4 of the thesis), and of how their signals reach
+    the cables."""
 
     self_inhibition_weight: float = Field(ge=0)
     """Weight beta of the self-inhibition v."""
@@ -65,7 +66,8 @@ class CpgSection(Section):
 
 
 class Network(NamedTuple):
-    """Constants of a Matsuoka network: tables with a row per neuron."""
+    """Constants of a Matsuoka network with n oscillators, as tables with a row for each of its 2n
+    neurons."""
 
     first: Table
     """Index of the first neuron that inhibits each neuron (2n,)."""
@@ -89,7 +91,9 @@ class Network(NamedTuple):
         tau_b: npt.ArrayLike,
         self_inhibition_weight: npt.ArrayLike,
     ) -> Self:
-        """A network with time constants (s) and beta; each is one number, or one per neuron.
+        """A network from its weights `inhibition` (2n, 2n), of neuron i by neuron j, its time
+        constants tau_A and tau_B (s), and the weight beta of its self-inhibition. The last three
+        are one number, or one per neuron.
 
         Raises ValueError if the shape of `inhibition` is not (2n, 2n), or a time constant is not
         above 0.
@@ -114,8 +118,8 @@ class Network(NamedTuple):
 
 
 def make_neurons(state: np.ndarray) -> np.ndarray:
-    """New table `neurons` (2n, 9) for the kernels, of a network whose state (4n,) is u of all
-    neurons, then v."""
+    """New table `neurons` (2n, 9) for the kernels. `state` (4n,) is the inner states u of all
+    neurons, then their self-inhibitions v. The other columns are 0."""
     neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
     neurons[:, U], neurons[:, V] = state.reshape(2, -1)
     return neurons
@@ -123,19 +127,20 @@ def make_neurons(state: np.ndarray) -> np.ndarray:
 
 @inlined
 def steered_input(external_input: Real, turn: Table, side: Table) -> Table:
-    """Tonic input of a neuron for a turn, as in the steering of snakes (arXiv 2207.04899):
+    """Tonic input of a neuron that steers a robot, as in the steering of snakes (arXiv 2207.04899):
     external_input (1 + turn side).
 
-    `side` is 1 for a neuron on the left, -1 on the right, 0 for neither, so a positive `turn`
-    raises the input on the left. Arguments are numbers or arrays.
+    `external_input` is the input u0 without steering, `turn` the steering (-1 to 1). `side` is 1
+    for a neuron on the left, -1 on the right, 0 for neither, so a positive `turn` raises the input
+    on the left. Arguments are numbers or arrays.
     """
     return external_input * (1.0 + turn * side)
 
 
 @compiled
 def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
-    """Writes the rates of inner state u and self-inhibition v, and the output y, to `neurons` (Eq.
-    7 of the thesis).
+    """Writes the rates (1/s) of inner state u and self-inhibition v, and the output y, of each
+    neuron to the table `neurons` (2n, 9), which has u and v (Eq. 7 of the thesis).
 
     The sign of u in Eq. 7 is a misprint: du/dt has the term -u, as in the thesis's listing B.2.
     `inputs` (2n,) is the sum of tonic input u0 and feedback f.
@@ -155,7 +160,7 @@ def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
 @compiled
 def oscillator_output(neurons: Table, output: Table) -> None:
     """Writes the output y_extensor - y_flexor of each oscillator to `output` (n,), with y = max(0,
-    u) (Eq. 8 and 9 of the thesis)."""
+    u) (Eq. 8 and 9 of the thesis). `neurons` (2n, 9) has the inner states u."""
     for k in range(output.size):
         extensor, flexor = neurons[2 * k, U], neurons[2 * k + 1, U]
         output[k] = maximum(extensor, 0.0) - maximum(flexor, 0.0)
@@ -164,7 +169,8 @@ def oscillator_output(neurons: Table, output: Table) -> None:
 @inlined
 def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
     """Integrates a network by one step (s) of the forward Euler method, as in listing B.1 of the
-    thesis. Updates `neurons`. `inputs` (2n,) are constant."""
+    thesis. Updates the table `neurons` (2n, 9). `inputs` (2n,), tonic input plus feedback, are
+    constant."""
     neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U] += step * neurons[i, U_RATE]
@@ -174,7 +180,7 @@ def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> N
 @inlined
 def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
     """Integrates a network by one step (s) of the classical Runge-Kutta method of order 4. Updates
-    `neurons`. `inputs` (2n,) are constant."""
+    the table `neurons` (2n, 9). `inputs` (2n,), tonic input plus feedback, are constant."""
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
         neurons[i, U_SUM], neurons[i, V_SUM] = 0.0, 0.0
@@ -196,13 +202,13 @@ def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table
 def network_output(
     network: Network, inputs: Table, step: float, listing: bool, neurons: Table, output: Table
 ) -> None:
-    """Writes the outputs of a single network over time to `output` (samples, n), one sample per
-    step (s).
+    """Writes the outputs y_extensor - y_flexor of a network over time to `output` (samples, n), one
+    sample per step (s).
 
-    `inputs` has a row (2n,) for each of the first steps. Later steps use its last row. With
-    `listing`, the method is forward Euler, and sample i is the state after i + 1 steps, as in
+    `inputs` (k, 2n) has the neurons' inputs for the first k steps. Later steps use its last row.
+    With `listing`, the method is forward Euler, and sample i is the state after i + 1 steps, as in
     listing B.1 of the thesis. Otherwise the method is Runge-Kutta, and sample i is the state after
-    i steps. `neurons` is the state at the start, and is updated.
+    i steps. `neurons` (2n, 9) is the state at the start, and is updated.
     """
     last = inputs.shape[0] - 1
     for i in range(output.shape[0]):
@@ -216,9 +222,9 @@ def network_output(
 
 @inlined
 def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """First half of a step (s) of Heun's method (order 2): an Euler step that updates `neurons`.
-    `inputs` (2n,) are the inputs at the beginning of the step. correct_neurons() is the second
-    half."""
+    """First half of a step (s) of Heun's method (order 2): an Euler step that updates the table
+    `neurons` (2n, 9). `inputs` (2n,), tonic input plus feedback, are taken at the beginning of the
+    step. correct_neurons() is the second half."""
     neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
@@ -231,9 +237,9 @@ def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table)
 def correct_neurons(
     network: Network, inputs: Table, step: Real, accepted: Truth, neurons: Table
 ) -> None:
-    """Second half of a step (s) of Heun's method, after predict_neurons(). `inputs` (2n,) are the
-    inputs at the end of the step. Where the step is not `accepted`, the neurons return to their
-    values at its beginning."""
+    """Second half of a step (s) of Heun's method, after predict_neurons(). `inputs` (2n,), tonic
+    input plus feedback, are taken at the end of the step. In lanes where `accepted` is false, the
+    neurons return to their values at the beginning of the step; each lane is a robot."""
     neuron_rates(network, inputs, neurons)
     half = 0.5 * step
     for i in range(neurons.shape[0]):

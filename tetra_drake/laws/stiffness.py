@@ -19,8 +19,9 @@ from tetra_drake.laws.struts import Axes, axes_of, vector_between
 
 
 class Springs(NamedTuple):
-    """Springs between points of two bodies, or of a body and the world. A spring has k
-    displacements. They are sums of one part from each body's motion."""
+    """Springs between points of two bodies, or of a body and the world. Each spring has k
+    displacements, such as the 3 components of the relative motion of a cable's ends. A displacement
+    is the sum of two parts, one from the motion of each body."""
 
     body_a: np.ndarray
     """Indices of the first bodies (springs,)."""
@@ -34,11 +35,12 @@ class Springs(NamedTuple):
 
 
 def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
-    """Stiffness matrix (6*bodies, 6 bodies) of a robot on flat ground: N m, N and N/m. It is
-    sparse: a 6 x 6 block for each body, and two for each pair of bodies that are joined.
+    """Stiffness matrix (6*bodies, 6*bodies) of a robot on flat ground. It is sparse: a 6 x 6 block
+    for each body, and two for each pair of bodies that are joined.
 
     The displacement of a body is a rotation vector in rad, then a translation in m, in the world
-    frame. `forces` are the forces of a state without motion, with all tables computed.
+    frame. The units are N m between rotations, N/m between translations, N otherwise. `forces` are
+    the forces of a state without motion, with all tables computed.
     """
     bodies = robot.bodies.mass.size
     carriers = np.full(len(robot.p_BN), WORLD)
@@ -81,8 +83,9 @@ def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
 
 
 def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:
-    """The straight cables as springs. A slack cable has no stiffness. `carriers` (nodes,) is the
-    index of each node's body, WORLD for fixed nodes."""
+    """The straight cables as springs, along them by their stiffness and sideways by their tension.
+    A slack cable has no stiffness. `carriers` (nodes,) is the index of each node's body, WORLD for
+    fixed nodes."""
     is_straight = np.diff(robot.cables.routes.first) == 0
     node_a, node_b = robot.cables.node_a[is_straight], robot.cables.node_b[is_straight]
     parts, lengthwise = forces.cable_forces[is_straight], _lengthwise(robot, forces)[is_straight]
@@ -205,11 +208,12 @@ def _stiffness_of_touch(
     touch: capsules.Touch, axes: Axes, reach: float, stiffness: float
 ) -> np.ndarray:
     """Second derivatives (12, 12), in N/m, of the energy of a contact of struts, with respect to
-    the displacements of their ends.
+    the displacements of their ends: start and end of the first strut, then of the second.
 
-    `reach` (m) is the sum of the radii, `stiffness` (N/m) the one of the contact. Half the squared
-    distance, D² / 2, is the minimum of a function of the positions s and t along the axes; see
-    laws.capsules. Its second derivatives are those at fixed positions, less what the positions gain
+    `touch` is the contact, `axes` the geometry of the struts, `reach` (m) the sum of their radii,
+    `stiffness` (N/m) the stiffness of the contact. D is the distance of the struts. D² / 2 is the
+    minimum of a function of the positions s and t along the axes; see laws.capsules. The second
+    derivatives of the minimum are the second derivatives at fixed s and t, less what s and t gain
     as they move. A position at the end of a strut does not move.
     """
     s, t, gradient = touch.s, touch.t, np.concatenate(touch.gradient)

@@ -70,7 +70,7 @@ def axes_of(struts: Struts, nodes: Table, i: int, j: int) -> Axes:
 def nearest_on_line(axes: Axes) -> Real:
     """Position along the first axis that is nearest to the line of the second: 0 at its start, 1 at
     its end (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9). Both axes count as
-    endless lines, so it may be below 0 or above 1."""
+    endless lines, so the result may be below 0 or above 1."""
     uu_vv = axes.uu * axes.vv
     square_of_sine = maximum(uu_vv - axes.uv * axes.uv, _PARALLEL * uu_vv)
     return (axes.uv * axes.vr - axes.ur * axes.vv) / square_of_sine
@@ -78,7 +78,8 @@ def nearest_on_line(axes: Axes) -> Real:
 
 @inlined
 def nearest_on_struts(axes: Axes, s: Real) -> tuple[Real, Real]:
-    """Positions along both axes, 0 to 1, that are nearest to each other.
+    """Positions along both axes that are nearest to each other, first of the first axis, then of
+    the second: 0 at the start of an axis, 1 at its end.
 
     The argument `s` is the result of nearest_on_line(). If a position is beyond the end of its
     strut, the end is used, and the point of the other strut that is nearest to it.
@@ -123,8 +124,8 @@ def share(x: Real) -> Real:
 
 @inlined
 def origin(state: Table, body: int) -> Vector3:
-    """Position (m) of a body's origin in the world. `state` is [q; v] of all bodies (13
-    bodies,)."""
+    """Position (m) of a body's origin in the world. `state` is [q; v] of all bodies
+    (13*bodies,)."""
     return state[7 * body + 4], state[7 * body + 5], state[7 * body + 6]
 
 
@@ -154,9 +155,9 @@ def least_strut_distance(
     """Least distance (m) between the axes of struts of different bodies, or `least` (m) if that is
     smaller. Struts with a common joint do not count.
 
-    `radius` (bodies,) are radii of spheres around the bodies. `state` is [q; v] (13*bodies,),
-    `nodes` the table of laws.kinematics for this state. `first_node` is the index of each body's
-    first node.
+    `radius` (bodies,) are radii of spheres around the bodies. `first_node` is the index of each
+    body's first node (bodies + 1,); the last number is the index of the first fixed node. `state`
+    is [q; v] (13*bodies,), `nodes` the table of laws.kinematics for this state.
     """
     for first in range(radius.size):
         for second in range(first + 1, radius.size):

@@ -26,8 +26,9 @@ from tetra_drake.laws.struts import least_strut_distance
 
 
 class Effort(NamedTuple):
-    """Effort of the actuators. Integrals are over the steady stretch, the part of the walk that
-    metrics judge, summed over the actuators; peaks are over all steps."""
+    """Effort of the actuators. Integrals are summed over the actuators, and over the steady
+    stretch: the part of the walk from `simulation.steady_from` to the end. Peaks are over all
+    steps."""
 
     left: Annotated[Table, "cables"]
     """Length of each driven cable that is not wound, at the latest step, in m."""
@@ -51,8 +52,8 @@ class Effort(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """Sums and extremes over all steps of a simulation, which metrics are computed from. Kernels
-    update them in place."""
+    """Sums and extremes over all steps of a simulation, from which metrics are computed. All are
+    arrays, so that kernels can update them in place."""
 
     begins: Annotated[Table, 1]
     """Time (s) at which the steady stretch begins."""
@@ -78,8 +79,9 @@ class Tally(NamedTuple):
 
     @classmethod
     def of(cls, robot: Model, *, signals: int, begins: float) -> Self:
-        """The tally at the start of a simulation. `signals` is the number of signals. `begins` (s)
-        is the time at which the steady stretch begins, the part of the walk that metrics judge."""
+        """The tally at the start of a simulation of a robot. `signals` is the number of signals.
+        The steady stretch, the part of the walk that metrics judge, is from the time `begins` (s)
+        to the end."""
         tally = allocate(cls, sizes_of(robot) | {"signals": signals})
         tally.begins[0] = begins
         return tally
@@ -87,10 +89,12 @@ class Tally(NamedTuple):
 
 @inlined
 def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
-    """Adds a simulation step to the tally. It ends at `time` (s) with these signals (N) and forces.
+    """Adds a simulation step to the tally. `time` (s), `signals` (N) and `forces` are those at its
+    end; it began at the time of the previous call.
 
     The first call, and a second one for the same time, add a step of duration 0. Sums take a step
-    only if it has a duration and is in the steady stretch.
+    only if it has a duration and begins in the steady stretch, the part of the walk that metrics
+    judge.
     """
     duration = time - tally.time[0]
     takes_time = duration > 0.0
@@ -148,8 +152,8 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
 
 @inlined
 def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
-    """Lowers the tally's least distance between struts if they are nearer in a state [q; v] (13
-    bodies,).
+    """Lowers the tally's least distance between struts of different bodies, `tally.clearance`, if
+    they are nearer in a state [q; v] (13*bodies,).
 
     It is too slow to be called at every step. `nodes` is the table of laws.kinematics for this
     state.
@@ -161,7 +165,8 @@ def update_clearance(tally: Tally, robot: Model, state: Table, nodes: Table) -> 
 
 @dataclass(frozen=True)
 class Metric:
-    """Declaration of a metric: its unit, its computation, and its use."""
+    """Declaration of a metric: its unit, the function that computes it from a simulation, and its
+    use."""
 
     unit: str
     """SI unit; "" for none."""
@@ -184,26 +189,27 @@ class Metric:
 
 
 def metric(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
-    """Declares a metric as a field of a dataclass. The arguments are the fields of Metric."""
+    """Declares a metric as a field of a dataclass. The arguments are the fields of Metric, `more`
+    the optional ones."""
     return field(metadata={"metric": Metric(unit, note, compute, **more)})
 
 
 def total(name: str) -> Callable[[Any], float]:
-    """Makes a function that reads one number from the tally of a Walk (a simulation for metrics).
-    `name` is its path in Tally, such as "effort.work"."""
+    """Makes a function that reads one number from the tally of a Walk (the data of one simulation
+    for metrics). `name` is its path in Tally, such as "effort.work"."""
     number = operator.attrgetter(name)
     return lambda walk: number(walk.tally)[0]
 
 
 def mean(name: str) -> Callable[[Any], float]:
-    """Makes a function that divides a total of Effort, such as "impulse", by the steady time and
-    the number of actuators of a Walk (a simulation for metrics)."""
+    """Makes a function of a Walk (the data of one simulation for metrics): a sum in Effort, such as
+    "impulse", divided by the duration of the steady stretch and by the number of actuators."""
     return lambda walk: walk.per_actuator_time * getattr(walk.tally.effort, name)[0]
 
 
 def greatest(unit: str, note: str, compute: Callable[[Any], float], **more: Any) -> Any:
-    """Declares a metric that is a cost, as a field of a dataclass; see metric(). Of several
-    simulations its greatest value is recorded."""
+    """Declares a metric that is a cost, as a field of a dataclass. The arguments are the fields of
+    Metric; see metric(). Of several simulations its greatest value is recorded."""
     return metric(unit, note, compute, most=True, is_cost=True, **more)
 
 

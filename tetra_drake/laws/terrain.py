@@ -75,7 +75,7 @@ def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, 
     """Height (m) of the surface at x and y (m), and its gradient: dh/dx and dh/dy.
 
     The surface is a quadratic B-spline. `heights` (points,) are the heights (m) of its control
-    points, row by row.
+    points, row by row. Beyond the grid the surface continues with the height at the border.
     """
     cells_x = (x - grid.corner_x) * grid.per_cell_x
     cells_y = (y - grid.corner_y) * grid.per_cell_y
@@ -103,8 +103,9 @@ def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
 
 @inlined
 def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real]:
-    """Value and derivative of a quadratic B-spline, from the values of three neighbouring control
-    points. `part` (-1/2 to 1/2) is the distance from the control point `here`, in cells."""
+    """Value of a quadratic B-spline and its derivative per cell, from the values of three
+    neighbouring control points. `part` (-1/2 to 1/2) is the distance from the control point `here`,
+    in cells."""
     less, more, rise, next_rise = 0.5 - part, 0.5 + part, here - before, after - here
     # Each sum has one product, so there is only one way to round a product and a sum together.
     value = here - 0.5 * less * less * rise + 0.5 * more * more * next_rise
@@ -115,12 +116,12 @@ def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Re
 def find_frames(
     nodes: Table, contacts: Table, grid: SurfaceGrid, heights: Table, frames: Table
 ) -> None:
-    """Writes the gap to the ground and its tangent frame, below each contact node, to the table
-    `frames`.
+    """Writes the frame of the ground below each contact node to the table `frames` (contacts,
+    FRAME_COLUMNS): gap (m) between node and surface, normal and tangents.
 
     `contacts` (contacts,) are the indices of the nodes, `nodes` the table with their positions.
-    `heights` are the heights of the surface's control points. A node that is too high to touch the
-    highest control point gets the frame of level ground at that height.
+    `heights` (points,) are the heights (m) of the surface's control points. A node that is too high
+    to touch the highest control point gets the frame of level ground at that height.
     """
     for i in range(contacts.size):
         node = contacts[i]
@@ -162,8 +163,9 @@ def to_frame(vector: Vector3, frames: Table, i: int, flat: bool) -> Vector3:
 
 @inlined
 def to_world(t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool) -> Vector3:
-    """Converts components along t1, t2 and n to a vector in the world frame. These are tangents and
-    normal of the ground in row i of `frames`; if it is `flat`, they are the world's axes."""
+    """Vector in the world frame that has the given components along t1, t2 and n. These are
+    tangents and normal of the ground in row i of `frames`. If the ground is `flat`, they are the
+    world's axes, and `frames` is not used."""
     if flat:
         return t_1, t_2, n
     return (
@@ -220,17 +222,19 @@ class Relief(Section):
 
     @property
     def text(self) -> str:
-        """Description of the terrain, such as "incline (slope 5 deg)"."""
+        """Description of the terrain with its settings, such as "incline (slope 5 deg)"."""
         kind = type(self).__name__.lower() if self.is_ground else "no ground"
         return kind + settings_text(self)
 
     @property
     def paths(self) -> dict[str, str]:
-        """Paths of the height files that these settings name, by key."""
+        """Paths of the height files that these settings name; the keys are the names of the
+        settings."""
         return {key: file.path for key, file in self if isinstance(file, HeightFile)}
 
     def save(self, folder: Path) -> None:
-        """Copies the terrain's height files to the folder of a record, under HeightFile's names."""
+        """Copies the terrain's height files, if it has any, to the folder of a record. A copy is
+        named heights-DIGEST.npy, by a digest of the heights."""
         for _, file in self:
             if isinstance(file, HeightFile):
                 file.save(folder)
@@ -239,8 +243,8 @@ class Relief(Section):
         """Heights of the terrain on a grid.
 
         Steps and obstacles without a start begin at x = `ahead` (m). The generated area grows with
-        the robot's `scale`; see Blueprint.scale. Raises InputError, naming `source` and the key,
-        for more than MOST_CELLS cells.
+        the robot's `scale`, a ratio of sizes; see Blueprint.scale. Raises InputError, naming
+        `source` (the scenario) and the key, for more than MOST_CELLS (4 million) cells.
         """
         raise NotImplementedError
 
@@ -266,7 +270,7 @@ class Nothing(Flat):
 class Incline(Relief):
     """A plane that rises along +x: h = tan(slope) x. A negative slope goes down.
 
-    The robot starts on it, turned with it.
+    The robot starts on the plane, tilted with it.
     """
 
     place = ""
@@ -287,9 +291,10 @@ class Incline(Relief):
 class Steps(Relief):
     """Stairs across the robot's path, from x = `start` on.
 
-    Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1). An
-    edge is not vertical: it rises over one cell before it and one behind it. A cell is about as
-    long as a step is high, but at most a quarter of the depth.
+    Each step has a depth and a height: h = height min(count, floor((x - start) / depth) + 1), and 0
+    before `start`. An edge is not vertical: it rises over one cell of the grid of heights before it
+    and one behind it. A cell is about as long as a step is high, but at most a quarter of the
+    depth.
     """
 
     place = "over steps"
@@ -315,8 +320,8 @@ class Steps(Relief):
 
 
 class Rough(Relief):
-    """Random ground. Heights half a wavelength apart are independent and uniform between -2
-    amplitude and 0.
+    """Random ground, interpolated smoothly between the heights of a grid. Neighbours are half a
+    wavelength apart. Their heights are independent and uniform between -2 amplitude and 0.
 
     The mean height is -amplitude. A robot that stands at z = 0 touches the ground without sinking
     in.
@@ -389,9 +394,9 @@ class HeightField(Relief):
     """Heights in m from a file. Rows are along x and columns along y, in ascending order.
 
     The grid's centre is the origin. The file is numpy's `.npy`, or text of numbers separated by
-    blanks or commas. It has at least 3 x 3 and at most 4 million heights. A relative path starts at
-    the scenario file that names it. A record keeps a copy of the file, named by a digest of the
-    heights.
+    blanks or commas. It has at least 3 x 3 and at most 4 million heights. A relative path starts in
+    the folder of the scenario file that names it. A record keeps a copy of the file, named by a
+    digest of the heights.
     """
 
     file: HeightPath
@@ -409,8 +414,8 @@ Terrain = Annotated[Flat | Nothing | Incline | Steps | Rough | Obstacles | Heigh
 
 
 def _check_size(cell: tuple[float, float], scale: float, source: object, key: str) -> None:
-    """Raises InputError that names `key` if cells of this size (m) would be more than MOST_CELLS.
-    The generated area grows with the robot's `scale`."""
+    """Raises InputError that names `source` (the scenario) and `key` if cells of this size (m)
+    would be more than MOST_CELLS (4 million). The generated area grows with the robot's `scale`."""
     if MOST_CELLS * cell[0] * cell[1] < scale**2 * (BEHIND + AHEAD) * 2.0 * ASIDE:
         problem = f"is too small: cells of {min(cell):.3g} m would be more than {MOST_CELLS}"
         raise InputError(source, f"terrain.{key}", problem)

@@ -72,7 +72,7 @@ def mean_fitness(fitnesses: Vector) -> float:
 
 
 class Optimizer(Protocol):
-    """An optimiser: ask() gives a batch of vectors, tell() takes their evaluations.
+    """Interface of an optimiser: ask() returns a batch of vectors, tell() takes their evaluations.
 
     It depends only on the evaluations and its random generator, so that a trial can be repeated
     from its record. Every trial ends after `evolution.evaluations` evaluations at the latest. Its
@@ -83,8 +83,8 @@ class Optimizer(Protocol):
         """The vectors of the next iteration. They may be evaluated in any order."""
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the evaluations, in the order of the vectors from ask(). If the batch was cut, only
-        its first vectors have evaluations."""
+        """Takes the evaluations of the vectors that ask() returned last, in the same order. Returns
+        a report on the iteration. If the batch was cut, only its first vectors have evaluations."""
 
 
 MakeOptimizer = Callable[[ParameterSpace, EvolutionSection, np.random.Generator], Optimizer]

@@ -72,8 +72,8 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
 
     @_one_thread
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the evaluations of a batch. The search learns nothing from a batch that the trial's
-        end cut."""
+        """Takes the evaluations of the batch that ask() returned last, in the same order. Returns
+        the report on it. The search learns nothing from a batch that the trial's end cut short."""
         iteration = super().tell(evaluations)
         fitnesses = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
         has_walked = np.isfinite(fitnesses)
@@ -139,8 +139,11 @@ class Search:
     """A search by CMA-ES for the point of greatest fitness. When it has converged, it restarts at
     its best point with twice the population.
 
-    `population` is the first size of the population; None for pycma's default. `start` is the first
-    point.
+    Args:
+        population: size of the first population; None for pycma's default.
+        ranges: the search space. It converts points to roots, the numbers that pycma varies.
+        generator: source of the random numbers.
+        start: the first point (size,).
     """
 
     def __init__(
@@ -169,7 +172,7 @@ class Search:
         """pycma's search; None before each start."""
 
     def draw(self) -> Matrix:
-        """Draws the next population: points (population, size), one per row."""
+        """Draws the next population: points (population, size) of the search space, one per row."""
         import cma
 
         if self._strategy is None:
@@ -188,8 +191,8 @@ class Search:
         return self._ranges.from_roots(self._drawn[:, : self._ranges.size])
 
     def learn(self, points: Matrix, fitnesses: Vector) -> None:
-        """Takes the fitnesses of the points from draw(); greater is better. CMA-ES adapts to
-        them."""
+        """Takes the points (population, size) that draw() returned last and their fitnesses
+        (population,); greater is better. CMA-ES adapts to them."""
         self.evaluations += len(points)
         best = int(np.argmax(fitnesses))
         if fitnesses[best] > self.best:

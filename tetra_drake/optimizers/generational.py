@@ -41,7 +41,8 @@ class Ranges:
         self.floors = (space.floors - space.low)[self.free] / self.width
 
     def random(self, count: int, generator: np.random.Generator) -> Matrix:
-        """Points (count, size) of random gaits: their scaled vectors, one per row."""
+        """Points (count, size) of random gaits, one per row: their free parameters, scaled to 0 to
+        1. `size` is the number of free parameters."""
         vectors = np.array([self._space.random(generator) for _ in range(count)])
         return (vectors - self._space.low)[:, self.free] / self.width
 
@@ -66,8 +67,8 @@ SettingsT = TypeVar("SettingsT")
 
 @dataclass(eq=False)
 class Generational(Generic[SettingsT]):
-    """Random search: each batch is a sample of random gaits. Base class of the optimisers that
-    learn from whole batches; they propose gaits in another way.
+    """Random search: each batch is a sample of random gaits. Also the base class of the optimisers
+    that learn from a whole batch at a time; they override how the gaits of a batch are chosen.
 
     The report has mean_fitness over the gaits that did not fail.
     """
@@ -93,7 +94,9 @@ class Generational(Generic[SettingsT]):
         return [self.space.repair(np.maximum(each, self.space.floors)) for each in vectors]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Reports on the evaluations of a batch."""
+        """Takes the evaluations of the batch that ask() returned last, in the same order. Returns
+        the report on it: mean_fitness and `population` (size of the batch). Random search learns
+        nothing from the evaluations; subclasses do."""
         mean = mean_fitness(np.array([evaluation.fitness for evaluation in evaluations]))
         counts = {"mean_fitness": json_number(mean), "population": len(self._points)}
         return Iteration(counts | self._report)

@@ -77,8 +77,9 @@ class QualityDiversityOptimizer(Generational[kinds.QualityDiversity]):
         return self._ranges.from_roots(self._roots)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Adds a batch to the archive. The emitters learn from it, unless the trial's end cut
-        it."""
+        """Adds the batch that ask() returned last to the archive (the map); `evaluations` are in
+        the same order. The emitters learn from it, unless the trial's end cut it short. Returns the
+        report on the batch."""
         objective = np.array([evaluation.fitness for evaluation in evaluations], dtype=float)
         rows = [[e.metrics.get(name) for name in self.settings.measures] for e in evaluations]
         measures = np.array(rows, dtype=float)  # None becomes NaN

@@ -41,7 +41,7 @@ class SteadyStateOptimizer:
     _means: list[float] = field(init=False, default_factory=list)
 
     def ask(self) -> list[Vector]:
-        """The initial population, then two children at a time."""
+        """Vectors to evaluate: at first the initial population, then two children at a time."""
         settings, generator, space = self.settings, self.generator, self.space
         if not self._population:
             self._asked = [space.random(generator) for _ in range(settings.population)]
@@ -57,7 +57,9 @@ class SteadyStateOptimizer:
         return [vector.copy() for vector in self._asked]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the initial population, or places the two children one after the other."""
+        """Takes the evaluations of the vectors from ask(), in the same order: of the initial
+        population, or of two children. The children replace members of the population one after the
+        other; see find_place(). Returns a report on the iteration."""
         placed: list[int | None] = []
         if not self._population:
             self._population = self._asked
@@ -84,7 +86,7 @@ class SteadyStateOptimizer:
 
 
 def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
-    """Index of the fittest of `tournament` members, which are drawn at random with replacement.
+    """Index of a parent: the fittest of `tournament` members, drawn at random with replacement.
     Among equals the first drawn wins (listing A.3.2 of the thesis)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)
     return int(candidates[np.argmax(fitnesses[candidates])])

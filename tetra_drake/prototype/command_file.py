@@ -33,20 +33,23 @@ def command_columns(robot: Robot) -> list[str]:
 
 
 def command_text(robot: Robot, command: Command) -> str:
-    """CSV text of a command, setpoints of the actuators over time, as load_command() reads it."""
+    """CSV text of a command, setpoints of the actuators over time. It has the column time_s and the
+    columns of command_columns(), in their units; load_command() reads it."""
     times = command.period * np.arange(len(command.samples))
     values = command.samples / robot.scenario.actuation.command_unit
     return table_text(command_columns(robot), times, values)
 
 
 def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) -> str:
-    """CSV text with a row per time: `times` (rows,) in s, then `values` (rows, columns)."""
+    """CSV text with a row per time: `times` (rows,) in s in the column time_s, then `values` (rows,
+    columns) in columns with the names `columns`."""
     table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME_S))
     return table.reset_index().to_csv(index=False, float_format="%.6f")
 
 
 def scenario_beside(path: Path) -> Path | None:
-    """Path of the scenario file in the folder of a command file; None if there is none."""
+    """Path of the file scenario.yaml in the folder of the command file `path`; None if there is
+    none."""
     scenario = path.parent / SCENARIO
     return scenario if os.path.isfile(scenario) else None
 
@@ -60,8 +63,11 @@ def load_command(path: str | Path, scenario: GivenScenario) -> Command:
 
     Args:
         path: the CSV file: a column time_s and one per driven cable, as export() writes. Columns
-            may be in any order; times are evenly spaced.
+            may be in any order; times are evenly spaced and begin at 0.
         scenario: the scenario of the robot, its name or file, or a run.
+
+    Returns:
+        The command with setpoints in SI units, named after the file.
 
     Raises:
         InputError: names file and line, if the file is wrong or does not fit the robot.
@@ -91,7 +97,8 @@ def table_cells(
     """Cells of a CSV table as texts, so that messages can show them.
 
     `text` is the content, `path` names the file in messages. Raises InputError if it is no table, a
-    column is given twice, or the columns are not the `wanted` ones, in any order.
+    column is given twice, or the columns are not the `wanted` ones, in any order. Without `wanted`,
+    all columns are accepted.
     """
     try:
         heading, *rows = csv.reader(io.StringIO(text.rstrip()), strict=True)
@@ -113,8 +120,11 @@ def table_cells(
 
 
 def column_numbers(cells: pandas.Series, path: str | Path, *, gaps: bool = False) -> np.ndarray:
-    """Numbers (rows,) of a column of texts; NaN for an empty cell if there may be `gaps`. Raises
-    InputError that names the line of another cell."""
+    """Numbers (rows,) of a column whose cells are texts, from table_cells().
+
+    With `gaps`, an empty cell becomes NaN. Raises InputError, naming the file `path` and the line,
+    for any other cell that is not a finite number.
+    """
     numbers = pandas.to_numeric(cells, errors="coerce").to_numpy(dtype=float)
     is_gap = gaps & (cells.str.strip() == "").to_numpy()
     for row in np.flatnonzero(~np.isfinite(numbers) & ~is_gap):

@@ -54,20 +54,21 @@ class Loads(NamedTuple):
 def export(
     scenario: GivenScenario, gait: GivenGait, out: str | Path, *, rate: float = 100.0
 ) -> str:
-    """Simulates a gait and writes it as commands for the actuators of a prototype. Returns a text,
-    the verdict.
+    """Simulates a gait and writes it as commands for the actuators of a prototype. Returns the
+    verdict, a text.
 
         >>> print(td.export(td.load_scenario("quick"), "gait.json", "prototype"))
 
     The verdict has the loads on the actuators, whether the actuators can bear them, and the
-    distance when the written commands are simulated. With feedback, the commands are the signals of
-    this one simulation.
+    distance that the robot walks if the written commands are simulated. For a gait with feedback,
+    the commands are recorded in this one simulation; the prototype's sensors do not change them.
 
     Args:
         scenario: a scenario, its name or file, or a run.
         gait: a gait, its file, or a run; a run means its best gait.
         out: the new folder. See the command `tetra-drake export` for its files.
-        rate: samples per second (Hz) in the files.
+        rate: samples per second (Hz) in the files, at most one per `cpg.listing_step`. The
+            duration of the simulation must be a whole number of samples.
 
     Raises:
         InputError: if an argument cannot be used.
@@ -116,8 +117,8 @@ def export(
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
-    """Loads on the actuators in a simulated motion: forces, speeds, travel and power of each driven
-    cable, and where a limit of the actuator binds."""
+    """Loads on the actuators in a simulated motion, from its recorded `trajectory`: forces, speeds,
+    travel and power of each driven cable, and at which times a limit of the actuator binds."""
     kind, constants = robot.scenario.actuation, robot.model.actuator
     cables, limits = robot.structure.cables[robot.driven], actuator.Limits(*constants.limits)
     walk = trajectory.isel(cable=robot.driven)
@@ -162,7 +163,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
 
 def load_verdict(loads: Loads, result: SimulationResult) -> str:
     """Text about the loads on the actuators in a simulation: greatest loads, limits, and whether
-    the actuators can play the gait without reaching a limit."""
+    the actuators can play the gait without reaching a limit. `result` is the recorded simulation
+    from which the loads were computed."""
     worst = loads.table.drop(columns="time_at_a_limit_percent").max()
     worst["least_length_mm"] = loads.table["least_length_mm"].min()
     table = worst.dropna().to_string(float_format=fixed)

@@ -52,7 +52,8 @@ SCHEMA = 1
 
 
 class PathColumns(Section):
-    """Columns of the centre's path in result.json, in the order of the arrays of CentrePath."""
+    """Path of the robot's centre of mass in result.json: lists over time of equal length, in the
+    order of the arrays of CentrePath. Positions are in the world frame."""
 
     time_s: list[float]
     x_m: list[float]
@@ -72,7 +73,7 @@ class PathColumns(Section):
 
 
 class ResultFile(Section):
-    """The keys of result.json that load_result() reads."""
+    """Part of result.json that load_result() reads back; the file has more keys."""
 
     name: str
     metrics: dict[str, Any]
@@ -87,15 +88,18 @@ class ResultFile(Section):
 
 
 def check_result_folder(folder: Path) -> None:
-    """Raises InputError if a simulation cannot write its files to `folder`."""
+    """Raises InputError if `folder` cannot be written to or holds a run of `evolve`."""
     check_folder(folder)
     if (folder / MANIFEST).exists():
         raise InputError(folder, "", "holds a run of `evolve`, expected another folder")
 
 
 def save_result_folder(folder: Path, result: SimulationResult) -> None:
-    """Writes the files of a simulation. Raises InputError if it has no trajectory, or if the folder
-    cannot be written to."""
+    """Writes scenario.yaml, trajectory.nc, replay.html and result.json of a simulation.
+
+    Raises InputError if the result has no recorded trajectory, or if the folder cannot be written
+    to.
+    """
     trajectory = result.trajectory
     # result.json is removed first and written last: if it is there, the other files belong to it.
     if (folder / RESULT).is_file():
@@ -107,8 +111,9 @@ def save_result_folder(folder: Path, result: SimulationResult) -> None:
 
 
 def save_result(path: str | Path, result: SimulationResult) -> None:
-    """Writes result.json: metrics in SI, lengths also in inches, times in s, and the path of the
-    centre as columns. `gait` is null for a command."""
+    """Writes the numbers of a result to the JSON file `path`: metrics in SI, lengths also in
+    inches, times in s, and the path of the centre of mass as columns. The key `gait` is null if
+    the robot followed a file of actuator commands."""
     scenario, gait, metrics = result.scenario, result.gait, result.metrics
     lengths = {name: getattr(metrics, name) for name, unit in UNITS.items() if unit == "m"}
     lengths["path_radius"] = metrics.path_radius
@@ -137,7 +142,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
 
 
 def load_result(folder: str | Path) -> SimulationResult:
-    """Reads a result folder of `simulate`: the result with scenario, gait and trajectory.
+    """Reads a folder written by `simulate`: returns the result with scenario, gait and trajectory.
 
         >>> result = td.load_result("out")
         >>> signals = result.trajectory.signal.sel(oscillator="T1-T2")
@@ -185,7 +190,8 @@ def load_result(folder: str | Path) -> SimulationResult:
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
-    """Reads a trajectory. Raises InputError if it is not a motion of this robot."""
+    """Reads a trajectory from a netCDF file. Raises InputError if it is damaged, or not a motion of
+    the robot with this structure."""
     import xarray
 
     try:
@@ -211,9 +217,11 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
 def load_or_simulate(
     source: Path, *, scenario: str | None = None, warn: Say = silent
 ) -> SimulationResult:
-    """Result of a result folder; or of a new simulation of a gait file, or of a run's best gait.
+    """Loads the result in a folder of `simulate`; or simulates a gait file, or the best gait of a
+    run of `evolve`.
 
-    `scenario` is for gait files only: folders have their own. For `warn`, see load_source().
+    `scenario` is a name or file, for gait files only: folders have their own. `warn` is called with
+    a warning if the gait was made for another scenario.
 
     Raises InputError if the source cannot be used, or if a folder is given a scenario. Raises
     SimulationFailure if the simulation fails.
@@ -237,11 +245,14 @@ def write_replay(
     Args:
         source: the result folder, gait file or folder of a run.
         out: the page to write.
-        scenario: the scenario for a gait file.
-        warn: see load_source().
+        scenario: name or file of the scenario for a gait file. By default the scenario of the run
+            that contains the file, or "thesis".
+        warn: function that gets a warning if the gait was made for another scenario.
 
     Raises:
-        InputError: if the page cannot be written; nothing is simulated then.
+        InputError: if the page cannot be written (nothing is simulated then), or the source cannot
+            be used.
+        SimulationFailure: if the simulation of a gait fails.
     """
     check_file(out)
     result = load_or_simulate(source, scenario=scenario, warn=warn)

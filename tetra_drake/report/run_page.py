@@ -58,7 +58,7 @@ _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 @dataclass(frozen=True)
 class RecordedGait:
-    """Gait of a run: its recorded evaluation, and a new simulation.
+    """Gait of a run: its recorded evaluation, and a new simulation for the report.
 
     The numbers may differ if other versions recorded the gait. They differ for a run with
     disturbances, because the new simulation has none.
@@ -71,7 +71,8 @@ class RecordedGait:
 
     @property
     def change(self) -> float:
-        """Difference (m) between the distances in the new simulation and in the record."""
+        """Absolute difference (m) between the distances walked in the new simulation and in the
+        record."""
         return abs(self.result.metrics.distance - self.recorded["distance"])
 
 
@@ -92,7 +93,8 @@ draw."""
 
 
 class GaitColumn(NamedTuple):
-    """Column of a gait in a table of the report."""
+    """Column of a table of the report, for one gait. The heading has all `names` of the gait, such
+    as "initially" and "best"."""
 
     names: Sequence[str]
     recorded: pandas.Series
@@ -134,9 +136,10 @@ def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USU
 def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
     """Writes figures/, replay.html and report.html into the folder of a run. Returns their paths.
 
-    A run with a map also gets elites/: a table of all gaits of the map, and a gait file and a
-    replay page for each notable gait. The run may be unfinished. Raises InputError if there is no
-    run, if it is damaged or has no fitness yet, or if the folder cannot be written to.
+    A run with a quality-diversity map also gets elites/: a table of all gaits of the map, and a
+    gait file and a replay page for each notable gait. The run may be unfinished. Raises InputError
+    if there is no run, if it is damaged or has no fitness yet, or if the folder cannot be written
+    to.
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     shown = simulate_shown_gaits(load_run(directory))
@@ -173,7 +176,8 @@ def _simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
 
 
 def pictures_of_gait(result: SimulationResult) -> Pictures:
-    """The figures of one simulation."""
+    """The figures of one simulation by section, not drawn yet: each is a function that draws
+    one."""
     structure = result.robot.structure
     forces = [path_of_the_centre, relative_distances, one_step]
     if structure.signals:
@@ -185,7 +189,8 @@ def pictures_of_gait(result: SimulationResult) -> Pictures:
 
 
 def pictures_of_run(shown: ShownGaits) -> Pictures:
-    """The figures of a run and of its best gait."""
+    """The figures of a run and of its best gait by section, not drawn yet: each is a function that
+    draws one."""
     run, trial = shown.run, shown.best.recorded["trial"]
     best, initial, trials = shown.best.result, shown.initial.result, initial_extremes(run).index
     evolution = [partial(fitness_of_trials, run)] if len(run.iterations) else []
@@ -200,7 +205,8 @@ def pictures_of_run(shown: ShownGaits) -> Pictures:
 
 
 def draw_pictures(pictures: Pictures, folder: Path, printed: Print = AS_USUAL) -> None:
-    """Draws figures and writes them to a folder. Raises InputError if a file cannot be written."""
+    """Draws figures and writes them to a folder. A file has the name of the function that draws it.
+    Raises InputError if a file cannot be written."""
     for part in pictures.values():
         for draw in part:
             figure = draw(**vars(printed.look))
@@ -208,7 +214,9 @@ def draw_pictures(pictures: Pictures, folder: Path, printed: Print = AS_USUAL) -
 
 
 def _notable(shown: ShownGaits) -> list[GaitColumn]:
-    """The notable gaits of the map. The run's best gait has its replay page already."""
+    """Columns of the notable gaits of a run's quality-diversity map (see notable_gaits()); empty
+    without a map. The page of the run's best gait is the run's replay.html, others are in
+    elites/."""
     found, best = [], gait_label(shown.best.recorded)
     for names, row in distinct_gaits(notable_gaits(shown.run)):
         name = names[0].replace(", ", "_").replace(" ", "_")
@@ -218,7 +226,8 @@ def _notable(shown: ShownGaits) -> list[GaitColumn]:
 
 
 def _embedded(picture: partial[Any], folder: Path) -> dict[str, str]:
-    """Name, caption and content of a figure with a file in `folder`."""
+    """Name, caption and image of a figure, by these keys. The image is the figure's SVG file in
+    `folder` as a data URI."""
     name, caption = picture.func.__name__, inspect.getdoc(picture.func) or ""
     content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
     # As an image: the ids of two SVGs in one page would clash.
@@ -227,7 +236,7 @@ def _embedded(picture: partial[Any], folder: Path) -> dict[str, str]:
 
 
 def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str:
-    """The report as HTML, with figures that are files in `folder`."""
+    """The report as HTML. It embeds the figures, whose SVG files are in `folder` already."""
     run, best, scenario = shown.run, shown.best, shown.run.scenario
     trial = best.recorded["trial"]
     gait = run.gait(trial, best.recorded["index"])

@@ -39,9 +39,10 @@ _NOISE = 1e-5
 def metrics_table(
     names: Sequence[str], gaits: Sequence[Mapping[str, Any] | pandas.Series], scenario: Scenario
 ) -> TextTable:
-    """Table of fitness and metrics, with a column per gait. A gait is a row of `Run.evaluations`.
+    """Table of fitness and metrics, with a column per gait under its heading in `names`.
 
-    The first row is the main metric of the objective. Numbers that are zero for all gaits are left
+    A gait is a row of `Run.evaluations`, or a mapping with the same keys. The first row is the main
+    metric of the objective (see headline_metric()). Numbers that are zero for all gaits are left
     out, unless the scenario's objective or requirements name them.
     """
     first = headline_metric(scenario.objective, gaits[-1])
@@ -59,7 +60,8 @@ def metrics_table(
 
 
 def _size_and_title(name: str, units: Units) -> tuple[float, str]:
-    """Size of the unit of a shown number, and the title of the number's row in a table."""
+    """Unit for showing the metric `name`, as its size in SI units (0.01 for percent); and the title
+    of the metric's row in a table, such as "distance (in)"."""
     title = _TITLES.get(name, name.replace("_", " "))
     if name in _SHARES:
         return 0.01, f"{title} (%)"
@@ -96,7 +98,8 @@ def ground_text(scenario: Scenario) -> str:
 
 
 def run_text(run: Run) -> str:
-    """Text about a run, printed at its end."""
+    """Text about a run, printed at its end: main results, tables of trials and metrics, and paths
+    of the pages."""
     texts = [TextTable(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
     if not run.best().empty:
         if len(run.statuses) > 1:
@@ -177,5 +180,5 @@ def trials_table(run: Run) -> TextTable:
 
 
 def _time(seconds: float) -> str:
-    """A wall time as text, such as "35 ms"."""
+    """A wall time as text, such as "35 ms" or "2.50 s"."""
     return f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{rounded(seconds)} s"

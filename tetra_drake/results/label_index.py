@@ -22,8 +22,12 @@ class LabelIndex(PandasIndex):
     def sel(
         self, labels: dict[Any, Any], method: str | None = None, tolerance: Any = None
     ) -> IndexSelResult:
-        """Positions of all entries that have one given label, or one of several in a list. Slices
-        and Boolean masks work as in xarray. Raises InputError for an unknown label."""
+        """Positions of all entries that have one given label, or one of several in a list.
+
+        `labels` has the name of the coordinate and what is given for it: label, list, slice or
+        Boolean mask. Slices and masks work as in xarray, with its `method` and `tolerance`. Raises
+        InputError for an unknown label.
+        """
         ((coordinate, given),) = labels.items()
         wanted = np.asarray(given)
         if isinstance(given, slice) or wanted.dtype.kind == "b":

@@ -41,7 +41,8 @@ if TYPE_CHECKING:
 
 
 class IntegratorWork(Section):
-    """Work of an integrator in one simulation: settings, and counts of steps and evaluations."""
+    """Computing work of an integrator in one simulation: its scheme and accuracy, and numbers of
+    steps and evaluations."""
 
     scheme: str
     accuracy: float
@@ -115,7 +116,8 @@ class SimulationResult:
         return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
 
     def show(self, *, height: int = 480) -> ReplayFrame:
-        """Replay page for a notebook, which shows it in a frame `height` pixels high."""
+        """Page that plays the motion, for a notebook, which shows it in a frame `height` pixels
+        high. Raises InputError if no trajectory was recorded."""
         return ReplayFrame(self.replay_page(), height)
 
     def replay_page(self) -> str:
@@ -125,7 +127,8 @@ class SimulationResult:
         return replay_page(robot=self.robot, trajectory=self.trajectory, title=self.title)[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
-        """Writes a page that plays the motion; see visualization.replay.save_replay()."""
+        """Writes an HTML page that plays the motion to the file `path`. For `viewer`, see
+        visualization.replay.save_replay(). Raises InputError if no trajectory was recorded."""
         from tetra_drake.visualization.replay import save_replay
 
         save_replay(
@@ -135,7 +138,8 @@ class SimulationResult:
 
 @dataclass(frozen=True)
 class ReplayFrame:
-    """Replay page in a notebook, shown by IPython's rich display."""
+    """Replay page (HTML text) in a notebook, shown by IPython's rich display in a frame of a height
+    in pixels."""
 
     page: str = field(repr=False)
     height: int
@@ -146,8 +150,9 @@ class ReplayFrame:
 
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
-    """Times (s), ascending, for which an engine must give the motion to make_result(): the points
-    of the path and, with `record`, the samples of the trajectory."""
+    """Times (s), ascending, for which an engine must give the motion to make_result(): the start,
+    `simulation.steady_from` and the end, the points of the path, and, with `record`, the samples of
+    the trajectory."""
     times = [np.array([0.0, simulation.settling_time, simulation.duration])]
     times.append(sample_times(simulation.duration, PERIOD))
     if record:
@@ -164,10 +169,15 @@ def make_result(
     wall_time: float,
     record: bool,
 ) -> SimulationResult:
-    """Result of a simulation, from its motion and tally. With `record`, it has a trajectory.
+    """Result of a simulation, from its motion and tally.
 
-    `motion` has the times of motion_times(). `totals`, the tally, has sums and extremes over all
-    steps; see laws.tally. `work` is the integrator's work, `wall_time` (s) its wall time.
+    Args:
+        driven: the robot with its gait or command.
+        motion: its motion at the times of motion_times().
+        totals: the tally, sums and extremes over all steps; see laws.tally.
+        work: counts of the integrator's steps and evaluations.
+        wall_time: wall time of the integration in s.
+        record: whether the result has a trajectory.
     """
     robot = driven.robot
     simulation, structure = robot.scenario.simulation, robot.structure
@@ -243,8 +253,9 @@ def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) 
 
 
 def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
-    """Result of a gait in a few words, such as "walks 14.3 inches in 15 s". The scenario's
-    objective chooses what it tells. `metrics` has metrics by name, in SI units."""
+    """Result of a gait in a few words, such as "walks 14.3 inches in 15 s". It tells the metric
+    that the scenario's objective is about and, unless this is turning, the distance. `metrics` has
+    metrics by name, in SI units."""
     seconds = f"in {scenario.simulation.duration:g} s"
     units, distance = scenario.units, metrics["distance"]
     length = fixed(abs(distance) / units.length, units.decimals)

@@ -80,8 +80,8 @@ class Motion:
 
 
 def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
-    """Makes a trajectory, an xarray dataset: the samples of a motion, with the lengths and forces
-    that follow from them.
+    """Makes a trajectory, an xarray dataset: the motion at all of its times, with the lengths and
+    forces that follow from it.
 
     Dimensions: time, body, node, cable, contact, oscillator, axis, horizontal, quaternion. A
     contact is a node that the ground can touch. Every variable has a `units` attribute; modes have
@@ -142,8 +142,9 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
 
 @functools.lru_cache(maxsize=32)
 def _coordinates(named: tuple[tuple[Any, ...], ...]) -> xarray.Coordinates:
-    """Coordinates with their indexes. `named` has a tuple for each: name, dimension, then values.
-    They are cached, because making them takes half of the time of make_dataset()."""
+    """Coordinates of a dataset with their indexes. `named` has a tuple for each: name, dimension,
+    then the labels along it. They are cached, because making them takes half of the time of
+    make_dataset()."""
     import xarray
 
     given = {name: (along, list(values)) for name, along, *values in named}

@@ -32,7 +32,8 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
     """Inertia of the bodies of a blueprint.
 
     Returns masses (bodies,) in kg, centres of mass (bodies, 3) in m in the blueprint's body frames
-    F, and unit inertias (bodies, 6) in m², as in Structure.unit_inertia.
+    F, and unit inertias (bodies, 6) in m²: xx, yy, zz, xy, xz, yz about the centre of mass, divided
+    by the mass.
     """
     made: dict[tuple[bytes, ...], Inertia] = {}  # equal bodies share one
     inertias = []
@@ -81,8 +82,11 @@ def _body_inertia(
     node_mass: np.ndarray,
 ) -> Inertia:
     """Inertia of one body: of its struts (solid cylinders), and of spheres and point masses at its
-    nodes. `struts` (struts, 2) has the two nodes of each strut, counted within the body. Numbers
-    that are rounding errors become 0."""
+    nodes. Numbers that are rounding errors become 0.
+
+    All arguments are in SI units. `p_FN` (nodes, 3) are the positions of the body's nodes, and
+    `struts` (struts, 2) the indices of the two nodes of each strut in it.
+    """
     total, along = SpatialInertia.Zero(), [0.0, 0.0, 1.0]
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
         if density > 0.0:

@@ -42,9 +42,10 @@ def driven_robot(
     """The robot of a scenario, driven by a gait or a command.
 
     The signals of a command are linear between multiples of `cpg.listing_step` (s). A change of
-    setpoint begins at the time of its sample and takes one such step. `steering` replaces the
-    turn of a gait; a command ignores it. Raises InputError for a command without samples, or with
-    another number of cables than the robot has driven ones.
+    setpoint begins at the time of its sample and takes one such step. `steering`, a function from
+    time (s) to the turn (-1 to 1), replaces the constant turn of a gait; a command ignores it.
+    Raises InputError for a command without samples, or whose number of cables is not the robot's
+    number of driven cables.
     """
     if isinstance(driver, Gait):
         return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
@@ -65,9 +66,11 @@ def driven_robot(
 
 
 def controlled_robot(scenario: Scenario) -> Robot:
-    """The robot of a scenario for a controller: one signal for each driven cable.
+    """The robot of a scenario for a controller, which sets one signal for each driven cable in
+    place of an oscillator network.
 
-    Its `first_signals` let the actuators start in the same state as with an oscillator network."""
+    Its `first_signals`, the signals at t = 0, let the actuators start in the same state as with the
+    network."""
     by_network, actuation = Robot.of(scenario), scenario.actuation
     setpoints = actuation.commands(by_network.starting_cables())
     robot = by_network.without_network()

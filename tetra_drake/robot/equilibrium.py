@@ -104,9 +104,9 @@ def find_equilibrium(
 ) -> Equilibrium:
     """Finds the equilibrium of a robot on flat ground without actuation.
 
-    The search goes downhill in potential energy from the state `start` (13*n,) of the n bodies to
-    a minimum. Friction bears no load there. `bodies` are the names of the bodies. Raises
-    InputError, naming `source` (the scenario) and a body, if no equilibrium is found.
+    The search goes downhill in potential energy to a minimum. It begins at `start` (13*n,), a state
+    [q; v] of the n bodies. Friction bears no load there. `bodies` are the names of the bodies.
+    Raises InputError, naming `source` (the scenario) and a body, if no equilibrium is found.
     """
     weights = np.array([0.0, 0.0, -model.bodies.weight.sum()])
     forces = np.vstack([model.loads.forces, weights])
@@ -165,8 +165,9 @@ class _Descent:
         self._arrive(start, force_at_rest(robot, start))
 
     def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
-        """Makes `state` (13*n,) the current one, with its generalized `force` (6*n,). No forces of
-        another state may have been computed in between."""
+        """Makes `state` (13*n,) the current one. `force` (6*n,) is force_at_rest() of this state.
+        No call of force_at_rest() for another state may lie in between, because this method uses
+        the arrays that it fills."""
         self.state, self.force = state, force
         if not np.isfinite(force).all():
             return
@@ -212,7 +213,8 @@ class _Descent:
         return False
 
     def _longest_step(self) -> tuple[np.ndarray, float]:
-        """Next step (6*n,) in m within reach, and twice the energy (J) that it should release.
+        """Next step (6*n,) in m within reach, not yet taken, and twice the energy (J) that it
+        should release.
 
         It is Newton's step with the smallest shift that keeps it within reach. In an equilibrium
         that is not stable, it is a step along the least stable motion. For the components of a
@@ -246,9 +248,9 @@ class _Descent:
         """Takes a trial `step` and corrects it back to the floor of the energy's valley; see the
         class.
 
-        `step` and `expected` (J) are from _longest_step(). Returns the state after the corrected
-        step, the force there, the corrected step (6*n,), and its gain: the released energy divided
-        by the expected one.
+        `step` and `expected`, twice the expected energy (J), are from _longest_step(). Returns the
+        state after the corrected step, the force there, the corrected step (6*n,), and its gain:
+        the released energy divided by the expected one.
         """
         longest = 0.5 * np.abs(step).max()
         moved = displaced(self._robot, self.state, step)
@@ -268,13 +270,13 @@ class _Descent:
         return moved, force, step, gain
 
     def _factor(self, stiffness: bsr_array, shift: float) -> Factor | None:
-        """Cholesky's factor of `stiffness` plus `shift` (N/m) on its diagonal; None if this sum is
-        not positive definite."""
+        """Cholesky's factor of `stiffness` (6*n, 6*n) plus `shift` (N/m) on its diagonal; None if
+        this sum is not positive definite."""
         return Factor.of(stiffness, shift, least=0.5 * self._least)
 
     def _solved(self, factor: Factor, force: np.ndarray) -> np.ndarray:
-        """Displacements (6*n,) under a force (6*n,), from the `factor` of _factor(). Motions of the
-        whole robot that nothing resists are projected out."""
+        """Displacements (6*n,) in m under a force (6*n,) in N, for the stiffness whose `factor` is
+        from _factor(). Motions of the whole robot that nothing resists are projected out."""
         step = factor.solved(force)
         return step - self._held @ (self._held.T @ step)
 
@@ -291,7 +293,7 @@ class Envelope(NamedTuple):
 
     @classmethod
     def of(cls, matrix: bsr_array) -> Envelope:
-        """The envelope of a matrix (6*n, 6 n) with 6 x 6 blocks."""
+        """The envelope of a matrix (6*n, 6*n) with 6 x 6 blocks."""
         graph = csr_array((np.ones(len(matrix.indices)), matrix.indices, matrix.indptr))
         by_index = cls._in_order(np.arange(len(matrix.indptr) - 1), graph)
         narrow = cls._in_order(reverse_cuthill_mckee(graph, symmetric_mode=True), graph)
@@ -318,7 +320,7 @@ class Factor(NamedTuple):
 
     @classmethod
     def of(cls, matrix: bsr_array, shift: float, *, least: float) -> Factor | None:
-        """The factor of a matrix (6*n, 6 n) with 6 x 6 blocks and `shift` added to its diagonal.
+        """The factor of a matrix (6*n, 6*n) with 6 x 6 blocks and `shift` added to its diagonal.
         None if a pivot is at most `least`."""
         envelope = Envelope.of(matrix)
         bodies, position = len(envelope.order), np.argsort(envelope.order)
@@ -341,8 +343,8 @@ class Factor(NamedTuple):
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     """Orthonormal basis (6*n, motions) of rigid displacements of the whole robot that change no
     energy: along x, along y and about z; for a robot without weight and contacts all six. Motions
-    that anchors, cables from fixed nodes, or loads resist are left out. The forces of the state
-    must have been computed."""
+    that anchors, cables from fixed nodes, or loads resist are left out. For the components see
+    displaced(). force_at_rest() must have been called for this state before."""
     model, nodes = robot.model, robot.forces.nodes
     floats = not model.bodies.weight.any() and not model.ground.contacts.size
     kept = [3, 4, 2, 5, 0, 1] if floats else [3, 4, 2]  # in the order of rigid_motions()
@@ -367,8 +369,9 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 @compiled
 def factorise(matrix: Table, ends: Table, least: float) -> bool:
-    """Replaces the upper half of a symmetric matrix, in place, by its Cholesky factor U, with
-    matrix = UᵀU. Returns False, with the work half done, if a pivot is at most `least`.
+    """Replaces the upper half of a symmetric `matrix` (n, n), diagonal included, in place by its
+    Cholesky factor U, with matrix = UᵀU. Entries below the diagonal stay. Returns True if this
+    succeeds. Returns False, with the work half done, if a pivot is at most `least`.
 
     Row i is 0 from column ends[i] on; see Envelope. LAPACK is not used because its threads wait for
     each other on busy processors.
@@ -386,7 +389,8 @@ def factorise(matrix: Table, ends: Table, least: float) -> bool:
 
 @compiled
 def solve(factor: Table, ends: Table, right: Table) -> Table:
-    """Solution x of matrix x = right, with the `factor` that factorise() left of the matrix."""
+    """Solution x (n,) of matrix x = right, for a vector `right` (n,). `factor` (n, n) is what
+    factorise() made of the matrix, with the same `ends` (n,)."""
     n, x = right.size, right.copy()
     for i in range(n):
         x[i] /= factor[i, i]
@@ -400,8 +404,9 @@ def solve(factor: Table, ends: Table, right: Table) -> Table:
 def force_at_rest(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     """Generalized force (6*n,) in N on the bodies at rest in a state (13*n,).
 
-    It is [t_W / radius; f_W] at each body's origin: torques are divided by `robot.radius`. Contact
-    nodes stick where they are, so friction exerts no force."""
+    It is [t_W / radius; f_W] at each body's origin. Torques are divided by `robot.radius`, so that
+    all numbers are in N. Contact nodes stick where they are, so friction exerts no force. The
+    arrays in `robot.forces` are overwritten."""
     modes = np.zeros((len(robot.forces.ground_forces), MODE_COLUMNS))
     force = np.empty(6 * robot.model.bodies.mass.size)
     compute_forces_at_rest(robot.parts, state, modes, force)
@@ -414,8 +419,9 @@ def compute_forces_at_rest(parts: Parts, state: Table, modes: Table, generalized
     """Writes the forces on a robot at rest in `state` (13*n,) to `generalized` (6*n,): [t_W; f_W]
     at each body's origin, in N m and N.
 
-    `modes` (contacts, 12) must be 0, which means nodes in the air. The kernel replaces them: nodes
-    in the ground stick. The other forces in `parts` are also overwritten."""
+    `parts` are the robot's constants and arrays of forces, from Unactuated; the forces are also
+    overwritten. `modes` (contacts, 12) is the table of contact states of laws.contact. It must be
+    0, which means nodes in the air. The kernel replaces it: nodes in the ground stick."""
     robot, forces = unpacked(parts)
     move_robot(robot, state, forces)
     update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
@@ -440,8 +446,8 @@ def displace(state: Table, motion: Table, moved: Table) -> None:
 
 
 def stiffness_at_rest(robot: Unactuated) -> bsr_array:
-    """Stiffness matrix (6*n, 6 n) in N/m of the robot without actuation, for displacements as
-    in displaced(); sparse. The state is the one of the last call of force_at_rest()."""
+    """Stiffness matrix (6*n, 6*n) in N/m of the robot without actuation, for displacements as in
+    displaced(); sparse. The state is the one of the last call of force_at_rest()."""
     matrix = stiffness_matrix(robot.model, robot.forces)
     per_radius = np.repeat([1.0 / robot.radius, 1.0], 3)
     matrix.data = per_radius[:, np.newaxis] * matrix.data * per_radius
@@ -449,7 +455,7 @@ def stiffness_at_rest(robot: Unactuated) -> bsr_array:
 
 
 def mass_matrix(robot: Unactuated) -> np.ndarray:
-    """Mass matrix (6*n, 6 n) in kg, for displacements as in displaced(). The state is the one of
+    """Mass matrix (6*n, 6*n) in kg, for displacements as in displaced(). The state is the one of
     the last call of force_at_rest()."""
     bodies = robot.model.bodies
     inertia_W = bodies.inertia if robot.model.isotropic else robot.forces.inertia

@@ -39,7 +39,8 @@ _MOST_COLUMNS = 8
 
 @dataclass(frozen=True)
 class Gait:
-    """Parameters of an oscillator network: what evolution searches for."""
+    """Parameters of an oscillator network (weights, time constants, turn, gains): what evolution
+    searches for."""
 
     name: str
     weights: tuple[float, ...]
@@ -100,7 +101,8 @@ class Gait:
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """Content of a gait file, for json.dumps(). The gait must fit `scenario`, which gives the
-        names of the weights. The file names the gait's own scenario, or `scenario` if unknown."""
+        names of the weights. The content has the name of the scenario that the gait was made for,
+        or the name of `scenario` if that is unknown."""
         names = Weights.of(scenario).names
         content: dict[str, Any] = {"schema": 2, "name": self.name}
         content["scenario"] = self.scenario or scenario.name
@@ -151,7 +153,7 @@ class ParameterSpace:
         """The parameter space of a scenario, given by its name or file, or by a run.
 
         The bounds are from its section `gait_bounds`. A parameter with equal bounds is fixed. The
-        bounds of tau_B are twice the bounds of tau_A.
+        bounds of tau_B are twice the bounds of tau_A. The bounds of feedback gains are -1 and 1.
         """
         scenario = given_scenario(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
@@ -184,9 +186,9 @@ class ParameterSpace:
         )
 
     def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
-        """Gait with the parameters of a vector; the bounds are not checked. Raises InputError for a
-        vector of another size, a number that is not finite, a weight below 0, or a time constant
-        that is not above 0."""
+        """Gait called `name` with the parameters of a vector (parameters,), in the order of
+        `names`; the bounds are not checked. Raises InputError for a vector of another size, a
+        number that is not finite, a weight below 0, or a time constant that is not above 0."""
         vector = self._numbers(vector)
         first_gain = len(self.names) - 2 - len(self.pathways)
         gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
@@ -201,9 +203,9 @@ class ParameterSpace:
         )
 
     def vector(self, gait: Gait) -> Vector:
-        """Parameter vector of a gait. If weights are mirrored, left and right ones share a
-        parameter: the first of each pair is used. Raises InputError if the gait has another number
-        of weights."""
+        """Parameter vector of a gait, without its name and turn. With mirrored weights, a left
+        weight and its right image share a parameter, which the first of the two gives. Raises
+        InputError if the gait has another number of weights."""
         if len(gait.weights) != len(self.weights):
             problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
             raise InputError("ParameterSpace", f"gait {gait.name}", problem)
@@ -213,15 +215,15 @@ class ParameterSpace:
         return np.concatenate([weights, gains, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:
-        """Random parameter vector, uniform between the bounds. Even if tau_B is independent in the
-        search, it begins as 2 tau_A."""
+        """Random parameter vector, uniform between `low` and `high`. tau_B is not drawn: it is
+        2 tau_A, even if a search may change it independently later."""
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
     def repair(self, vector: npt.ArrayLike) -> Vector:
         """A copy of the vector with tau_B = 2 tau_A, for example after mutation. If the scenario
-        makes tau_B independent, it stays. The bounds are not enforced. Raises InputError for a
-        vector of another size."""
+        makes tau_B independent of tau_A, tau_B stays as given. The bounds are not enforced. Raises
+        InputError for a vector of another size."""
         repaired = self._numbers(vector)
         if self.couples_tau_b:
             repaired[TAU_B] = TAU_B_PER_TAU_A * repaired[TAU_A]
@@ -265,8 +267,8 @@ def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
 
 
 def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
-    """Writes a gait file (JSON). `scenario` must fit the gait and gives the names of its weights.
-    load_gait() reads exactly the same numbers."""
+    """Writes a gait file (JSON) at `path`. The gait must fit `scenario`, which gives the names of
+    its weights. load_gait() reads exactly the same numbers."""
     write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
 
 
@@ -296,7 +298,8 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     Args:
         path: a gait file.
         scenario: the scenario that the gait must fit, its name or file, or a run.
-        key: key of the gait, if `path` is another JSON file that contains one.
+        key: for another JSON file that contains a gait: the key at its top level whose value is the
+            gait. By default the file is the gait.
 
     Raises:
         InputError: names file and key, if the file is wrong or does not fit the scenario.
@@ -361,8 +364,9 @@ def check_gait(
 ) -> None:
     """Raises InputError, naming source and key, if a gait does not fit the scenario.
 
-    It needs as many weights as `weights` has connections, gains only for the scenario's feedback,
-    and a turn only where the robot has left or right oscillators.
+    It needs as many weights as the robot has connections (`weights`), gains only for the scenario's
+    feedback, and a turn only where the robot has left or right oscillators. `key` is the gait's key
+    in the source, for the message.
     """
     prefix = f"{key}." if key else ""
     count, expected = len(gait.weights), len(weights.couplings)

@@ -28,9 +28,11 @@ def lift(scenario: Scenario, placed: Structure) -> float:
     """Distance (m) by which a structure must move up so that its lowest foot touches the plane
     z = 0; negative for down.
 
-    It is 0 without contact nodes, or if anchors hold a node along z. A structure with other anchors
-    is never moved down. Raises InputError if a contact node is clearly below the plane; if the
-    structure is held along z, also if the bottom of a foot is."""
+    `placed` is the structure at the positions of its settings. A foot is the sphere about a contact
+    node that touches the ground. The distance is 0 without contact nodes, or if anchors hold a node
+    along z. A structure with other anchors is never moved down. Raises InputError if a contact node
+    is below the plane by more than a thousandth of the structure's height; if anchors hold the
+    structure along z, also if the bottom of a foot is."""
     if not placed.contacts.size:
         return 0.0
     stays, shown, heights = placed.held[:, 2].any(), scenario.units.shown, placed.p_WN[:, 2]
@@ -88,8 +90,8 @@ def make_surface(
 ) -> Ground:
     """Ground with the given laws and terrain, but without contact nodes, for AddGroundContact().
 
-    `grid` has the terrain's heights. By default it is made from `terrain_kind`, and a terrain that
-    begins in front of a robot begins at x = 0."""
+    `grid` has the terrain's heights. By default it is made from `terrain_kind`, whose steps or
+    obstacles begin at x = 0 if its settings give no start."""
     grid = grid or terrain_kind.grid(ahead=0.0, scale=1.0, source="make_surface")
     rows, columns = grid.heights.shape
     inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
@@ -135,7 +137,8 @@ def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
 
 def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
     """Table `frames` of laws.terrain (points, FRAME_COLUMNS) for the points p_WN (points, 3) in m:
-    gap above the surface, and axes of the surface."""
+    a row has the point's distance (m) from the surface, positive above it, and the axes of the
+    surface there."""
     frames = np.empty((len(p_WN), terrain.FRAME_COLUMNS))
     nodes = np.zeros((len(p_WN), NODE_COLUMNS))
     nodes[:, P_WN : P_WN + 3] = p_WN

@@ -72,7 +72,8 @@ def path_of_centre(trajectory: xarray.Dataset, structure: Structure) -> CentrePa
 
 
 def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> np.ndarray:
-    """Displacement (time,) in m along the world's x axis since the start, negative if backward.
+    """Displacement (times,) in m along the world's x axis since the start, at all samples of a
+    recorded trajectory; negative if backward.
 
     It is the displacement of the first marker (in a row of tetrahedra the bottom left node of T1,
     the first one), or of the centre of mass for a robot without markers."""
@@ -81,7 +82,8 @@ def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> np.ndar
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """Boolean array (time, contact): True where a contact node bears no normal force."""
+    """Boolean array (times, contact nodes) for a recorded trajectory: True where a contact node
+    bears no normal force."""
     return trajectory.normal_force == 0.0
 
 
@@ -98,7 +100,8 @@ def intervals(times: np.ndarray, active: np.ndarray) -> list[Span]:
 
 
 def share_of_time(active: xarray.DataArray) -> float:
-    """Share of time, 0 to 1, during which a Boolean signal (time,) is true, by intervals()."""
+    """Share of time, 0 to 1, during which a Boolean signal is true. `active` (times,) has the
+    coordinate `time` in s; see intervals() for what a sample means."""
     times = active.time.values
     length = sum(end - start for start, end in intervals(times, active.values))
     return length / float(times[-1] - times[0])
@@ -121,7 +124,8 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
 
 
 def last_step(trajectory: xarray.Dataset) -> Span | None:
-    """Start and end (s) of the robot's last step: one period of the signals, late in a trajectory.
+    """Start and end (s) of the robot's last step: one period of the oscillators' signals, late in a
+    recorded trajectory.
 
     The period is taken from the signal with the largest swing in the second half of the trajectory.
     The step ends where this signal rises through its mean for the last time. None if no signal

@@ -67,7 +67,8 @@ class Weights:
     @functools.cached_property
     def images(self) -> np.ndarray:
         """Index of the mirror image of each weight (weights,): the weight between the oscillators
-        on the robot's other side. The weight's own index if it has none."""
+        on the robot's other side, left and right exchanged. A weight without an image has its own
+        index."""
         images = self.blueprint.images
         opposite = [k if image is None else image for k, image in enumerate(images)]
         neurons = np.add.outer(2 * np.array(opposite, dtype=int), [0, 1]).ravel()
@@ -84,8 +85,9 @@ class Weights:
 
 
 def constant_steering(turn: float) -> SteeringSignal:
-    """Steering function that gives the same turn, -1 to 1, at all times. Raises InputError unless
-    the turn is a number; checked_turn() checks its limits later."""
+    """Steering function that gives the same turn, -1 to 1, at all times; a positive turn raises the
+    input of left oscillators. Raises InputError unless the turn is a number; checked_turn() checks
+    its limits later."""
     if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
         expected = "a number from -1 to 1, or a function of the time in s"
         raise InputError("steering", "", f"found {turn!r}, expected {expected}")
@@ -101,8 +103,11 @@ def checked_turn(turn: float, *, time: float) -> float:
 
 
 def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
-    """State of the neurons of n oscillators at t = 0 (4n,), by default from Table 4 of the thesis:
-    the inner states u of all neurons, then the self-inhibitions v."""
+    """State (4n,) at t = 0 of the 2n neurons of n = `oscillators` oscillators: the inner states u
+    of all neurons, then the self-inhibitions v. Extensor and flexor alternate.
+
+    The numbers are from the settings `cpg`; their defaults are from Table 4 of the thesis.
+    """
     inner_state, extensor_self_inhibition, flexor_self_inhibition = cpg.initial_state
     u = np.full(2 * oscillators, inner_state)
     v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)

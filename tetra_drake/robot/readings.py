@@ -65,8 +65,9 @@ class Readings(NamedTuple):
     ) -> Self:
         """The readings of one robot at a time (s), as copies.
 
-        They are from the state [q; v] (13*n,) of its bodies and the tables `cable_forces` (cables,
-        7) of laws.cable and `ground_forces` (contacts, 3) of laws.contact at that time."""
+        They are from the state [q; v] (13*n,) of its bodies at that time, the table `cable_forces`
+        (cables, 7) of laws.cable (length, rate and tension of each cable), and the table
+        `ground_forces` (contacts, 3) of laws.contact (friction along t1 and t2, normal force)."""
         nodes, bodies = moved_nodes(structure, state), len(structure.bodies)
         return cls(
             time=time,
@@ -81,8 +82,8 @@ class Readings(NamedTuple):
         )
 
     def rows(self, which: int | slice) -> Self:
-        """Readings of one robot (an index; without the first axis) or of several (a slice). They
-        are views: they change with these readings."""
+        """Readings of some of the N robots: of one (`which` is an index; without the first axis) or
+        of several (a slice). They are views: they change with these readings."""
         return type(self)(*(values[which] for values in self))
 
     def copied(self) -> Self:
@@ -90,8 +91,8 @@ class Readings(NamedTuple):
         return type(self)(*(values.copy() for values in self))
 
     def put(self, place: int, readings: Readings) -> None:
-        """Writes the `readings` of a single robot into these arrays, at index `place` of the first
-        axis."""
+        """Writes the `readings` of a single robot into these arrays of N robots, at index `place`
+        of the first axis."""
         for values, given in zip(self, readings, strict=True):
             values[place] = given
 
@@ -122,9 +123,10 @@ def readings_at(
 
     Args:
         state: state [q; v] (13*n,) of the bodies.
-        modes: table `modes` (contacts, 12) of the contact nodes; see laws.contact.
-        signals: signals (m,) in N.
-        drives: states of the actuators (drives,); see laws.actuator.
+        modes: table `modes` (contacts, 12) with the contact state of each contact node, such as its
+            stick point; see laws.contact.
+        signals: signals of the m oscillators, or of given actuators, (m,) in N.
+        drives: states of the actuators (drives,), such as free lengths; see laws.actuator.
         ground_forces: forces (contacts, 3) in N along t1, t2 and n from an engine with its own law
             of contact. By default they are computed from state and modes.
     """
@@ -142,7 +144,7 @@ def readings_at(
 
 def pitch_rates(readings: Readings, structure: Structure) -> np.ndarray:
     """Pitch rates (N,) in rad/s of N robots: the angular velocity of each robot as a whole about
-    the world's y axis; see kinematics.pitch_rate()."""
+    the world's y axis, positive if the front goes down; see kinematics.pitch_rate()."""
     rates = np.empty(len(readings.time))
     write_pitch_rates(readings.p_WN, readings.v_WN, structure.first_node[-1], rates)
     return rates
@@ -150,8 +152,10 @@ def pitch_rates(readings: Readings, structure: Structure) -> np.ndarray:
 
 @compiled
 def write_pitch_rates(p_WN: Table, v_WN: Table, moving: int, rates: Table) -> None:
-    """Writes the pitch rates (rad/s) of N robots to `rates` (N,), from positions (m) and velocities
-    (m/s) of nodes (N, nodes, 3). Only the first `moving` nodes count; the others are fixed."""
+    """Writes the pitch rates (rad/s) of N robots to `rates` (N,); see pitch_rates().
+
+    They are from the positions p_WN (m) and velocities v_WN (m/s) of nodes (N, nodes, 3). Only the
+    first `moving` nodes count; the others are fixed to the world."""
     nodes = np.empty((moving, kinematics.NODE_COLUMNS))
     for robot in range(rates.size):
         for node in range(moving):

@@ -24,8 +24,8 @@ BEARS is usual in a ground that is stiff enough."""
 
 
 def gain_remark(robot: Robot) -> str:
-    """Remark on a `cpg.gain` (N) whose signals hardly move the cables, or exceed the limits of the
-    actuators. It is "" if the gain is sensible."""
+    """Remark on a `cpg.gain` (N) whose signals change the length of no cable by 1% (LEAST_MOTION),
+    or exceed the limits of the actuators. It is "" if the gain is sensible."""
     cpg, driven = robot.scenario.cpg, robot.structure.cables[robot.driven]
     if not driven.size:
         return ""
@@ -40,8 +40,8 @@ def gain_remark(robot: Robot) -> str:
 
 
 def stillness_remark(robot: Robot, distance: float) -> str:
-    """Remark on a robot that should walk, but walked a `distance` (m) of less than a tenth of its
-    own length. It is "" otherwise."""
+    """Remark on a robot whose objective rewards distance, but which walked a `distance` (m) of less
+    than a tenth of its own length. It is "" otherwise."""
     scenario, units = robot.scenario, robot.scenario.units
     length = np.ptp(robot.structure.p_WN, axis=0).max()
     if not looks_for_distance(scenario.objective) or not abs(distance) < STILL * length:
@@ -54,8 +54,8 @@ def stillness_remark(robot: Robot, distance: float) -> str:
 
 
 def start_up_remark(robot: Robot) -> str:
-    """Remark on a simulation that ends before the start-up time, so no cable is ever actuated. It
-    is "" otherwise."""
+    """Remark on a simulation that ends by the start-up time `cpg.start_up`, before which signals
+    are zero, so no cable is ever actuated. It is "" otherwise."""
     start_up, duration = robot.scenario.cpg.start_up, robot.scenario.simulation.duration
     if start_up < duration:
         return ""
@@ -84,8 +84,8 @@ def sinking_remark(robot: Robot) -> str:
 
 
 def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:
-    """Typical amplitude (N) of a network's signals, and the stretch (m) of each driven cable under
-    a force of this size."""
+    """Typical amplitude (N) of a network's signals, and the elastic stretch (driven cables,) in m
+    of each driven cable under a force of this size."""
     cpg, law = robot.scenario.cpg, cable.CableLaw.of(robot.structure.cables[robot.driven])
     signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
     return signal, np.asarray(cable.elastic_stretch(signal, law))

@@ -90,11 +90,11 @@ class Robot:
         return cls(scenario, structure, model, first_signals=np.zeros(structure.signals))
 
     def without_network(self) -> Robot:
-        """A copy of the robot for given signals in place of oscillators: one for each driven cable,
-        in the order of `driven`.
+        """A copy of the robot for given signals in place of oscillators: one signal for each driven
+        cable, in the order of `driven`.
 
-        Where software of the actuators imitates a cable's spring and damper, the copy has none: the
-        given signal is the whole tension.
+        If the software of the actuators imitates a cable's spring and damper, the driven cables of
+        the copy have none: a given signal is the whole tension.
         """
         names, laws = self.structure.cable_names, [*self.structure.cable_laws]
         if self.scenario.actuation.plays_cable:
@@ -113,8 +113,9 @@ class Robot:
 
     @property
     def driven(self) -> np.ndarray:
-        """Indices of the cables that have actuators, in the order of the oscillators. Commands,
-        actions and loads have this order; states of the actuators have the order of the cables."""
+        """Indices (driven cables,) of the cables that have actuators, in the order of the
+        oscillators. Commands, a program's actions, and loads on actuators have this order. States
+        of the actuators have the order of the cables, ascending."""
         groups = self.structure.groups
         return np.array([number for group in groups for number in group], dtype=np.int64)
 
@@ -131,8 +132,8 @@ class Robot:
     @functools.cached_property
     def equilibrium(self) -> Equilibrium:
         """Equilibrium of the robot on flat ground without actuation, found at the first use. The
-        scenario's terrain and offsets are ignored. Raises InputError if there is no
-        equilibrium."""
+        scenario's terrain and the offsets of the bodies at the start are ignored. Raises InputError
+        if there is no equilibrium."""
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
         return equilibrium_of(self.scenario, _placed(self.scenario))
@@ -176,11 +177,13 @@ class Robot:
         )
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-        """Values of `steering`, -1 to 1, at multiples of `cpg.listing_step` from t = 0 to the end;
-        without `steering` one value, the gait's constant turn.
+        """Turns, -1 to 1: how much more input left oscillators have than right ones.
 
-        At 1 only the left oscillators have input, at -1 only the right ones. Raises InputError if a
-        value is not between -1 and 1, or if no oscillator is on one side of the robot.
+        They are the values of `steering`, a function of time (s), at multiples of
+        `cpg.listing_step` from t = 0 to the end. Without `steering` there is one value, the gait's
+        constant turn. At 1 only the left oscillators have input, at -1 only the right ones. Raises
+        InputError if a value is not between -1 and 1, or if no oscillator is on one side of the
+        robot.
         """
         if steering is None:
             return np.array([gait.turn])
@@ -191,22 +194,24 @@ class Robot:
         return np.array([checked_turn(steering(time), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
-        """Tonic input u0 of each of the 2m neurons (..., 2m), for turns (...) from -1 to 1; see
-        laws.oscillator.steered_input()."""
+        """Tonic input of each of the 2m neurons (..., 2m), for turns (...) from -1 to 1. It is
+        u0 (1 + turn) on the left, u0 (1 - turn) on the right, u0 for neither side."""
         sides, u0 = np.repeat(self.structure.sides, 2), self.scenario.cpg.external_input
         return np.asarray(steered_input(u0, turns[..., np.newaxis], sides))
 
     def starting_drives(self) -> np.ndarray:
-        """States of the actuators at t = 0 (drives,), in the order of the cables; empty if the
-        kind of actuators has no states. See laws.actuator."""
+        """States of the actuators at t = 0 (drives,), in the order of the cables: free lengths (m)
+        of winches, tensions (N) of motors. Empty if the kind of actuators has no states."""
         cables = self.starting_cables(np.sort(self.driven))
         return np.asarray(self.scenario.actuation.drives(cables))
 
     def starting_cables(self, numbers: np.ndarray | None = None) -> DrivenCables:
-        """Driven cables at t = 0, for methods of the actuators: lengths, signals and constants.
+        """Driven cables at rest at t = 0, for methods of the actuators: lengths, signals, tensions
+        and constants.
 
         Args:
-            numbers: indices of the cables, by default all driven ones.
+            numbers: indices of the cables among all cables; by default all driven ones, in the
+                order of `driven`.
         """
         which = self.driven if numbers is None else numbers
         cables, lengths = self.structure.cables[which], self.structure.initial_lengths[which]
@@ -215,8 +220,8 @@ class Robot:
 
     @functools.cached_property
     def starting_modes(self) -> np.ndarray:
-        """Table `modes` (contacts, 12) of laws.contact at t = 0. A contact node that touches the
-        ground sticks at its position."""
+        """Table `modes` (contacts, 12) of laws.contact, the states of the contact nodes, at t = 0.
+        A contact node that touches the ground sticks at its position."""
         modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
         parts = Packed((self.model, Forces.of(self.model)))
         modes_after_step(parts, self.structure.initial_state, modes)
@@ -273,8 +278,8 @@ def equilibrium_of(
 ) -> Equilibrium:
     """Equilibrium of a structure without actuation, on flat ground if it has contact nodes.
 
-    The search begins at the state `start` (13*bodies,), by default the structure's initial state.
-    Raises InputError if there is no equilibrium.
+    The search begins at `start` (13*bodies,), a state [q; v], by default the structure's initial
+    state. Raises InputError if there is no equilibrium.
     """
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
     start = structure.initial_state if start is None else start
@@ -283,7 +288,8 @@ def equilibrium_of(
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
     """Constants of a robot as arguments of the compiled kernels: its structure, and the physical
-    laws of the scenario. Raises InputError for a wrong start on the terrain, as make_ground()."""
+    laws of the scenario. Raises InputError if the structure starts in the ground or outside the
+    terrain; see make_ground()."""
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,

@@ -22,8 +22,8 @@ FIXED = "fixed nodes"
 
 
 def make_sdf(structure: Structure, state: np.ndarray, *, name: str) -> str:
-    """SDFormat text of a model called `name`: the bodies of a structure at the poses of a state
-    (13*bodies,), with a frame for each node. Cables are left out."""
+    """SDFormat text of a model called `name`: the bodies of a structure at the poses of a `state`
+    [q; v] (13*bodies,), with a frame for each node. Cables are left out."""
     root = Element("sdf", version="1.9")
     model = add_element(root, "model", name=name)
     shapes = [*shapes_of(structure)]
@@ -67,10 +67,11 @@ def _add_pose(parent: Element, X: RigidTransform) -> None:
 
 
 def _add_shape(link: Element, purpose: str, shape: Shape, kind: str) -> Element:
-    """Adds a shape to a link, with the tag `purpose`: "visual" or "collision".
+    """Adds a shape to a link, and returns the new element. Its tag is `purpose`: "visual" or
+    "collision".
 
-    `kind` is the SDFormat tag of its solid: "cylinder" or "capsule". A shape of length 0 is a
-    sphere."""
+    `kind` is the SDFormat tag of the shape's solid: "cylinder" or "capsule". A shape of length 0
+    gets the tag "sphere" instead."""
     element = add_element(link, purpose, name=shape.name)
     _add_pose(element, shape.X_BS)
     solid = add_element(add_element(element, "geometry"), kind if shape.length else "sphere")

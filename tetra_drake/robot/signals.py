@@ -44,14 +44,15 @@ class DrivenRobot:
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
-        """A robot driven by the network of a gait. `steering`, a function of time, replaces the
-        gait's constant turn."""
+        """A robot driven by the network of a gait. `steering`, a function from time (s) to the turn
+        (-1 to 1), replaces the gait's constant turn."""
         none = np.zeros((0, robot.structure.signals))
         return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)
 
     @property
     def start_up(self) -> float:
-        """Time (s) from which the signals act: `cpg.start_up` for a gait, otherwise 0."""
+        """Time (s) from which the signals act: `cpg.start_up` for a gait, otherwise 0. Before it
+        they are zero."""
         return self.robot.scenario.cpg.start_up if self.gait else 0.0
 
     @property
@@ -62,7 +63,8 @@ class DrivenRobot:
 
     @property
     def is_controlled(self) -> bool:
-        """True if a controller sets the signals while the robot moves."""
+        """True if a controller sets the signals while the robot moves. False for a gait or a
+        command."""
         return len(self.samples) == 1
 
     @property
@@ -73,7 +75,8 @@ class DrivenRobot:
 
     @property
     def sample_count(self) -> int:
-        """Number of samples of the signals: of the given ones, or of the network's output."""
+        """Number of samples of the signals, one per `cpg.listing_step`: of the given ones, or of
+        the network's output."""
         if self.gait is None:
             return len(self.samples)
         scenario = self.robot.scenario
@@ -82,7 +85,8 @@ class DrivenRobot:
 
     def signals_at(self, times: np.ndarray) -> np.ndarray:
         """Signals (times, m) in N at `times` (s), interpolated between samples; zero before the
-        start-up time. For a gait they are from signal_samples()."""
+        start-up time. For a gait they are from signal_samples(), which refuses a gait with
+        feedback."""
         samples = self._all_samples
         grid = self.robot.scenario.cpg.listing_step * np.arange(len(samples))
         values = np.empty((len(times), samples.shape[1]))
@@ -101,8 +105,8 @@ class DrivenRobot:
 
     @property
     def changes(self) -> dict[float, np.ndarray]:
-        """Changes of the given signals: key is the time (s) at which a change begins, value the
-        signals (m,) in N after it. Empty for a gait."""
+        """Changes of the given signals. A key is the time (s) at which a change begins, its value
+        the signals (m,) in N after the change. Empty for a gait."""
         begins = self.robot.scenario.cpg.listing_step * self._changing
         after = self.samples[self._changing + 1]
         return dict(zip(begins.round(MARK_DECIMALS).tolist(), after, strict=True))
@@ -114,8 +118,9 @@ class DrivenRobot:
 
     @functools.cached_property
     def marks(self) -> np.ndarray:
-        """Times (s) at which a step must end, ascending: start, start-up, `simulation.steady_from`,
-        end, and where a change of the given signals begins or ends."""
+        """Times (s) at which a step of the integrator must end, ascending: the start t = 0, the
+        start-up time, `simulation.steady_from`, the end, and where a change of the given signals
+        begins or ends."""
         settings, step = self.robot.scenario.simulation, self.robot.scenario.cpg.listing_step
         ends = step * np.add.outer([0, 1], self._changing).ravel()
         instants = np.append([0.0, settings.settling_time, self.start_up], ends)
@@ -139,8 +144,9 @@ class DrivenRobot:
 
     @property
     def turns(self) -> np.ndarray:
-        """Turns, -1 to 1, at multiples of `cpg.listing_step`; one value if the turn is constant,
-        0 without a gait. See Robot.turns()."""
+        """Turns, -1 to 1, at multiples of `cpg.listing_step`: how much more input left oscillators
+        have than right ones, see Robot.turns(). One value if the turn is constant; a single 0
+        without a gait."""
         return self.robot.turns(self.gait, self.steering) if self.gait else np.zeros(1)
 
 
@@ -175,7 +181,8 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
 
 
 def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:
-    """Writes the signals of a gait as CSV with the columns time_s, signal_1 ... signal_m.
+    """Writes the signals of a gait without feedback to the CSV file `path`, with the columns
+    time_s, signal_1 ... signal_m.
 
     The first lines begin with # and describe the columns. Forces are in the scenario's unit.
 
@@ -183,7 +190,8 @@ def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | No
         rate: samples per second (Hz); one per `cpg.listing_step` by default.
 
     Raises:
-        InputError: if the rate is above its default, or the file cannot be written.
+        InputError: if the gait has feedback, the rate is above its default, or the file cannot be
+            written.
     """
     scenario, cpg, units = robot.scenario, robot.scenario.cpg, robot.scenario.units
     duration = scenario.simulation.duration

@@ -22,8 +22,9 @@ def speed_limit(driven: DrivenRobot) -> float:
 
     The default is the speed of the lightest body if it had all possible energy. This is the energy
     of a fall from the robot's top to the lowest ground, of the cables at the start, and of a pull
-    by each actuator over the length of its cable. Where no ground stops the robot, the speed that
-    weight and loads can give the whole robot is added.
+    by each actuator over the length of its cable. To it is added the speed that loads, and the
+    weight downhill or without ground, can give the whole robot in the duration. The default is at
+    least 10.16 m/s (LEAST_LIMIT).
     """
     robot = driven.robot
     scenario, structure = robot.scenario, robot.structure

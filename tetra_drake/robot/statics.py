@@ -43,9 +43,9 @@ def find_statics(
 ) -> Statics:
     """Self-stress states and mechanisms of rigid bodies joined by cables and ball joints.
 
-    `held` (nodes, 3) is True for each axis of a node along which the world holds it; by default
-    nothing is held. `joints` (joints, 2) has the two nodes of each joint. For the other arguments
-    see cable_wrenches().
+    `held` (nodes, 3) is True where an anchor holds a node along the world's x, y or z axis; by
+    default nothing is held. `joints` (joints, 2) has the two nodes of each joint. For the other
+    arguments see cable_wrenches().
     """
     held = np.zeros(p_WN.shape, dtype=bool) if held is None else held
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
@@ -56,7 +56,11 @@ def find_statics(
     motions = motions[:, :, :bodies].reshape(nodes.size, 3, 6 * bodies)
     constraints = motions[held]
     if joints is not None:
-        apart = motions[joints[:, 0]] - motions[joints[:, 1]]
+        # The spring of a joint acts along a line through the middle of its nodes.
+        middle = rigid_motions(p_WN[joints].mean(axis=1))
+        apart, each = np.zeros((len(joints), 3, bodies, 6)), np.arange(len(joints))
+        apart[each, :, body_of_node[joints[:, 0]]] = middle
+        apart[each, :, body_of_node[joints[:, 1]]] = -middle
         constraints = np.concatenate([constraints, apart.reshape(-1, 6 * bodies)])
     allowed = null_space(constraints, TOLERANCE)
     felt = csr_array(allowed.T @ wrenches if len(constraints) else wrenches)
@@ -81,8 +85,8 @@ def find_statics(
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
-    """Orthonormal basis (n, vectors) of the vectors that a matrix (m, n) maps to 0. Singular values
-    up to a share `tolerance` of the greatest count as 0."""
+    """Orthonormal basis (n, vectors), in columns, of the vectors that a matrix (m, n) maps to 0.
+    Singular values up to `tolerance` times the greatest one count as 0."""
     _, singular_values, rows = np.linalg.svd(matrix)
     greatest = singular_values.max(initial=0.0)
     return np.asarray(rows[np.count_nonzero(singular_values > tolerance * greatest) :].T)

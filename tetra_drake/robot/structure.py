@@ -74,8 +74,8 @@ class Structure(Blueprint):
 
     def turned(self, slope: float) -> Self:
         """A copy of the structure that stands on an incline as it did on flat ground. The incline
-        rises by `slope` (rad) along x; all bodies turn about the world's y axis through the
-        origin."""
+        rises by the angle `slope` (rad) along x, falls if it is negative. All bodies are rotated
+        about the world's y axis through the origin."""
         # Written out, because processors round a product of matrices differently.
         s, c = math.sin(slope), math.cos(slope)
         forward, left, up = self.p_WB.T
@@ -88,7 +88,8 @@ class Structure(Blueprint):
     @functools.cached_property
     def cables(self) -> np.ndarray:
         """Cables with their nodes, signals and constants: records (cables,) of dtype
-        laws.cable.CABLE. The signal of a cable without actuator is PASSIVE."""
+        laws.cable.CABLE. Their `signal` is the index of the oscillator that drives the cable, or
+        laws.cable.PASSIVE without actuator."""
         cables = np.zeros(len(self.cable_names), dtype=cable.CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
         cables["signal"] = cable.PASSIVE
@@ -100,7 +101,7 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def strut_table(self) -> Struts:
-        """Struts as arrays for the kernels."""
+        """Struts as arrays for the kernels: nodes, lengths (m), radii (m)."""
         node_a, node_b = self.struts.T
         return Struts(
             node_a.copy(),
@@ -114,8 +115,8 @@ class Structure(Blueprint):
 
     @property
     def least_radius(self) -> float:
-        """Radius (m) of the thinnest strut, or a hundredth of the size of a robot without struts.
-        Shapes that are drawn have at least this radius."""
+        """Radius (m) of the thinnest strut. Without struts it is a hundredth of the robot's largest
+        extent along an axis. Shapes that are drawn have at least this radius."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return float(self.strut_radius.min()) if self.strut_radius.size else size / SLENDERNESS
 
@@ -127,7 +128,8 @@ class Structure(Blueprint):
         return np.asarray(np.maximum.reduceat(distances, self.first_node[:-1]))
 
     def strut_name(self, strut: int) -> str:
-        """Name of a strut: the names of its two nodes."""
+        """Name of the strut with the index `strut`: the names of its two nodes, with a space in
+        between."""
         return " ".join(self.node_names[node] for node in self.struts[strut])
 
     @property
@@ -175,8 +177,9 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def node_shares(self) -> np.ndarray:
-        """Weights of the nodes (nodes,): the weighted sum of node positions is the centre of mass
-        in every pose of the bodies. Fixed nodes have the weight 0."""
+        """Factors of the nodes (nodes,), without unit, for the robot's centre of mass: in every
+        pose of the bodies it is the sum of the node positions times these factors. They are 0 for
+        fixed nodes, and may be negative."""
         *of_bodies, fixed = np.split(self.p_BN, self.first_node[1:])
         shares = []
         for p_BN, mass in zip(of_bodies, self.mass, strict=True):
@@ -203,26 +206,26 @@ class Structure(Blueprint):
     def initial_lengths(self) -> np.ndarray:
         """Lengths of the cables (cables,) in m at t = 0."""
         node_a, node_b = node_positions(self, self.initial_state)[self.segments.ends.T]
-        pieces = np.linalg.norm(node_b - node_a, axis=1)
-        return np.bincount(self.segments.cable, pieces, minlength=len(self.cable_names))
+        return self.along_cables(np.linalg.norm(node_b - node_a, axis=1))
 
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
-    """Positions of the points whose motion is shown: the markers (..., markers, 3) among the nodes
-    p_WN (..., nodes, 3). A structure without markers is shown by its centre of mass (..., 1, 3)."""
+    """Positions in m of the points whose motion is shown: of the structure's markers (..., markers,
+    3), which are some of the nodes p_WN (..., nodes, 3). Without markers it is the centre of mass
+    (..., 1, 3)."""
     if structure.markers.size:
         return p_WN[..., structure.markers, :]
     return (structure.node_shares @ p_WN)[..., np.newaxis, :]
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Positions p_WN (nodes, 3) of the nodes in m, for a state (13*n,) of the bodies."""
+    """Positions p_WN (nodes, 3) of the nodes in m, for a state [q; v] (13*n,) of the n bodies."""
     return moved_nodes(structure, state)[:, kinematics.P_WN : kinematics.P_WN + 3]
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """Table `nodes` of laws.kinematics (nodes, NODE_COLUMNS) for a state (13*n,) of the bodies:
-    positions and velocities. The forces are 0."""
+    """Table `nodes` of laws.kinematics (nodes, NODE_COLUMNS) for a state [q; v] (13*n,) of the n
+    bodies: positions (m) and velocities (m/s) in the world. Its columns of forces are 0."""
     nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
     kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
@@ -240,8 +243,8 @@ def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np
 
 
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
-    """Adds the bodies of a structure, as free bodies, to a plant that is not finalized. If the
-    plant has a SceneGraph, struts and spheres are shown."""
+    """Adds the bodies of a structure, as free bodies, to a plant that is not finalized, and returns
+    them in the structure's order. If the plant has a SceneGraph, struts and spheres are shown."""
     given = zip(structure.bodies, structure.mass, structure.unit_inertia, strict=True)
     bodies = [
         plant.AddRigidBody(name, SpatialInertia(mass, np.zeros(3), UnitInertia(*unit)))
@@ -256,7 +259,8 @@ def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
 
 
 class Shape(NamedTuple):
-    """Visible shape of a body: a cylinder along the z axis of its frame S, or a sphere."""
+    """Visible shape fixed to a body: a cylinder along the z axis of the shape's frame S, or a
+    sphere about the origin of S."""
 
     name: str
     body: int

@@ -38,7 +38,8 @@ ELONGATION = 1e-6
 
 def strut_contact_law(scenario: Scenario, structure: Structure) -> StrutContactLaw:
     """Constants of the contact between struts for the kernels: its law, and the distances that
-    decide which pairs of struts are checked. `acts` is False without struts."""
+    decide which pairs of struts are checked. Its field `acts` is False without struts: then the
+    kernels check none."""
     lightest, radii = structure.mass.min(), structure.strut_radius
     if not radii.size:
         search = StrutSearch(0.0, drift=0.0, passage=0.0, lightest=lightest)
@@ -51,7 +52,7 @@ def strut_contact_law(scenario: Scenario, structure: Structure) -> StrutContactL
 
 def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool = False) -> None:
     """Raises InputError if struts of different bodies overlap in the initial pose of a structure,
-    by more than the robot's weight would press them into each other.
+    unless the robot's weight would press them as deep into each other.
 
     With `may_overlap`, overlaps are allowed, except where the axes of two struts meet: then no
     direction leads them apart. Nothing is checked if the scenario lets struts pass through each
@@ -73,7 +74,7 @@ def check_apart(scenario: Scenario, structure: Structure, *, may_overlap: bool =
 def overlaps(
     scenario: Scenario, structure: Structure, state: np.ndarray
 ) -> dict[tuple[str, str], tuple[float, float]]:
-    """Overlaps of struts of different bodies in a state (13*bodies,).
+    """Overlaps of struts of different bodies in a state [q; v] (13*bodies,).
 
     Key: the names of the two struts. Value: depth of the overlap and distance of the axes, in m.
     Depths by which the robot's weight presses touching struts into each other are left out.
@@ -100,8 +101,8 @@ def elastic_struts(blueprint: Blueprint) -> np.ndarray:
 
 
 def axial_forces(structure: Structure, unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Axial forces (struts,) in N on the struts at rest in a state (13*bodies,); negative in
-    compression.
+    """Axial forces (struts,) in N on the struts at rest in a state [q; v] (13*bodies,); negative in
+    compression. `unactuated` is the same robot with its arrays of forces, which are overwritten.
 
     The forces on the two ends are weighted by the distances of the ends from the body's centre of
     mass, divided by the strut's length. For the centre of mass stays where it is as a strut becomes
@@ -122,8 +123,9 @@ def axial_forces(structure: Structure, unactuated: Unactuated, state: np.ndarray
 
 
 def elongated(structure: Structure, elongation: np.ndarray) -> np.ndarray:
-    """Positions p_BN (nodes, 3) in m of the nodes of a structure whose elastic struts are longer by
-    `elongation` (struts,) in m. The bodies keep their centres of mass."""
+    """Positions p_BN (nodes, 3) in m, in the frames of their bodies, of the nodes of a structure
+    whose elastic struts are made longer by `elongation` (struts,) in m. Entries of rigid struts are
+    ignored. The bodies keep their centres of mass."""
     p_BN = structure.p_BN.copy()
     for strut in elastic_struts(structure):
         share = elongation[strut] / structure.strut_table.length[strut]
@@ -134,8 +136,8 @@ def elongated(structure: Structure, elongation: np.ndarray) -> np.ndarray:
 def condensed(
     stiffness: np.ndarray, structure: Structure, unactuated: Unactuated, state: np.ndarray
 ) -> np.ndarray:
-    """Stiffness matrix (6*n, 6 n) in N/m with the compliance of the elastic struts (static
-    condensation).
+    """Stiffness matrix (6*n, 6*n) in N/m with the compliance of the elastic struts (static
+    condensation). `unactuated` is the same robot with its arrays of forces.
 
     `stiffness` is the matrix of the n bodies as if rigid, from stiffness_at_rest(), in the
     equilibrium `state` (13*n,). The elongations of the struts have no inertia: they follow the

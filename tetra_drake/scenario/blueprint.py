@@ -63,8 +63,8 @@ class Blueprint:
     """Geometry and constants of a robot, computed from its settings; SI units.
 
     Nodes and struts are in the order of the bodies. Then come fixed nodes, which belong to no body:
-    the world holds them where they are. Left and right are the two sides of the plane
-    y = 0; mirror images are with respect to this plane.
+    the world holds them where they are. Left is y > 0, right is y < 0; mirror images are with
+    respect to the plane y = 0.
     """
 
     bodies: tuple[str, ...]
@@ -168,10 +168,12 @@ class Blueprint:
             for cable, (first, last) in enumerate(self.cable_ends.tolist())
         ]
         ends = [pair for path in paths for pair in itertools.pairwise(path)]
-        pieces = [len(path) - 1 for path in paths]
-        return Segments(
-            np.array(ends, dtype=int).reshape(-1, 2), np.repeat(range(len(paths)), pieces)
-        )
+        cables = [cable for cable, path in enumerate(paths) for _ in path[1:]]
+        return Segments(np.array(ends, dtype=int).reshape(-1, 2), np.array(cables, dtype=int))
+
+    def along_cables(self, of_pieces: np.ndarray) -> np.ndarray:
+        """Sums (cables,) of numbers of the straight pieces (pieces,) along each cable."""
+        return np.bincount(self.segments.cable, of_pieces, minlength=len(self.cable_names))
 
     def bodies_at(self, cables: Sequence[int]) -> set[int]:
         """Indices of the bodies that some cables join, also at rings; WORLD for fixed nodes."""
@@ -195,7 +197,8 @@ class Blueprint:
 
     @property
     def held(self) -> np.ndarray:
-        """True for each axis of a node along which the world holds it (nodes, 3)."""
+        """Whether the world holds each node along x, y and z, as Booleans (nodes, 3): by the spring
+        of an anchor or, for a fixed node, along all axes."""
         is_fixed = self.carriers == WORLD
         return is_fixed[:, np.newaxis] | (self.anchor_stiffness > 0.0)
 
@@ -206,8 +209,9 @@ class Blueprint:
 
     @property
     def scale(self) -> float:
-        """Factor by which lengths such as margins of figures grow or shrink with the robot; 1 for
-        robots of 0.1 m to 1 m (USUAL_SIZES)."""
+        """Factor by which lengths such as margins of figures grow or shrink with the robot: 1 for
+        robots of 0.1 m to 1 m, 3 for 3 m, 0.5 for 0.05 m. The size is the largest extent along an
+        axis."""
         size = float(np.ptp(self.p_WN, axis=0).max())
         return size / min(max(size, USUAL_SIZES[0]), USUAL_SIZES[1]) or 1.0  # a point has no size
 
@@ -228,8 +232,8 @@ class Blueprint:
 
     @property
     def images(self) -> tuple[int | None, ...]:
-        """For each oscillator, the index of the oscillator that drives the mirror images of its
-        cables; None if there is none."""
+        """For each oscillator, the index of the oscillator that drives exactly the mirror images of
+        its cables in the plane y = 0, such as itself; None if there is none."""
         middles = [
             self.p_WN[self.segments.ends[self.segments.cable == cable]].mean(axis=(0, 1))
             for cable in range(len(self.cable_ends))
@@ -250,7 +254,7 @@ class Blueprint:
         return tuple(groups.index(cables) if cables in groups else None for cables in images)
 
     def check(self) -> None:
-        """Raises InputError, naming the key, if the robot cannot be simulated."""
+        """Raises InputError, naming the key of the robot's settings, if it cannot be simulated."""
         self.check_sizes()
         self._check_bodies()
         self._check_cables()
@@ -278,8 +282,8 @@ class Blueprint:
             refuse("contacts", "found none, expected one node at least")
 
     def check_sizes(self) -> None:
-        """Raises InputError if `offsets` or `payload` has not one item for each body, or if the
-        size of a strut is too extreme for the computation of forces."""
+        """Raises InputError if `offsets` or `payload` has not one item for each body, or if a strut
+        is too short, too long, too thin or too light for the computation of forces."""
         bodies = len(self.bodies)
         for key, items in (("offsets", self.offsets), ("payload", self.payload)):
             if len(items) != bodies:
@@ -299,7 +303,7 @@ class Blueprint:
                 refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
     def _check_bodies(self) -> None:
-        """Refuses bodies of hardly any mass, and two nodes at the same position.
+        """Raises InputError for bodies of hardly any mass, and for two nodes at the same position.
 
         The point masses of a body with several nodes do not count, as they have no inertia about
         the line between two of them.
@@ -312,13 +316,14 @@ class Blueprint:
         mass = np.add.reduceat(of_nodes[:moving], self.first_node[:-1])
         np.add.at(mass, self.carriers[self.struts[:, 0]], of_struts)
         for body, given in self.given_inertia.items():
-            if mass[body] < LIGHTEST and given.inertia is None:
-                problem = "is missing, and no part of the body has mass and inertia"
-                refuse(f"bodies.{self.bodies[body]}.inertia", problem)
+            for key, value in (("centre", given.centre), ("inertia", given.inertia)):
+                if mass[body] < LIGHTEST and value is None:
+                    problem = "is missing, and no part of the body has mass and inertia"
+                    refuse(f"bodies.{self.bodies[body]}.{key}", problem)
             mass[body] = mass[body] if given.mass is None else given.mass
         if mass.min() < LIGHTEST:
-            node = self.first_node[mass.argmin()]
-            without = "" if self.node_mass[node] else "without point masses "
+            body = mass.argmin()
+            node, without = self.first_node[body], "without point masses " * (sizes[body] > 1)
             problem = f"is on a body whose mass {without}is {mass.min():.3g} kg"
             expected = f"expected at least {LIGHTEST:g} kg"
             refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
@@ -333,8 +338,9 @@ class Blueprint:
                 refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
 
     def _check_cables(self) -> None:
-        """Refuses cables that join no two bodies, bodies that no cables join to the others, and
-        tensions so high that the free length of a cable would be negative."""
+        """Raises InputError for cables that do not join two bodies, or a body and the world; for
+        bodies that no cables, joints or anchors join to the others; and for a tension in the
+        settings so high that the free length of the cable would be negative."""
         pairs = self.carriers[self.segments.ends]
         for cable, key in enumerate(self.cable_keys):
             first, *others = {*pairs[self.segments.cable == cable].ravel().tolist()}
@@ -356,8 +362,7 @@ class Blueprint:
             )
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
-        pieces = self._distances(self.segments.ends)
-        lengths = np.bincount(self.segments.cable, pieces, minlength=len(self.cable_names))
+        lengths = self.along_cables(self._distances(self.segments.ends))
         for cable, length in enumerate(lengths):
             law = CableLaw(**self.cable_laws[cable])
             if law.free_length < 0.0:
@@ -385,7 +390,8 @@ class Blueprint:
 
     @property
     def shortest(self) -> float:
-        """Length (m) of the shortest strut, or of the shortest cable if there are no struts."""
+        """Length (m) of the shortest strut, or of the shortest cable if there are no struts; 0 if
+        there are no cables either."""
         pairs = self.struts if len(self.struts) else self.cable_ends
         return float(self._distances(pairs).min()) if len(pairs) else 0.0
 

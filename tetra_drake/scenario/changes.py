@@ -19,12 +19,15 @@ REMOVABLE = ("disturbances",)
 
 class Part(Tree):
     """Mapping made from dotted keys, such as "objective.speed", not written as a mapping by the
-    user. merged() changes only the keys or list indices that it has, even where another mapping
-    replaces the whole."""
+    user. merged() changes only the keys or list indices that it has, also in `objective` and in
+    lists, which an ordinary mapping or list replaces as a whole."""
 
 
 def merged(base: Any, changes: Any, key: str = "") -> Any:
-    """Merges changes into the settings of a scenario, or into its section at `key`. The rules are:
+    """Returns the settings `base` of a scenario with changes; `base` itself stays as it is.
+
+    Both are nested mappings, or the values in them at the dotted `key` ("" for the whole scenario).
+    Raises InputError for an index that a list does not have. The rules are:
 
     - A mapping changes the keys that it names; the others stay. An empty key, as in `friction:`,
       changes nothing; `disturbances:` removes the section.
@@ -55,8 +58,8 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
 
 
 def given_changes(changes: Mapping[str, Any], source: object) -> Mapping[str, Any]:
-    """Checks an argument that must be a mapping with dotted keys, and returns it. Raises
-    InputError, naming `source`, for anything else."""
+    """Checks an argument that must be a mapping with dotted keys as texts, and returns it. The
+    values are not checked. Raises InputError, naming `source`, for anything else."""
     if isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes):
         return changes
     problem = f"found {changes!r:.60}, expected values by dotted keys, such as {{'cpg.gain': ...}}"

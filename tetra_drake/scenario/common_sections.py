@@ -86,7 +86,7 @@ class SimulationSection(Section):
 
 
 class EvolutionSection(Section):
-    """Number and length of the trials, for any optimiser."""
+    """Number and length of an evolution's trials, which are independent runs, for any optimiser."""
 
     trials: int = Field(ge=1, le=1000)
     """Number of independent trials, each with another seed."""
@@ -103,8 +103,8 @@ def separate(joined: str) -> list[str]:
 
 
 def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mapping[str, Value]:
-    """Validator of a mapping with joined keys, such as "a.b, c.d": each key may be given once.
-    Raises InputError, naming `source`, for a key that is given twice."""
+    """Checks a mapping whose keys may each name several scenario keys, such as "a.b, c.d", and
+    returns it. Raises InputError, naming `source`, if a scenario key occurs twice."""
     counts = Counter(key for joined in by_joined for key in separate(joined))
     for key, count in counts.items():
         if count > 1:

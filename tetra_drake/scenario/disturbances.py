@@ -31,8 +31,9 @@ class Draw:
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
-    """The draw (set of random changes) that a seed gives for a scenario's disturbances. Its factors
-    do not depend on the scenario's numbers."""
+    """The draw (set of random changes) that a seed, a few integers, gives for the scenario's
+    `disturbances`. Without them it changes nothing. Its factors do not depend on the scenario's
+    numbers."""
     settings = scenario.disturbances
     if settings is None:
         return Draw({})
@@ -76,22 +77,23 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:
-    """The disturbed scenarios of one iteration of an evolution, one per draw. Every gait of the
-    iteration is simulated on each."""
+    """The disturbed scenarios of one iteration of an evolution, one per draw (set of random
+    changes). Every gait of the iteration is simulated on each. `seed` has the seed of the run and
+    the numbers of trial and iteration."""
     draws = [draw_disturbances(scenario, (*seed, k)) for k in range(scenario.draw_count)]
     return [disturbed(scenario, draw) for draw in draws]
 
 
 def fresh_draws(scenario: Scenario, seed: int, count: int) -> list[Draw]:
-    """`count` draws of disturbances, to test evolved gaits on. No evolution uses them, whatever its
-    seed."""
+    """`count` draws (sets of random changes) of disturbances, to test evolved gaits on. The same
+    `seed` gives the same draws. No evolution uses them, whatever its seed."""
     return [draw_disturbances(scenario, fresh_seed(seed, k)) for k in range(count)]
 
 
 def fresh_seed(seed: int, k: int) -> tuple[int, ...]:
     """Seed of draw k in fresh_draws(): six numbers, the last 1.
 
-    No evolution has such a seed. Its seeds have four numbers (five after numpy splits a large first
-    one), and numpy pads them with zeros.
+    No draw of an evolution has such a seed. Its seeds have four numbers (five after numpy splits a
+    large first one). Numpy pads them with zeros, so the sixth number is 0 there.
     """
     return seed, k, 0, 0, 0, 1

@@ -27,7 +27,7 @@ class EngineSettings(Section):
 
 
 class Drake(EngineSettings):
-    """The Drake diagram with an error-controlled integrator.
+    """Settings of the engine that integrates a Drake diagram with error control.
 
     The mode of a node is whether it touches the ground, and whether it sticks.
     """
@@ -49,7 +49,8 @@ class Drake(EngineSettings):
 
 
 class Compiled(EngineSettings):
-    """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
+    """Settings of the compiled engine: a Rosenbrock method in machine code, which simulates many
+    gaits side by side."""
 
     module: ClassVar[str] = "tetra_drake.engines.lanes.batch"
     tolerance: Speed = Field(default=1e-4, gt=0)
@@ -65,7 +66,7 @@ class Compiled(EngineSettings):
 
 
 class Mujoco(EngineSettings):
-    """MuJoCo with its own contact, on planes."""
+    """Settings of the engine MuJoCo, with MuJoCo's own contact. Its grounds are planes."""
 
     module: ClassVar[str] = "tetra_drake.engines.mujoco"
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)

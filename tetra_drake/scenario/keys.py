@@ -13,8 +13,9 @@ from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.shipped import SCENARIOS, STRUCTURES
+from tetra_drake.scenario.yaml_text import FORMAT
 from tetra_drake.settings.refusals import Tree, keys_in, members_of
-from tetra_drake.settings.section import attribute_docstrings
+from tetra_drake.settings.section import attribute_docstrings, parts_in
 from tetra_drake.settings.units import plainest
 
 PAGE = SCENARIOS / "KEYS.md"
@@ -41,10 +42,17 @@ _LENGTHS = {"minItems": "≥ {} items", "maxItems": "≤ {} items"}
 def schema_text(*, structure: bool = False) -> str:
     """JSON Schema of scenario files, or of structure files, for editors and other tools.
 
-    A quantity is a text with a pattern; `unit` is its SI unit. The title of a kind is its tag.
+    A quantity is a text with a pattern; its key `unit`, an addition to JSON Schema, has its SI
+    unit. The `title` of a section that has kinds is the kind's YAML tag, such as !Coulomb.
+    The schema is of draft 2020-12 of JSON Schema.
     """
-    schema = (StructureFile if structure else Scenario).model_json_schema()
+    what = "structure" if structure else "scenario"
+    schema: Tree = {"$id": f"urn:tetra-drake:{what}:format-{FORMAT}.schema.json"}
+    schema |= (StructureFile if structure else Scenario).model_json_schema()
     schema["properties"].pop("file", None)  # a scenario's key, which names the structure's file
+    for node in parts_in(schema):
+        if not structure and isinstance(node, dict):
+            node.pop("required", None)  # a base may have the keys
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
@@ -84,7 +92,7 @@ def _table_of_keys(rows: Iterable[tuple[str, Tree]]) -> str:
 
 
 def _value(node: Tree) -> str:
-    """Text about the values that a node of the JSON Schema allows, with unit and limits."""
+    """Text about the values that a part of the JSON Schema allows, with unit and limits."""
     if "anyOf" in node:
         return " or ".join(_value(part) for part in node["anyOf"] if part != {"type": "null"})
     if "properties" in node:

@@ -54,8 +54,8 @@ it; a run or a result."""
 
 
 def given_scenario(scenario: GivenScenario) -> Scenario:
-    """Converts an argument to a scenario. It is a scenario, its name or file, a run or a result.
-    Raises InputError for anything else."""
+    """Converts an argument to a scenario. It is a scenario, its name or file, a folder that holds
+    its file scenario.yaml, a run or a result. Raises InputError for anything else."""
     if isinstance(scenario, (str, Path)):
         in_folder = Path(scenario) / SCENARIO
         is_folder = str(scenario) not in shipped_scenarios() and os.path.isfile(in_folder)
@@ -69,7 +69,8 @@ def given_scenario(scenario: GivenScenario) -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """Text of a scenario file with all settings in SI. It loads as the same scenario even if
-    defaults change. A height file must be beside it, see save_scenario()."""
+    defaults change. If the terrain comes from a height file, this must lie in the same folder;
+    save_scenario() puts it there."""
     return dump_yaml(written(scenario.model_dump()))
 
 
@@ -88,8 +89,8 @@ def _file(name: str, folder: Path) -> Path:
 
 
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
-    """Loads the scenario of a file, on top of its bases. `seen` are the files that are based on
-    this one: naming one of them as a base is refused."""
+    """Loads the scenario of a file, with the values that it takes from its base, and so on. `seen`
+    are the files that are based on this one. Raises InputError if it is based on one of them."""
     keys = [*keys_of(Scenario), "base"]
     given = read_mapping(file, "scenario file", keys=keys)
     if file.resolve() in seen:

@@ -67,14 +67,15 @@ class Walk(Poses):
 
     @property
     def per_steady_time(self) -> float:
-        """Inverse (1/s) of the duration of the steady stretch; see Metrics."""
+        """Inverse (1/s) of the duration of the steady stretch, which is the simulation without its
+        start; see Metrics."""
         steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
         return 1.0 / float(steady_time or 1)
 
     @property
     def per_actuator_time(self) -> float:
         """Inverse (1/s) of the duration of the steady stretch (see Metrics), divided by the number
-        of actuators."""
+        of actuators. It turns an integral summed over actuators into a mean."""
         return self.per_steady_time / max(self.actuators, 1)
 
     @property
@@ -174,8 +175,9 @@ class Metrics(TalliedMetrics, WalkMetrics):
 
     @classmethod
     def of(cls, walk: Walk, *, lacking: Collection[str], units: Units) -> Self:
-        """Computes all metrics of a simulation, for printing in `units`. A metric is NaN if it
-        needs a property that the robot is `lacking`."""
+        """Computes all metrics of a simulation, for printing in `units`. `lacking` are properties
+        that the robot does not have, such as "row of tetrahedra": metrics that need them are
+        NaN."""
         numbers = {
             name: math.nan if metric.needs in lacking else float(metric.compute(walk))
             for name, metric in METRICS.items()
@@ -192,7 +194,8 @@ class Metrics(TalliedMetrics, WalkMetrics):
 
     @property
     def table(self) -> TextTable:
-        """Table of the metrics that apply to the robot, with units, in two pairs of columns."""
+        """Table of the metrics that apply to the robot, with units. Its four columns are metric and
+        value, twice side by side."""
         rows, units = [], current(self.units)
         for name, unit in UNITS.items():
             value = round(getattr(self, name), 9) + 0.0  # neither -0 nor rounding errors
@@ -216,8 +219,8 @@ class Metrics(TalliedMetrics, WalkMetrics):
 
     @property
     def path_radius(self) -> float:
-        """Radius in m of the path of the centre in the steady stretch (see Metrics); inf if it is
-        straight."""
+        """Radius in m of the path of the centre in the steady stretch (see Metrics); inf from 100 m
+        on, which counts as straight."""
         bend = abs(self.path_curvature)
         return 1.0 / bend if bend > STRAIGHT else math.inf
 
@@ -236,8 +239,9 @@ UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
 
 def wrong_metric(metrics: Mapping[str, Any]) -> str:
-    """Name of the first metric whose value has a wrong type; "" if there is none. The values are in
-    the form of Metrics.to_json()."""
+    """Name of the first metric whose value has a wrong type; "" if there is none. The values, read
+    from JSON, are expected in the form of Metrics.to_json(): a float or None, for `lifted_shares` a
+    list of floats."""
     for name, value in metrics.items():
         numbers = value if name == "lifted_shares" else [value]
         kinds = float if name == "lifted_shares" else float | None
@@ -259,17 +263,19 @@ _WALKED = ("distance", "steady_distance", "speed")
 
 
 def looks_for_distance(objective: Mapping[str, float]) -> bool:
-    """True if an objective rewards long distances."""
+    """True if an objective, weights by metric, has a positive weight for a distance or speed along
+    x."""
     return any(objective.get(name, 0.0) > 0.0 for name in _WALKED)
 
 
 def looks_for_turns(objective: Mapping[str, float]) -> bool:
-    """True if an objective is about turning, not about distances."""
+    """True if an objective, weights by metric, is about turning and does not reward distances."""
     return "heading_change" in objective and not looks_for_distance(objective)
 
 
 def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
-    """Fitness: the sum of metrics times the objective's weights (SI)."""
+    """Fitness: the sum of metrics times their weights. `objective` has weights by metric, in SI
+    units. A weight may be negative."""
     total = 0.0
     for name, weight in objective.items():
         # Inches give Eq. 10 the constants of the thesis, and keep the digits of recorded numbers.
@@ -279,9 +285,9 @@ def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
 
 
 def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:
-    """Name of the most important metric of a gait: the distance if the objective rewards it,
-    otherwise the metric with the largest part in the fitness. Metrics that it only punishes do not
-    count beside one that it rewards."""
+    """Name of the most important metric of a gait: "distance" if the objective rewards distances,
+    otherwise the metric with the largest part (weight times value) in the fitness. Metrics with
+    negative weights do not count if one has a positive weight. Both mappings are by metric, SI."""
     if looks_for_distance(objective):
         return "distance"
     rewarded = {name: weight for name, weight in objective.items() if weight > 0.0} or objective
@@ -290,8 +296,9 @@ def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
-    """Texts about the metrics that do not meet their required SI values, such as "clearance is
-    0.05 in, less than 0.125 in". NaN meets no requirement."""
+    """Texts about the metrics that do not meet their limits in `require` (SI, by metric), such as
+    "clearance is 0.05 in, less than 0.125 in". A limit is the greatest value for costs, the least
+    value for other metrics. NaN meets no limit."""
     texts, shown = [], current(metrics.units).shown
     for name, limit in require.items():
         value, unit, is_cost = getattr(metrics, name), UNITS[name], METRICS[name].is_cost

@@ -42,7 +42,7 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     `unit` is the file's unit of length in m. The axes z, x, y of NTRT become x (forward), y (left),
     z (up). A node of a substructure is named "SUBSTRUCTURE/NODE". A group is named by its tags,
     joined by slashes, because dots separate keys. The log names what is left out. Raises InputError
-    that names file and key, for substructures too.
+    that names file and key, also of the file of a substructure.
     """
     whole = Assembly()
     for name, (_, _, tag) in CLASSES.items():
@@ -72,8 +72,9 @@ nodes."""
 
 @dataclass
 class _Translation:
-    """Conversion of NTRT's files: content of the structure file, and the file and key that each of
-    its keys comes from."""
+    """Conversion of NTRT's files, read into `whole`, to `tree`, the content of a structure file.
+    `places` has the file and key of NTRT that each key of `tree` comes from. `unit` is NTRT's unit
+    of length in m."""
 
     whole: Assembly
     unit: float
@@ -84,8 +85,8 @@ class _Translation:
     to."""
 
     def add_all(self) -> None:
-        """Adds all rods, spheres and cables that can move, and the fixed nodes that cables join to
-        them."""
+        """Adds to `tree` all rods, spheres and cables that can move, and the fixed nodes that
+        cables join to them."""
         ignored = [name for rule in self.whole.rules for name in rule.builder.ignored]
         for name in ignored:
             self._note("not used, as the scenario has its own", name)
@@ -143,7 +144,8 @@ class _Translation:
         return {name: names[first] for name, first in zip(names, firsts, strict=True)}
 
     def _parts(self) -> Iterator[_Part]:
-        """Rods, boxes, cables and spheres, each with the last builder whose tags fit."""
+        """Rods, boxes, cables and spheres, each with its builder: the last one in the files whose
+        tags it has. Raises InputError for a pair without a builder."""
         whole = self.whole
         for pair in whole.pairs:
             rule = whole.rule(pair, "struts") or whole.rule(pair, "cables")

@@ -31,14 +31,15 @@ Ends = tuple[str, str]
 
 
 class Place(NamedTuple):
-    """Position of something in the files, for error messages: file and key."""
+    """Where an entry stands in NTRT's files, for error messages: file and dotted key."""
 
     file: Path
     key: str
 
 
 class Rule(NamedTuple):
-    """Builder, and the tags that a pair or a node must have for it."""
+    """Builder (class and parameters of parts), the tags that a pair or a node must have for it, and
+    its entry in the files."""
 
     tags: Tags
     builder: Builder
@@ -76,8 +77,12 @@ class Assembly:
     """Content of the files that were read. Several substructures may share a file."""
 
     def add_file(self, file: Path, *, part: str = "", above: tuple[Path, ...] = ()) -> None:
-        """Adds the content of a file to the structure. The names of its nodes begin with `part`.
-        `above` are the files that contain this file."""
+        """Adds the content of a file to the structure, with its substructures.
+
+        The names of its nodes get the prefix `part`, such as "SUBSTRUCTURE."; "" for the whole.
+        `above` are the files that have this file as a substructure, at any depth. Raises InputError
+        if the file is among them.
+        """
         if file not in self._read:
             content = read_mapping(file, "structure file of NTRT", keys=keys_of(NtrtFile))
             self._read[file] = NtrtFile.from_tree(content, file)
@@ -112,8 +117,9 @@ class Assembly:
     def _add_parts(
         self, given: dict[str, Substructure], file: Path, part: str, above: tuple[Path, ...]
     ) -> None:
-        """Adds the substructures of a file. Then it rotates all of them, and then scales and moves
-        them."""
+        """Adds the substructures `given` in a file, then rotates all of them, then scales and moves
+        them. `part` is the prefix of the file's nodes; `above` are this file and the files that
+        contain it."""
         entries: list[tuple[str, int, Substructure, Place]] = []
         for names, entry in given.items():
             place = Place(file, f"substructures.{names}")
@@ -142,8 +148,9 @@ class Assembly:
     def _move(
         self, part: str, place: Place, matrix: np.ndarray, *, about: Any = None, shift: Any = 0.0
     ) -> None:
-        """Rotates and scales a substructure's nodes by a matrix (3, 3) about a point, by default
-        their centre, and then shifts them. `place` is for the error message."""
+        """Rotates and scales a substructure's nodes, whose names begin with `part`, by a matrix
+        (3, 3) about a point, by default their mean, and then adds `shift`. Raises InputError with
+        `place` if they get too far away."""
         if names := [name for name in self.nodes if name.startswith(part)]:
             p = np.array([self.nodes[name] for name in names])
             centre = p.mean(axis=0) if about is None else np.array(about)
@@ -154,29 +161,30 @@ class Assembly:
             self.nodes |= dict(zip(names, p, strict=True))
 
     def _part(self, part: str, tags: str, place: Place) -> str:
-        """Substructure inside `part` that has all `tags`. If there are several, the least nested
-        one."""
+        """Substructure inside `part` whose name has all words of `tags`. If there are several, the
+        least nested one. Raises InputError with `place` if there is none."""
         return _least_nested(self.parts, part, tags, place, f"no path of the part '{tags}'")
 
     def _node(self, part: str, path: str, place: Place) -> str:
-        """Node inside the substructure `part`, by a path such as PART.NODE. If there are several,
-        the least nested one."""
+        """Full name of the node inside the substructure `part` with a path such as PART.NODE. If
+        there are several, the least nested one. Raises InputError with `place` if there is none."""
         *parts, tags = path.split(".")
         for one in parts:
             part = self._part(part, one, place)
         return _least_nested(self.nodes, part, tags, place, f"unknown node '{path}'")
 
     def _add_pairs(self, listed: list[TaggedPair], starts: Ends) -> None:
-        """Adds pairs of nodes. `starts` are the substructures of the first and of the second
-        nodes."""
+        """Adds pairs of nodes, whose names are looked up: the first node of each pair in the first
+        substructure of `starts`, the second node in the second one."""
         for pair in listed:
             _check_size(len(self.pairs) + 1, MOST_PAIRS, pair.place)
             first, second = map(self._node, starts, pair.nodes, (pair.place, pair.place))
             self.pairs.append(pair._replace(nodes=(first, second)))
 
     def _add_bond(self, bond: str, listed: list[TaggedPair], part: str, place: Place) -> None:
-        """Adds a bond, which joins substructures by pairs of nodes. For "a/b/c/node_node", the
-        pairs join a to b and b to c. For "node_edge", see _bond_edges()."""
+        """Adds a bond, which joins substructures inside `part` by the pairs `listed`. For the bond
+        "a/b/c/node_node", each pair joins a node of a to one of b, and one of b to one of c. For
+        "node_edge", see _bond_edges()."""
         *names, kind = bond.split("/")
         _check_size(len(names), MOST_PARTS, place)
         if kind not in ("node_node", "node_edge") or len(names) < 2:
@@ -191,7 +199,8 @@ class Assembly:
                 self._add_pairs([one._replace(tags=one.tags | tags) for one in listed], starts)
 
     def _bond_edges(self, listed: list[TaggedPair], starts: Ends, place: Place) -> None:
-        """Bonds nodes of one substructure to the middles of edges NODE/NODE of another.
+        """Bonds nodes of one substructure to the middles of edges NODE/NODE of another. `starts`
+        are the two substructures, `listed` the pairs of node and edge.
 
         The second substructure is moved onto the first. Then the centres of their bonded points are
         equal, the planes of their first three points are equal, and their first points are in the
@@ -232,7 +241,8 @@ class Assembly:
 
 
 def _listed(pairs: list[Pair], tags: str, part: str, place: Place) -> list[TaggedPair]:
-    """Pairs of a list in a file. `tags` is the list's key, `place` its file and key."""
+    """The pairs of a list in a file, with their tags, substructure `part` and place. `tags` is the
+    list's key, tags with blanks between them; `place` is the list's file and key."""
     group, all_tags = " ".join(tags.split()), frozenset(tags.split())
     places = [place._replace(key=f"{place.key}[{number}]") for number in range(len(pairs))]
     return [
@@ -242,7 +252,7 @@ def _listed(pairs: list[Pair], tags: str, part: str, place: Place) -> list[Tagge
 
 
 def _check_size(count: int, most: int, place: Place) -> None:
-    """Raises InputError if a structure has more than `most` parts of a sort."""
+    """Raises InputError with `place` if `count`, such as the number of nodes, is above `most`."""
     if count > most:
         problem = f"found more than {most} in the whole structure, expected at most as many"
         raise InputError(*place, problem)
@@ -266,9 +276,10 @@ def _tags_of(path: str) -> Tags:
 
 
 def _frame(p: np.ndarray, place: Place) -> Any:
-    """Orthogonal axes (3, 3), in rows, of points (points, 3). The first is normal to the plane of
-    the first three points. The third points along this plane, from the centre to the first
-    point."""
+    """Three orthogonal unit vectors, the rows of a (3, 3) array, which follow from points
+    (points, 3). The first is normal to the plane of the first three points. The third is the
+    direction from the mean of all points to the first, projected onto this plane. Raises InputError
+    with `place` if they are not defined, such as for fewer than three points or for a line."""
     axes = np.zeros((3, 3))
     if len(p) >= LEAST_PAIRS:
         axes[0] = np.cross(p[1] - p[0], p[2] - p[0])

@@ -31,8 +31,8 @@ class Rotation(Section):
 
 
 class Substructure(Section):
-    """Part of a structure that another file describes, or several equal parts with a name such as
-    a/b/c.
+    """Part of a structure that another file describes, or several equal parts: the key a/b/c makes
+    three of them.
 
     An entry without a path rotates, scales and moves a part that another entry has added. That part
     may be nested.
@@ -72,7 +72,8 @@ class BoxParameters(RigidParameters):
 
     @property
     def radius(self) -> float:
-        """Radius of the rod with the same cross-section area."""
+        """Radius of the round rod that replaces the box, in the file's unit of length. Its
+        cross-section has the box's area, 4 width height, as both are halves in NTRT."""
         return math.sqrt(4.0 * self.width * self.height / math.pi)
 
 
@@ -122,8 +123,8 @@ the default ("" for none)."""
 
 
 class Builder(Section):
-    """Class and parameters of the rods, cables or spheres that are made from pairs or nodes with
-    certain tags."""
+    """NTRT's rule that makes rods, boxes, cables or spheres: their class and parameters. It applies
+    to pairs or nodes with certain tags."""
 
     made_as: str = Field(alias="class")
     parameters: Any = Field(default=None, validate_default=True)
@@ -144,7 +145,7 @@ class Builder(Section):
 
     @property
     def kind(self) -> str:
-        """Key of the groups in a structure file: struts, spheres or cables."""
+        """What it makes, by the key in a structure file: "struts", "spheres" or "cables"."""
         return CLASSES[self.made_as][0]
 
     @property

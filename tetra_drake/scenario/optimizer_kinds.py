@@ -14,7 +14,7 @@ MOST_GAITS = 100_000
 
 
 class SteadyState(Section):
-    """The thesis's evolutionary algorithm (Table 6, section 2.3, appendix A)."""
+    """Settings of the thesis's evolutionary algorithm (its Table 6, section 2.3, appendix A)."""
 
     population: int = Field(default=50, ge=2, le=MOST_GAITS)
     """Number of gaits in the population."""
@@ -41,11 +41,11 @@ class SteadyState(Section):
 
 
 class CmaEs(Section):
-    """Covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
+    """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
 
-    Vectors are drawn from a normal distribution that adapts to the fittest. A search that has
-    converged restarts around its best gait, with twice the population. Where a search has stalled,
-    a new one begins elsewhere.
+    Vectors of gait parameters are drawn from a normal distribution that adapts to the fittest. A
+    search that has converged restarts around its best gait, with twice the population. Where a
+    search has stalled, a new one begins elsewhere.
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
@@ -61,18 +61,18 @@ class CmaEs(Section):
 
 
 class RandomSearch(Section):
-    """Random gaits: a baseline."""
+    """Random search, a baseline for other optimisers: all gaits are random. It has no settings."""
 
 
 CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
 class QualityDiversity(Section):
-    """Search for a map of two metrics with the fittest gait in each cell (extra `qd`).
+    """Settings of a search for a map of two metrics with the fittest gait in each cell.
 
-    CMA-MAE by pyribs (Fontaine and Nikolaidis, arXiv 2205.10752). Each cell has a level of fitness,
-    which slowly follows its fittest gait. Several runs of CMA-ES look for gaits above the level of
-    their cell.
+    It needs the package's extra `qd`. The method is CMA-MAE by pyribs (Fontaine and Nikolaidis,
+    arXiv 2205.10752). Each cell has a level of fitness, which slowly follows its fittest gait.
+    Several runs of CMA-ES look for gaits above the level of their cell.
     """
 
     measures: Annotated[

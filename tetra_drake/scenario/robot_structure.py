@@ -1,15 +1,18 @@
 """Structures: robots of any shape, as data about nodes, struts, cables and oscillators.
 
-Struts of a structure that share a node are one rigid body. Cables join bodies. Coordinates are in
-the world frame (x forward, y left, z up), near a static equilibrium.
+Struts of a structure that share a node are one rigid body, and so are the parts of an entry of
+`bodies`. Cables and joints join bodies. Coordinates are in the world frame (x forward, y left, z
+up), near a static equilibrium. FORMAT.md describes the format of the files.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pydantic
@@ -17,13 +20,21 @@ from pydantic import Field
 
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch
 from tetra_drake.laws.model import WORLD
-from tetra_drake.scenario.blueprint import LONGEST, Blueprint
+from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia
 from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
+from tetra_drake.scenario.structure_graph import (
+    Member,
+    components,
+    members,
+    struts_by_name,
+    with_joints,
+)
 from tetra_drake.settings.quantities import (
     Acceleration,
     Density,
     ForceQuantity,
+    InertiaQuantity,
     Keyed,
     Length,
     Mass,
@@ -36,6 +47,13 @@ from tetra_drake.settings.section import Kinds, Section, Tree, Varied, mapped
 from tetra_drake.settings.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
+
+LEAST_MOMENT = 1e-10
+"""Least principal moment of inertia of a body, as a share of the greatest. The thinnest strut has
+about this share."""
+
+ROUNDED = 1e-12
+"""Relative error of the moments of a flat body that counts as a rounding error."""
 
 
 def _check_name(name: object) -> object:
@@ -53,6 +71,7 @@ BareLength = Annotated[Length, Field(json_schema_extra={"if": False})]
 """A length that needs no unit where the structure has one."""
 Coordinates = Annotated[list[BareLength], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
+CablePath = Annotated[list[str], Field(min_length=2, max_length=MOST_NODES)]
 AnchorAxes = Annotated[
     Literal["x", "y", "z", "xy", "xz", "yz", "xyz"],
     pydantic.BeforeValidator(lambda axes: "".join(sorted(axes)) if isinstance(axes, str) else axes),
@@ -60,14 +79,13 @@ AnchorAxes = Annotated[
         {"type": "string", "pattern": r"^(?!.*(.).*\1)[xyz]{1,3}$", "format": "some of x, y, z"}
     ),
 ]
-Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
 class StrutGroup(Section):
     """Struts with the same constants: solid cylinders with a sphere of the same density at each
     end."""
 
-    pairs: Pairs
+    pairs: Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
     """The nodes that each strut joins."""
     diameter: Length = Field(gt=0)
     """Diameter of a strut."""
@@ -108,8 +126,9 @@ class SphereGroup(Section):
 class CableGroup(CableConstants):
     """Cables with the same constants. They never push."""
 
-    pairs: Pairs
-    """The nodes that each cable joins."""
+    pairs: Annotated[list[CablePath], Field(min_length=1, max_length=MOST_PAIRS)]
+    """The nodes that each cable joins. A cable with more than two nodes, such as [a, b, c], runs
+    over frictionless rings at its inner nodes; it has one tension."""
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     """Tension per elongation."""
     free_length: Length | None = Field(default=None, ge=0)
@@ -125,8 +144,8 @@ class CableGroup(CableConstants):
         return self
 
     def law(self, distance: float) -> dict[str, float]:
-        """Constants of a cable whose nodes are at a distance (m) in the file, by the names of
-        laws.cable.CableLaw."""
+        """Constants (SI) of a cable's force law, by the names of laws.cable.CableLaw. `distance`
+        (m) is the distance of its nodes in the file; it gives the free length for a `tension`."""
         free_length = self.free_length
         if free_length is None:
             law = CableLaw(**self.constants(stiffness=self.stiffness, free_length=distance))
@@ -134,13 +153,59 @@ class CableGroup(CableConstants):
         return self.constants(stiffness=self.stiffness, free_length=free_length)
 
 
-class Member(NamedTuple):
-    """A strut or a cable of a structure file."""
+class BallJoint(Section):
+    """Ball joint: a spring and a damper hold nodes of two bodies together along all axes."""
 
-    key: str
-    """Key in the file, such as "cables.side.pairs[0]"."""
-    group: str
-    nodes: tuple[str, str]
+    nodes: Pair
+    """Nodes of two bodies at one place."""
+    stiffness: Stiffness = Field(default=1e5, gt=0)
+    """Force per distance of the two nodes."""
+    time_constant: Time = Field(default=1e-3, ge=0)
+    """Ratio of damping to stiffness. With less than 1 ms, a stiff joint vibrates, and steps are
+    short."""
+
+
+class JoinedBody(Section):
+    """Struts and nodes that are one rigid body, though they share no node. Its mass, centre and
+    inertia may be given; what is not given follows from its parts."""
+
+    struts: list[str] = Field(default=[])
+    """Groups of struts, such as cage, or single struts by group and nodes, such as cage a b."""
+    nodes: list[str] = Field(default=[])
+    """Further nodes of the body, which need no strut."""
+    mass: Mass | None = Field(default=None, gt=0)
+    """Mass of the whole body, in place of the masses of its parts."""
+    centre: Coordinates | None = None
+    """Centre of mass [x, y, z] where the nodes are as in the file."""
+    inertia: Annotated[list[InertiaQuantity], Field(min_length=3, max_length=6)] | None = None
+    """Moments of inertia [xx, yy, zz] about the centre of mass, along the axes of the file, where
+    the nodes are as in the file. [xx, yy, zz, xy, xz, yz] also has the products, which are the
+    elements of the matrix (xy is the integral of -x y dm). Without it, the inertia of the parts
+    grows in proportion to the mass."""
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> JoinedBody:
+        if not self.struts and not self.nodes:
+            refuse("struts", "found neither struts nor nodes, expected some of them")
+        if self.inertia is None:
+            return self
+        if len(self.inertia) not in (3, 6):
+            refuse("inertia", f"found {len(self.inertia)} items, expected 3 or 6")
+        xx, yy, zz, xy, xz, yz = (*self.inertia, 0.0, 0.0, 0.0)[:6]
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
+        least, middle, greatest = moments
+        if least < LEAST_MOMENT * greatest or greatest > (1.0 + ROUNDED) * (least + middle):
+            found = f"found the principal moments {', '.join(f'{m:.6g}' for m in moments)} kg*m^2"
+            expected = "expected positive ones, each at most the sum of the other two"
+            refuse("inertia", f"{found}, which no rigid body has; {expected}")
+        return self
+
+    @property
+    def given_inertia(self) -> GivenInertia:
+        """Mass, centre and inertia as the blueprint of a robot has them."""
+        centre = None if self.centre is None else np.array(self.centre)
+        inertia = None if self.inertia is None else np.array([*self.inertia, 0.0, 0.0, 0.0][:6])
+        return GivenInertia(self.mass, centre, inertia)
 
 
 class StructureFile(Section):
@@ -151,6 +216,8 @@ class StructureFile(Section):
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
     """Properties that some metrics need and this robot does not have."""
 
+    format: Literal[1] = Field(default=1, exclude=True)
+    """Version of the format of the file."""
     nodes: Keyed[Name, Coordinates] = Field(max_length=MOST_NODES)
     """Coordinates [x, y, z] of each node, near an equilibrium. A node that nothing else names is
     left out."""
@@ -159,9 +226,15 @@ class StructureFile(Section):
     struts: Keyed[Name, StrutGroup] = Field(default={})
     cables: Keyed[Name, CableGroup] = Field(default={})
     spheres: Keyed[Name, SphereGroup] = Field(default={})
+    joints: Keyed[Name, BallJoint] = Field(default={})
+    pinned: list[str] = Field(default=[], exclude=True)
+    """Nodes at which struts of several bodies are held together by ball joints. Without, struts
+    that share a node are one body. The first strut's body has the node; each other body has a copy
+    of it, such as n-2 and n-3 for n, and a joint with the same name."""
+    bodies: Keyed[Name, JoinedBody] = Field(default={})
     actuated: Keyed[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
-    """Names of the cables that each oscillator drives. The two nodes in a name may have either
-    order."""
+    """Names of the cables that each oscillator drives, such as side a b. The nodes in a name may
+    have either order."""
     masses: Keyed[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors. One at a node of no strut is a body of its own, such
     as a payload that cables hold."""
@@ -200,14 +273,16 @@ class StructureFile(Section):
         return self.blueprint().shortest
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """Further changes that follow from `changes` to a base scenario: none for structures."""
+        """Further changes that follow from `changes` to the robot `base`: none for structures, so
+        the mapping is empty. Rows of tetrahedra adapt their spacing."""
         return {}
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
 
-        Bodies and their nodes are in the order of the struts; then come other nodes with a mass or
-        a sphere. Cables are in the order of the pairs of bodies, those from fixed nodes first.
+        Bodies and their nodes are in the order of the struts; then come entries of `bodies` without
+        struts, and other nodes with a mass or a sphere. Cables are in the order of the pairs of
+        bodies, those from fixed nodes first. Cables that run over rings come after all others.
         """
         bodies = self._nodes_of_bodies()
         body_of = {node: body for body, nodes in enumerate(bodies) for node in nodes}
@@ -221,20 +296,19 @@ class StructureFile(Section):
         touching = moving if self.contacts == "all" else self.contacts
         radius, density, contact_radius = self._spheres(number, held)
 
-        struts = sorted(_members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
+        struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
-        cables = sorted(
-            _members("cables", self.cables),
-            key=lambda cable: sorted(body_of[node] for node in cable.nodes),
-        )
-        cable_ends, cable_laws = [], []
-        for cable in cables:
-            first, second = sorted(cable.nodes, key=body_of.__getitem__)
-            span = np.array(self.nodes[second]) - self.nodes[first]
-            cable_ends.append([number[first], number[second]])
-            cable_laws.append(self.cables[cable.group].law(float(np.linalg.norm(span))))
-        cable_names = tuple(" ".join((cable.group, *cable.nodes)) for cable in cables)
+        cables, paths = self._cables_in_order(body_of)
+        rings = {i: path[1:-1] for i, path in enumerate(paths) if len(path) > 2}
+        joints = [
+            [number[node] for node in sorted(joint.nodes, key=body_of.__getitem__)]
+            for joint in self.joints.values()
+        ]
+        stiffness = np.array([joint.stiffness for joint in self.joints.values()])
+        time_constants = np.array([joint.time_constant for joint in self.joints.values()])
+        joined = self._nodes_of_joined()
+        cable_names = tuple(cable.names[0] for cable in cables)
         numbers = _cable_numbers(cable_names)
         groups = [  # unknown cables are refused by _check_actuated()
             tuple(numbers[name] for name in names if name in numbers)
@@ -264,18 +338,57 @@ class StructureFile(Section):
             cable_names=cable_names,
             cable_groups=tuple(cable.group for cable in cables),
             cable_keys=tuple(cable.key for cable in cables),
-            cable_ends=np.array(cable_ends, dtype=int).reshape(-1, 2),
-            cable_laws=tuple(cable_laws),
+            cable_ends=np.array(
+                [[number[path[0]], number[path[-1]]] for path in paths], dtype=int
+            ).reshape(-1, 2),
+            cable_laws=tuple(
+                self.cables[cable.group].law(self._length(path))
+                for cable, path in zip(cables, paths, strict=True)
+            ),
+            cable_rings={
+                cable: tuple(number[node] for node in nodes) for cable, nodes in rings.items()
+            },
+            joints=np.array(joints, dtype=int).reshape(-1, 2),
+            joint_keys=tuple(f"joints.{name}" for name in self.joints),
+            joint_stiffness=stiffness,
+            joint_damping=stiffness * time_constants,
+            given_inertia={
+                body_of[joined[name][0]]: given.given_inertia for name, given in self.bodies.items()
+            },
             slack=True,
             contacts=np.array(sorted({number[node] for node in touching}), dtype=int),
             oscillators=tuple(self.actuated),
             groups=tuple(groups),
         )
 
+    def _cables_in_order(
+        self, body_of: Mapping[str, int]
+    ) -> tuple[list[Member], list[tuple[str, ...]]]:
+        """Cables in the order of a blueprint, each with its nodes from the body with the lower
+        index. `body_of` has the index of each node's body."""
+        cables = sorted(
+            members("cables", self.cables),
+            key=lambda cable: (
+                len(cable.nodes) > 2,
+                sorted(body_of[node] for node in (cable.nodes[0], cable.nodes[-1])),
+            ),
+        )
+        paths = [
+            cable.nodes[::-1] if body_of[cable.nodes[0]] > body_of[cable.nodes[-1]] else cable.nodes
+            for cable in cables
+        ]
+        return cables, paths
+
+    def _length(self, path: Sequence[str]) -> float:
+        """Length (m) of the path through nodes at their places in the file."""
+        places = [np.array(self.nodes[node]) for node in path]
+        return sum(float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(places))
+
     def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
-        """Radii, densities and contact radii (3, nodes) of the spheres at the nodes. A node has the
-        sphere of its first strut in the file, unless it has one of its own. `number` has the index
-        of each node; `held` (nodes, 3) is True along the axes of its anchor."""
+        """Radii (m), densities (kg/m^3) and contact radii (m) of the spheres at the nodes: three
+        rows (3, nodes). A node has the sphere of its first strut in the file, unless it has one of
+        its own. `number` has the index of each node by name; `held` (nodes, 3) is True along the
+        axes of its anchor. Nodes that joints hold together are held together."""
         spheres: list[tuple[list[str], StrutGroup | SphereGroup, float, float]] = []
         for bar in reversed(self.struts.values()):
             ends = [node for pair in bar.pairs for node in pair]
@@ -283,17 +396,24 @@ class StructureFile(Section):
         for own in self.spheres.values():
             spheres.append((own.nodes, own, own.diameter, own.diameter))
 
+        is_held = {name: bool(held[node, 2]) for name, node in number.items()}
+        for group in components(joint.nodes for joint in self.joints.values()):
+            is_held |= dict.fromkeys(group, any(is_held[node] for node in group))
         made = np.zeros((3, len(number)))
         for names, make, diameter, foot in spheres:
-            for node in (number[name] for name in names):
-                by_default = 0.0 if held[node, 2] else foot / 2
-                given = make.contact_radius
-                made[:, node] = diameter / 2, make.density, by_default if given is None else given
+            for name in names:
+                radius = make.contact_radius
+                if radius is None:
+                    radius = 0.0 if is_held[name] else foot / 2
+                made[:, number[name]] = diameter / 2, make.density, radius
         return made
 
     def _nodes_of_bodies(self) -> list[list[str]]:
-        """Names of the nodes of each rigid body. Struts that share a node are one body."""
-        bodies = components(pair for group in self.struts.values() for pair in group.pairs)
+        """Names of the nodes of each rigid body. Struts that share a node are one body, and so are
+        the parts of an entry of `bodies`. A node with a mass or sphere and without struts is a body
+        of its own, unless it is fixed."""
+        ends = (strut.nodes for strut in members("struts", self.struts))
+        bodies = components([*ends, *self._nodes_of_joined().values()])
         of_struts = {node for nodes in bodies for node in nodes}
         with_sphere = [node for group in self.spheres.values() for node in group.nodes]
         for node in dict.fromkeys([*self.masses, *with_sphere]):
@@ -301,22 +421,42 @@ class StructureFile(Section):
                 bodies.append([node])
         return bodies
 
+    def _nodes_of_joined(self) -> dict[str, list[str]]:
+        """Names of the nodes that each entry of `bodies` joins."""
+        if not self.bodies:
+            return {}
+        struts = [*members("struts", self.struts)]
+        named = struts_by_name(struts)
+        ends = {name: [node for i in named[name] for node in struts[i].nodes] for name in named}
+        return {
+            name: [*(node for strut in body.struts for node in ends[strut]), *body.nodes]
+            for name, body in self.bodies.items()
+        }
+
     def _names_of_bodies(self, bodies: list[list[str]], nodes: Sequence[str]) -> tuple[str, ...]:
-        """Name of each body: the group of struts that has exactly its nodes, or the part of a
-        structure of NTRT that has them, such as "vertebra1"; otherwise the names of its nodes."""
+        """Name of each body: its key in `bodies`; the group of struts that has exactly its nodes;
+        the part of a structure of NTRT that has them, such as "vertebra1"; or else the names of its
+        nodes."""
         names: dict[frozenset[str], str] = {}
         for part in {node.rpartition("/")[0] for node in nodes} - {""}:
             names[frozenset(node for node in nodes if node.startswith(f"{part}/"))] = part
         for name, group in self.struts.items():
             names[frozenset(node for pair in group.pairs for node in pair)] = name
+        for name, (node, *_) in self._nodes_of_joined().items():
+            names |= {frozenset(body): name for body in bodies if node in body}
         return tuple(names.get(frozenset(body), " ".join(body)) for body in bodies)
 
     @pydantic.model_validator(mode="before")
     @classmethod
     def _prepare(cls, tree: Any) -> Any:
-        """Refuses a group without pairs: most often a change of a group of another name. Applies
-        the key `unit` to all coordinates without a unit. Only mm is kept: other units of a robot
-        follow from its lengths."""
+        """Checks the content of a structure file before its fields are read, and completes it.
+
+        Raises InputError if a group of struts or cables has no key `pairs`. Then most often a
+        scenario meant to change a group of the file, but misspelled its name. Replaces `pinned` by
+        joints. Nodes get the unit of the key `unit` where their coordinates are bare numbers.
+        Afterwards `unit` is "mm" or None: a robot in mm is shown in mm, for others Scenario.units
+        chooses the unit by size.
+        """
         if not isinstance(tree, dict):
             return tree
         for kind in ("struts", "cables"):
@@ -328,6 +468,7 @@ class StructureFile(Section):
                 if "pairs" not in group:
                     refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, whole)}")
 
+        tree = with_joints(tree) if tree.get("pinned") else tree
         unit = tree.get("unit")
         if unit is None:
             return tree
@@ -335,48 +476,99 @@ class StructureFile(Section):
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
+
+        def with_unit(x: Any) -> Any:
+            return f"{x!r} {unit}" if type(x) in (int, float) else x
+
         tree = tree | {"unit": "mm" if unit == "mm" else None}
         if "nodes" in tree:
-            tree["nodes"] = mapped(
-                tree["nodes"], lambda x: f"{x!r} {unit}" if type(x) in (int, float) else x
-            )
+            tree["nodes"] = mapped(tree["nodes"], with_unit)
+        if isinstance(tree.get("bodies"), dict):
+            tree["bodies"] = {
+                name: body | {"centre": mapped(body["centre"], with_unit)}
+                if isinstance(body, dict) and "centre" in body
+                else body
+                for name, body in tree["bodies"].items()
+            }
         return tree
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
-        """Refuses nodes that do not exist, are joined twice or to themselves, or hang on nothing;
-        fixed nodes with a mass, sphere, load or contact; and nodes that are far away. Then checks
-        what holds for any robot, see Blueprint.check()."""
-        members = [*_members("struts", self.struts), *_members("cables", self.cables)]
-        ends = [(member.key, node) for member in members for node in member.nodes]
-        anchors = [(f"anchors.{node}", node) for node in self.anchors]
+        """Refuses unknown names, members that are there twice, nodes that hang on nothing, and two
+        entries for one body. Then checks what holds for any robot, see Blueprint.check()."""
+        self._check_names()
+        self._check_members()
+        self._check_nodes()
+        for node, place in self.nodes.items():
+            if max(map(abs, place)) > LONGEST:
+                expected = f"expected coordinates of at most {LONGEST:g} m"
+                refuse(f"nodes.{node}", f"found {place}, {expected}")
+        blueprint = self.blueprint()
+        self._check_joined(blueprint)
+        blueprint.check()
+        self._check_actuated(blueprint.cable_names)
+        return self
+
+    def _check_names(self) -> None:
+        """Refuses nodes and struts that do not exist."""
+        named = [(member.key, node) for member in self._members for node in member.nodes]
+        named += [(f"anchors.{node}", node) for node in self.anchors]
+        for kind, entries in (("joints", self.joints), ("bodies", self.bodies)):
+            for name, entry in entries.items():
+                nodes = enumerate(entry.nodes)
+                named += [(f"{kind}.{name}.nodes[{i}]", node) for i, node in nodes]
+        for key, node in (*named, *self._named_as_moving):
+            if node not in self.nodes:
+                refuse(key, f"found unknown node '{node}'; {hint(node, self.nodes)}")
+        struts = struts_by_name(members("struts", self.struts))
+        for name, body in self.bodies.items():
+            for i, strut in enumerate(body.struts):
+                if strut not in struts:
+                    found = f"found unknown strut '{strut}'; {hint(strut, struts)}"
+                    refuse(f"bodies.{name}.struts[{i}]", found)
+
+    @property
+    def _members(self) -> list[Member]:
+        return [*members("struts", self.struts), *members("cables", self.cables)]
+
+    @property
+    def _named_as_moving(self) -> list[tuple[str, str]]:
+        """Keys and names of the nodes that only a body can have."""
         moving = [(f"masses.{node}", node) for node in self.masses]
         for name, group in self.spheres.items():
             moving += [(f"spheres.{name}.nodes[{i}]", node) for i, node in enumerate(group.nodes)]
         moving += [(f"loads.{node}", node) for node in self.loads]
         if self.contacts != "all":
             moving += [(f"contacts[{i}]", node) for i, node in enumerate(self.contacts)]
-        for key, node in (*ends, *anchors, *moving):
-            if node not in self.nodes:
-                refuse(key, f"found unknown node '{node}'; {hint(node, self.nodes)}")
+        return moving
 
+    def _check_members(self) -> None:
+        """Refuses struts and cables of length 0, and those that are there twice."""
         keys: dict[object, str] = {}
-        for key, group_name, (first, second) in members:
-            if self.nodes[first] == self.nodes[second]:
+        for key, group_name, nodes in self._members:
+            if any(self.nodes[a] == self.nodes[b] for a, b in itertools.pairwise(nodes)):
                 refuse(key, "has length 0, expected nodes at two places")
-            is_cable, pair = key.startswith("cables."), frozenset([first, second])
-            earlier = keys.setdefault((group_name, pair) if is_cable else pair, key)
+            node, count = Counter(nodes).most_common(1)[0]
+            if count > 1:
+                refuse(key, f"found '{node}' {count} times, expected each node once")
+            is_cable, path = key.startswith("cables."), min(nodes, nodes[::-1])
+            earlier = keys.setdefault((group_name, path) if is_cable else path, key)
             if earlier != key:
                 where = " in a group of cables" if is_cable else ""
                 refuse(key, f"found the nodes of {earlier}, expected each pair once{where}")
 
-        bodies, joined = self._nodes_of_bodies(), {node: None for _, node in ends}
+    def _check_nodes(self) -> None:
+        """Refuses nodes that hang on nothing, and fixed nodes with a mass, sphere, load or
+        contact."""
+        joined = {node: None for member in self._members for node in member.nodes}
+        joined |= {node: None for joint in self.joints.values() for node in joint.nodes}
+        bodies = self._nodes_of_bodies()
         of_bodies = {node for nodes in bodies for node in nodes}
         for node in joined | self.anchors:
             if node not in of_bodies and self.anchors.get(node) != "xyz":
                 expected = "a node of a strut, an anchor along xyz, a mass or a sphere"
                 refuse(f"nodes.{node}", f"is on no strut, expected {expected}")
-        for key, node in moving:
+        for key, node in self._named_as_moving:
             if node not in of_bodies:
                 what = "fixed" if node in self.anchors else "unused"
                 refuse(key, f"found the {what} node '{node}', expected one that can move")
@@ -386,17 +578,28 @@ class StructureFile(Section):
             if not others and node not in joined:
                 refuse(f"nodes.{node}", "is on no strut and no cable, expected a cable to it")
 
-        for node, place in self.nodes.items():
-            if max(map(abs, place)) > LONGEST:
-                expected = f"expected coordinates of at most {LONGEST:g} m"
-                refuse(f"nodes.{node}", f"found {place}, {expected}")
-        blueprint = self.blueprint()
-        blueprint.check()
-        self._check_actuated(blueprint.cable_names)
-        return self
+    def _check_joined(self, blueprint: Blueprint) -> None:
+        """Refuses two entries of `bodies` for one body, two bodies of one name, and cables between
+        nodes that joints hold at one place."""
+        entries: dict[int, str] = {}
+        body_of = dict(zip(blueprint.node_names, blueprint.carriers.tolist(), strict=True))
+        for name, (node, *_) in self._nodes_of_joined().items():
+            earlier = entries.setdefault(body_of[node], name)
+            if earlier != name:
+                problem = f"shares a node with bodies.{earlier}, so that they are one body"
+                refuse(f"bodies.{name}", f"{problem}, expected one entry for it")
+        (name, count), *_ = Counter(blueprint.bodies).most_common(1)
+        if count > 1:
+            key = f"bodies.{name}" if name in self.bodies else f"nodes.{name}"
+            refuse(key, f"found {count} bodies of this name, expected another name for one of them")
+        places = blueprint.places[blueprint.segments.ends]
+        for piece in np.flatnonzero(places[:, 0] == places[:, 1])[:1]:
+            key = blueprint.cable_keys[blueprint.segments.cable[piece]]
+            refuse(key, "has length 0 between nodes of a joint, expected nodes at two places")
 
     def _check_actuated(self, cable_names: Sequence[str]) -> None:
-        """Refuses an unknown cable, or one that has an oscillator already."""
+        """Raises InputError if `actuated` names a cable that is not among `cable_names`, the names
+        of all cables, or gives a cable to a second oscillator."""
         numbers, drivers = _cable_numbers(cable_names), dict[int, str]()
         for oscillator, names in self.actuated.items():
             for i, name in enumerate(names):
@@ -418,31 +621,11 @@ scenario.metrics), `unit`, `blueprint()` and `implied_changes()`.
 """
 
 
-def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterator[Member]:
-    for name, group in groups.items():
-        for place, (first, second) in enumerate(group.pairs):
-            yield Member(f"{key}.{name}.pairs[{place}]", name, (first, second))
-
-
 def _cable_numbers(names: Iterable[str]) -> dict[str, int]:
-    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its two
-    nodes in either order."""
+    """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
+    in either order."""
     numbers: dict[str, int] = {}
     for number, name in enumerate(names):
-        group, first, second = name.split()
-        numbers[name] = numbers[f"{group} {second} {first}"] = number
+        group, *nodes = name.split()
+        numbers[name] = numbers[" ".join((group, *nodes[::-1]))] = number
     return numbers
-
-
-def components(pairs: Iterable[Sequence[str]]) -> list[list[str]]:
-    """Connected components of the graph with the pairs as edges, each a list of nodes; in the order
-    of the pairs."""
-    first_node: dict[str, str] = {}
-    for pair in pairs:
-        start, joined = (first_node.setdefault(node, node) for node in pair)
-        if start != joined:
-            first_node |= {node: start for node, old in first_node.items() if old == joined}
-    groups: dict[str, list[str]] = {}
-    for node, start in first_node.items():
-        groups.setdefault(start, []).append(node)
-    return [*groups.values()]

@@ -68,8 +68,8 @@ class RowCables(CableConstants):
     """True if a cable pulls only while it is stretched; otherwise it also pushes (Eq. 6)."""
 
     def law(self, cable: str) -> dict[str, float]:
-        """Constants of one cable of a junction, such as "outer top", by the names of
-        laws.cable.CableLaw."""
+        """Constants (SI) of the force law of one cable of a junction, such as "outer top", by the
+        names of laws.cable.CableLaw."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
         return self.constants(stiffness=stiffness, free_length=self.free_length)
 
@@ -185,8 +185,9 @@ class Tetrahedra(Section):
         )
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """Further changes that follow from `changes` to a base scenario: `spacing: balanced` if
-        strut length or cables changed and no spacing was given."""
+        """Further changes that follow from `changes`, which made this robot from the robot `base`:
+        {"spacing": "balanced"} if strut length or cables differ and `changes` has no spacing;
+        otherwise none."""
         if not isinstance(base, Tetrahedra) or "spacing" in changes:
             return {}
         deciding = []  # strut length, and all constants of cables at rest
@@ -198,7 +199,8 @@ class Tetrahedra(Section):
     @field_validator("spacing")
     @classmethod
     def _balance(cls, spacing: float, info: ValidationInfo) -> float:
-        """Spacing s (m) at which the cables of a junction balance along x, if none is given.
+        """The given spacing (m) or, if it is 0, the spacing s at which the cables of a junction
+        balance along x.
 
         Three outer cables of length s pull two tetrahedra together. Three inner cables, from a tip
         at distance h to base nodes at distance s and radius R, push them apart if s < h. The weight

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -69,6 +69,8 @@ class Scenario(Section):
 
     keys_of_files: ClassVar = {"base": "Name or file of a scenario that has the other values."}
 
+    format: Literal[1] = 1
+    """Version of the format of the file."""
     name: str
     """Label of the scenario; equal scenarios may have different names."""
     robot: RobotKind
@@ -126,8 +128,9 @@ class Scenario(Section):
     def differences(self, base: Scenario) -> list[tuple[str, str]]:
         """Keys and values that differ from `base`, in the unit that needs the fewest digits.
 
-        A value that only `base` has is "none". It is left out if the kinds of the section differ.
-        The list is empty exactly if the scenarios are equal.
+        The values are this scenario's, as text. A value that only `base` has is "none"; it is left
+        out if its section is of another kind in `base`, such as another law of friction. The list
+        is empty exactly if the scenarios are equal, apart from their names.
         """
         ours, theirs = self.values(), base.values()
         kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs[key]]
@@ -154,13 +157,13 @@ class Scenario(Section):
     def values(self) -> dict[str, Any]:
         """Values by dotted keys, without the scenario's name. Scenarios with the same values are
         equal; the name is only a label."""
-        return flattened(self.model_dump(exclude={"name"}))
+        return flattened(self.model_dump(exclude={"format", "name"}))
 
     @property
     def units(self) -> Units:
-        """Units of this scenario in texts, pages and figures: the units of units.shown_in(); mm if
-        its robot is given in mm; otherwise those that need the fewest digits for the long lengths
-        of its robot."""
+        """Units of this scenario in texts, pages and figures: the units that units.shown_in()
+        sets, if it is in use; otherwise mm if the robot is given in mm; otherwise the units that
+        need the fewest digits for the long lengths of the robot."""
         robot = self.robot
         return current(SYSTEMS[robot.unit] if robot.unit else fitting(robot.lengths))
 
@@ -182,7 +185,8 @@ class Scenario(Section):
 
     @property
     def lacking(self) -> tuple[str, ...]:
-        """Properties that some metrics need and this robot does not have; see scenario.metrics."""
+        """Properties that some metrics need and this scenario's robot or actuators do not have,
+        such as "row of tetrahedra". Such metrics are NaN."""
         return *self.robot.lacking, *self.actuation.lacking
 
     @property
@@ -208,8 +212,12 @@ class Scenario(Section):
         return self.with_file(tree_of_changes(changes, source), source)
 
     def with_file(self, changes: Tree, source: object) -> Self:
-        """Scenario of a file that has this scenario as its base. `changes` is the file's content;
-        see changes.merged()."""
+        """A checked copy with the settings of a scenario file whose `base` is this scenario.
+
+        `changes` is the parsed content of the file, without `base`: nested mappings with the keys
+        that differ, quantities with units. See changes.merged() for the rules. Raises InputError
+        that names `source`, such as the file, and key.
+        """
         changes = with_structure(changes, source)
         tree = merged(self.model_dump(), changes)
         changed = self.from_tree(tree, source)
@@ -218,18 +226,19 @@ class Scenario(Section):
         return self.from_tree(merged(tree, {"robot": implied}), source) if implied else changed
 
     def on_engine(self, name: str | None) -> Self:
-        """This scenario on the engine of this name, such as "compiled". It keeps its own settings
-        if it is on this engine or there is no name; otherwise the engine has default settings."""
+        """This scenario with the engine called `name`, such as "compiled", in its default settings.
+        If the scenario has this engine already, or `name` is None, nothing changes."""
         if name in (None, self.engine_name):
             return self
         return self.with_changes({"engine": {TAG: str(name).capitalize()}})
 
     def with_sections(self, **sections: Any) -> Self:
-        """A copy with other sections. They are not checked."""
+        """A copy with other sections, such as terrain=Flat(). They are not checked."""
         return self.model_copy(update=sections)
 
     def with_numbers(self, numbers: Mapping[str, float]) -> Self:
-        """A copy with other SI numbers by dotted keys. They are not checked."""
+        """A copy with other numbers in SI units by dotted keys, such as {"ground.stiffness": 5e3}.
+        They are not checked."""
         changed = self
         for key, number in numbers.items():
             changed = _with_number(changed, key.split("."), number)
@@ -243,7 +252,8 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _check_combinations(self) -> Self:
-        """Refuses settings from different sections that do not go together."""
+        """Raises InputError, naming a key, for settings of different sections that do not go
+        together, such as a sample period too short for the memory."""
         simulation, step = self.simulation, self.cpg.listing_step
         if step > simulation.duration:
             expected = f"expected at most the duration, {simulation.duration} s"
@@ -284,7 +294,8 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _check_disturbances(self) -> Self:
-        """Refuses disturbances whose largest changes would make a number invalid."""
+        """Raises InputError if `disturbances` name no number of the scenario, or if their largest
+        changes would make a number invalid."""
         if self.disturbances is None:
             return self
         undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
@@ -321,7 +332,8 @@ def _text(value: Any, *, exact: bool = False) -> str:
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
-    """A copy of a section or mapping with another number at the path `names`."""
+    """A copy of a section or mapping with another number at the path `names`: the parts of a dotted
+    key, such as ["ground", "stiffness"]."""
     if not names:
         return number
     name, *rest = names

@@ -31,8 +31,8 @@ any."""
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
     """Reads a structure: a shipped one by name, or a structure file or file of NTRT by path.
 
-    `unit`, such as "dm", is the unit of coordinates without a unit. A file of NTRT needs it. Raises
-    InputError that names file and key.
+    `unit`, such as "dm", is the unit of length of coordinates without a unit. A file of NTRT (NASA
+    Tensegrity Robotics Toolkit) needs it. Raises InputError that names file and key.
     """
     file = structure_file(str(name_or_file), Path())
     if not os.path.exists(file):
@@ -81,7 +81,8 @@ def with_structure(tree: Tree, source: object) -> Tree:
 
 
 def _structure(content: Any, file: Path) -> StructureFile:
-    """Structure from the content of a file. Nodes that are left out are noted in the log."""
+    """Structure from the parsed content of a file. A warning in the log names the nodes that
+    nothing uses. Raises InputError that names `file` and key."""
     structure = StructureFile.from_tree(content, file)
     used = structure.blueprint().node_names
     if unused := [node for node in structure.nodes if node not in used]:
@@ -90,8 +91,8 @@ def _structure(content: Any, file: Path) -> StructureFile:
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
-    """Content of a structure file, or of a file of NTRT converted to one. If the `unit` of NTRT is
-    missing, the error names `source` and `key`."""
+    """Content of a structure file, or of a file of NTRT converted to one. `unit` is the unit of
+    length of a file of NTRT. If it is missing or wrong, InputError names `source` and `key`."""
     keys = keys_of(StructureFile) | keys_of(NtrtFile)
     content = read_mapping(file, "structure file", keys=keys)
     if not KEYS_OF_NTRT & content.keys():

@@ -14,15 +14,19 @@ from yamlcore.loader import CommonResolver
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.refusals import TAG, described
 from tetra_drake.settings.section import Tree
 
 LARGEST_YAML = 2**20
 """Largest size of a file in bytes."""
 
+FORMAT = 1
+"""Version of the format of scenario files and structure files, see FORMAT.md."""
+
 
 def parse_yaml(content: str, source: object) -> Any:
-    """Content of a YAML text. Raises InputError if it is not YAML."""
+    """Content of a YAML text. A tag such as `!Coulomb` becomes a key of its mapping. Raises
+    InputError, naming `source`, if the text is not YAML."""
     # The file may be a private one, so errors show neither its lines nor its names.
     try:
         return yaml.load(content, _Loader)
@@ -38,15 +42,18 @@ def parse_yaml(content: str, source: object) -> Any:
 
 
 def read_mapping(file: Path, what: str, *, keys: Collection[str]) -> Tree:
-    """Content of a YAML file: a mapping with some of `keys`. `what` is the kind of file, such as
-    "scenario file", for error messages.
+    """Content of a YAML file: a mapping with at least one of `keys`; it may have others. `what` is
+    the kind of file, such as "scenario file", for error messages.
 
-    Raises InputError for another content. The file may be a private one, so the error does not show
-    its content.
+    Raises InputError for another content, or for another version of the format. The file may be a
+    private one, so the error does not show its content.
     """
     content = parse_yaml(read_text(file, what, most=LARGEST_YAML), file)
     if not isinstance(content, dict):
         raise InputError(file, "", f"holds no mapping of keys, expected a {what}")
+    version = content.get("format", FORMAT)
+    if type(version) is not int or version != FORMAT:
+        raise InputError(file, "format", f"found {described(version)}, expected {FORMAT}")
     if content.keys().isdisjoint(keys):
         problem = f"has none of the keys of a {what}, expected some of {', '.join(keys)}"
         raise InputError(file, "", problem)
@@ -106,8 +113,9 @@ class _Loader(yamlcore.CoreLoader):
 
 
 def _expanded(node: yaml.Node, sizes: dict[int, int]) -> int:
-    """Number of values in a node, with the values of the nodes that its aliases name. `sizes` has
-    the numbers of the nodes that are counted already, by id."""
+    """Number of values in a YAML node: itself and all values in it. What an alias names counts at
+    every use. `sizes` has the numbers of the nodes counted already, by Python's id(), and gets the
+    new ones."""
     if id(node) not in sizes:
         sizes[id(node)] = 1  # for an alias of what holds it
         inner = node.value if isinstance(node, yaml.CollectionNode) else []

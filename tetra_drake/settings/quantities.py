@@ -32,10 +32,12 @@ class Quantity(float):
 
 
 def quantity(unit: str, **words: float) -> tuple[Any, ...]:
-    """Annotations that make `float` the type of a quantity in an SI unit, for pydantic.
+    """Annotations that make `float` the type of a quantity in an SI unit, for pydantic, such as
+    Annotated[float, *quantity("N/m")].
 
     Texts such as "25 lbf/in" are converted. `words` are further texts that stand for numbers, such
-    as balanced=0. In a file, numbers without a unit are refused, except 0.
+    as balanced=0. In a file, numbers without a unit are refused, except 0. From Python they are
+    accepted, in SI.
     """
     expected = f"expected a quantity that converts to {unit}"
 
@@ -63,6 +65,7 @@ def quantity(unit: str, **words: float) -> tuple[Any, ...]:
 Length = Annotated[float, *quantity("m")]
 Angle = Annotated[float, *quantity("rad")]
 Mass = Annotated[float, *quantity("kg")]
+InertiaQuantity = Annotated[float, *quantity("kg*m^2")]
 Density = Annotated[float, *quantity("kg/m^3")]
 Time = Annotated[float, *quantity("s")]
 Frequency = Annotated[float, *quantity("Hz")]
@@ -96,8 +99,9 @@ def by_name(
 ) -> tuple[Any, ...]:
     """Annotations for a mapping from known names, such as metrics, to numbers with units.
 
-    `units` has the SI unit of each name, or "" for a number without a unit. By default a value is
-    a number; `value` makes another type from it, such as a list of numbers.
+    `units` has the SI unit of each name, or "" for a number without a unit. By default each value
+    is a number. Otherwise `value` turns the type of the number into the type of the value, such as
+    a list of numbers.
     """
     numbers = {
         name: Annotated[float, *quantity(unit)] if unit else float for name, unit in units.items()

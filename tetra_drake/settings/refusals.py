@@ -37,9 +37,10 @@ def refuse(key: str, problem: str) -> NoReturn:
 def input_error(
     error: ValidationError, section: type[BaseModel], tree: Any, source: object, key: str = ""
 ) -> InputError:
-    """Converts pydantic's error to an InputError that names `source` and key.
+    """Converts pydantic's error to an InputError that names `source`, such as a file, and key.
 
-    `tree` is the content of the section, and `key` is the dotted key of the section in `source`.
+    `section` is the class that refused its content `tree`. `key` is the dotted key of the section
+    in `source`; the error's key is appended to it.
     """
     # An unknown key tells why another is missing. A value that fits no member of a union has an
     # error per member: the innermost tells most, then one that is not about the type.
@@ -81,16 +82,20 @@ _UNKNOWN = "extra_forbidden", "invalid_key"
 
 
 def members_of(node: Tree, schema: Tree) -> list[Tree]:
-    """Alternative types that a node of a JSON Schema allows: members of its union, or its only
-    type. A reference to a section is replaced by the section's schema."""
+    """Alternative types that a node of a JSON Schema allows: members of its union (anyOf), or its
+    only type. A reference to a section is replaced by the section's schema, from the definitions
+    ($defs) of the whole `schema`."""
     sections = {"": {}} | schema.get("$defs", {})
     members = node.get("anyOf", [node])
     return [sections[one.get("$ref", "").rpartition("/")[2]] | one for one in members]
 
 
 def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, Tree]]:
-    """Dotted keys of a section in a JSON Schema, each with the schema of its value. NAME in a key
-    stands for a name that the user chooses."""
+    """Dotted keys of a section, nested ones included, each with the JSON Schema of its value.
+
+    `section` is the section's part of the whole `schema`. `key` is put before all keys. NAME in a
+    key stands for a name that the user chooses.
+    """
     for name, node in section.get("properties", {}).items():
         item = node.get("additionalProperties")
         inner = joined(key, f"{name}.NAME" if item else name)
@@ -101,9 +106,12 @@ def keys_in(section: Tree, schema: Tree, key: str = "") -> Iterator[tuple[str, T
 
 
 def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
-    """Schemas of the types that an item of a value may have. `members` are the types of the value
-    itself. `part` is the key or index of the item. If `part` is the value's tag, the result is the
-    type with this tag; for any other name it is `members`."""
+    """JSON Schemas of the types that an item of a value may have, in a list.
+
+    `members` are the types that the value itself may have; `schema` is the whole JSON Schema.
+    `part` is the key or index of the item. If `part` is a tag, the result is the one of `members`
+    with this tag. If it is neither a tag, key nor index, the result is `members`.
+    """
     for member in members:
         if member.get("title") == f"!{part}":
             return [member]
@@ -115,8 +123,9 @@ def _inner(part: str | int, members: list[Tree], schema: Tree) -> list[Tree]:
 
 
 def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str, str]:
-    """Key within the wrong value, and problem in words, for one of pydantic's errors. `members` are
-    the types that the value may have, from the JSON Schema."""
+    """Key and problem in words, for one of pydantic's errors about `value`. The key is relative to
+    the value, and "" if the value itself is wrong. `members` are the types that the value may have,
+    from the JSON Schema."""
     kind, context, found = error["type"], error.get("ctx", {}), f"found {described(value)}"
     if kind == "value_error":
         cause = context["error"]
@@ -163,6 +172,6 @@ def hint(name: Any, names: Iterable[str]) -> str:
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
-    """Error text with advice, for a name that is neither shipped nor a file. `what` is a kind of
-    file, such as "scenario file"."""
+    """Error text with advice, for a `name` that is neither a file nor one of the names `shipped`
+    with the package. `what` is a kind of file, such as "scenario file"."""
     return f"no such {what}; {hint(name.rpartition('/')[2], shipped)}"

@@ -47,7 +47,8 @@ class Units:
     def of(self, unit: str) -> tuple[float, str]:
         """Unit that replaces an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name.
 
-        A unit with other dimensions than length, force, angle and time is returned as it is.
+        A unit with other dimensions than length, force, angle and time is returned as it is, with
+        the size 1. So is a unit that contains N, if the unit of force is N.
         """
         names = {"m": self.length_name, "N": self.force_name, "rad": "deg", "s": "s"}
         words = re.findall("[A-Za-z]+", unit)
@@ -95,8 +96,9 @@ def current(own: Units) -> Units:
 
 @functools.lru_cache(maxsize=1000)
 def fitting(lengths: tuple[float, ...]) -> Units:
-    """Units that show lengths (m) with the fewest digits. Lengths below a quarter of the longest do
-    not count. If the lengths are round in no unit, as in a turned robot, the units are metric."""
+    """The units of SYSTEMS that show lengths (m) with the fewest digits. Lengths below a quarter of
+    the longest do not count. If the lengths are round in no unit, such as in a robot whose nodes
+    were rotated, the unit is cm."""
     least = _LONG * max(map(abs, lengths), default=0.0)
     long = [abs(length) for length in lengths if abs(length) >= least]
     return min(
@@ -161,7 +163,8 @@ def quantity_to_si(text: str, unit: str) -> float:
 
 
 def given_quantity(text: str, unit: str, source: object, key: str) -> float:
-    """Reads a quantity like quantity_to_si(). Raises InputError that names `source` and key."""
+    """Reads a quantity like quantity_to_si(), but raises InputError that names `source`, such as a
+    file, and the `key` of the quantity there."""
     try:
         return quantity_to_si(text, unit)
     except ValueError as error:
@@ -169,7 +172,8 @@ def given_quantity(text: str, unit: str, source: object, key: str) -> float:
 
 
 def plainest(number: float, unit: str) -> str:
-    """Text of an SI number in the unit that needs the fewest digits, such as "20 ms"."""
+    """Text of an SI number in the SI, metric or inch unit that needs the fewest digits, such as "20
+    ms". Six significant digits are kept."""
     if number == 0.0:
         return "0"
     candidates = [INCHES.of(unit), *_SMALL.get(unit, []), (1.0, unit.removeprefix("1"))]
@@ -178,7 +182,8 @@ def plainest(number: float, unit: str) -> str:
 
 
 def shortest(number: float, unit: str) -> str:
-    """Text of plainest() if it reads as exactly the same number; otherwise the exact SI number."""
+    """Text of plainest() if quantity_to_si() reads it as exactly the same number. Otherwise the
+    number with all digits, in the SI unit."""
     exact = f"{number!r} {unit}"
     text = plainest(number, unit)
     return text if " " in text and quantity_to_si(text, unit) == number else exact

@@ -104,7 +104,8 @@ def compare(
     reach: float | None = None,
     labels: Sequence[str] | None = None,
 ) -> Compared:
-    """Compares how well evolution runs with the same objective search, finished or not.
+    """Compares evolution runs with the same objective, finished or not: the fitness that their
+    trials reach, over the number of simulations.
 
         >>> compared = td.compare(["runs/demo", "runs/other"], reach=0.3)
         >>> compared.trials[["run", "fitness", "reached"]], compared.improvement, compared.notes
@@ -166,7 +167,7 @@ def compare_scenarios(
     labels: Sequence[str] | None = None,
 ) -> dict[str, Compared]:
     """Compares runs within each scenario: groups the folders by the name of their scenario and
-    returns compare() of each group, by that name.
+    returns compare() of each group, by that name. For `reach` and `labels`, see compare().
 
     Raises InputError like compare(), and if no scenario has two of the runs.
     """
@@ -298,8 +299,8 @@ def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
 
 
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
-    """The row of Compared.runs for one run, by column: medians, means and intervals of its
-    trials."""
+    """The row of Compared.runs for one run, by column: medians, means and intervals of its trials.
+    Input: the table of _trials()."""
     going_on, cost = int((~trials["ended"]).sum()), trials["cost"].median()
     row: dict[str, Any] = {"trials": len(trials), "going_on": going_on, "cost": cost}
     for name in ("at_common", "fitness", "distance"):
@@ -315,7 +316,8 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:
     """Notes on runs whose scenario differs from the first run's in more than the settings of the
-    search (evolution, optimizer). Raises InputError if objectives differ."""
+    search (evolution, optimizer). `runs` are by their labels. Raises InputError if objectives
+    differ."""
     notes, objectives = [], []
     (first, base), *_ = runs.items()
     for label, run in runs.items():
@@ -374,7 +376,8 @@ def comparison_text(compared: Compared) -> str:
 
 
 def improvement_text(improvement: pandas.DataFrame) -> str:
-    """Table of the probabilities in Compared.improvement, with their confidence intervals."""
+    """Text for the terminal: table of the probabilities in Compared.improvement, with their
+    confidence intervals."""
     cells = {}
     for pair, row in improvement.iterrows():
         probability, low, high = (fixed(row[name]) for name in ("probability", "low", "high"))
@@ -390,7 +393,8 @@ def improvement_text(improvement: pandas.DataFrame) -> str:
 
 def save_comparison(compared: Compared, folder: Path, printed: Print = AS_USUAL) -> list[str]:
     """Writes trials.csv, curves.csv, summary.json and the figure to a folder. Lengths are in m;
-    infinite and unknown numbers of the summary are null.
+    infinite and unknown numbers of the summary are null. `printed` has the look and the file types
+    of the figure.
 
     Returns the names of the files. Raises InputError if a file cannot be written.
     """

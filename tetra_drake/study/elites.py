@@ -45,10 +45,10 @@ def elites(run: Run) -> pandas.DataFrame:
     """Elites of a run, the fittest gait of each cell of its map, over all trials. The fittest is
     first; the table is empty if the optimiser makes no map.
 
-    A row is a row of Run.evaluations with more columns: cell_1 and cell_2 (numbers of the cell,
-    from 0), kept (share of disturbance draws where the gait loses at most 10 % of its distance
-    and meets the requirements), mean_distance (m, on disturbed robots). The last two are NaN if the
-    gait was not simulated on disturbed robots.
+    A row is a row of Run.evaluations with more columns: cell_1 and cell_2 (index of the cell along
+    each of the two metrics, from 0), kept (share of disturbance draws where the gait loses at most
+    10 % of its distance and meets the requirements), mean_distance (m, on disturbed robots). The
+    last two are NaN if the gait was not simulated on disturbed robots.
     """
     table, kind = run.with_parameters, run.scenario.optimizer
     lines = [line.content() for line in run.file(ELITES).read()]
@@ -71,7 +71,8 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
     folder; see robustness().
 
     An elite is the fittest gait of a cell of the map. The optimiser's settings in the scenario set
-    the number of draws of disturbances. Elites with a recorded result are skipped.
+    the number of draws of disturbances; without draws or a map, nothing is done. Elites with a
+    recorded result are skipped. `workers` is the number of threads.
     """
     manifest = read_manifest(directory)
     kind, file = manifest.scenario.optimizer, RecordFile.of(directory, manifest.run, ELITES)
@@ -97,8 +98,9 @@ def judge_elites(directory: Path, *, workers: int | None = None) -> None:
 
 
 def kept_gaits(gaits: pandas.DataFrame) -> pandas.DataFrame:
-    """Elites that are robust in at least half of the disturbance draws, the fittest first. Elites
-    not simulated on disturbed robots are kept. A row per elite, as elites() returns it."""
+    """Rows of `gaits`, a table from elites(), without the elites whose column `kept` (share of the
+    disturbance draws where they are robust) is below one half. Elites not simulated on disturbed
+    robots stay."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 
@@ -118,8 +120,8 @@ def notable_gaits(run: Run) -> dict[str, pandas.Series]:
 
 
 def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
-    """Gaits without repetitions: the same gait under several names becomes one item, its list of
-    names and its row of evaluations."""
+    """Gaits without repetitions: a list of pairs, the names of a gait and its row of
+    Run.evaluations. `named` has such a row by name; a gait may have several names."""
     names: dict[Any, list[str]] = {}
     for name, gait in named.items():
         names.setdefault((gait["trial"], gait["index"]), []).append(name)

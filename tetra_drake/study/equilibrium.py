@@ -157,7 +157,9 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
 
 def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness matrix K and mass matrix M of small motions M x'' = -K x about the equilibrium,
-    without damping. x has six coordinates per body, as displaced() takes them. Returns K and M."""
+    without damping. x has six coordinates per body in m, in the world frame: a rotation vector
+    times `unactuated.radius`, then a translation. Returns K and M. The forces of `unactuated` are
+    overwritten."""
     state = robot.equilibrium.state
     force_at_rest(unactuated, state)
     rigid = stiffness_at_rest(unactuated).toarray()
@@ -166,8 +168,8 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
-    """Robot of a structure file or of a scenario, on flat ground, with forces as actuators, so that
-    MuJoCo can simulate it. A structure gets Coulomb friction.
+    """Robot of a structure file or of a scenario, on flat ground, so that MuJoCo can simulate it:
+    each actuator is an ideal force. A structure gets Coulomb friction.
 
     A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
     for it. A file of the NASA Tensegrity Robotics Toolkit (NTRT) has bare numbers, so it needs a
@@ -274,8 +276,8 @@ def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> st
 
 
 def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
-    """Writes a page that shows the robot in equilibrium. Raises InputError if the page cannot be
-    written."""
+    """Writes an HTML page that shows the robot in equilibrium in 3D. Raises InputError if the page
+    cannot be written."""
     robot = study.robot
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
     modes = np.zeros((2, len(loads), MODE_COLUMNS))

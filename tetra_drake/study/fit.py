@@ -147,13 +147,13 @@ def fit_values(
     Args:
         scenario: the scenario whose values are the start.
         measurements: the measurements, of the kinds MotionCapture and Rest.
-        parameters: the bounds, least and most, by scenario key of the value to fit. Keys joined by
-            commas get the same value.
-        search: searches all values within the bounds for a better start, by CMA-ES.
+        parameters: the bounds, least and most, by scenario key of the value to fit: texts with
+            units, or numbers in SI. Keys joined by commas get the same value.
+        search: True to search all values within the bounds for a better start, by CMA-ES.
         folder: folder for the predictions of each simulated point. Another fit to the same data
             reads them in place of a simulation.
         say: function that gets a line of text after each iteration.
-        source: file with the parameters, for errors.
+        source: file with the parameters, to name in errors.
 
     Raises:
         InputError: if an argument cannot be used, or the start cannot be simulated.
@@ -214,8 +214,9 @@ def _searched(problem: FitProblem, start: np.ndarray) -> np.ndarray:
 
 
 def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: float) -> Fit:
-    """The Fit that led from the point `start` (n,) to the solution `x` (n,), with intervals and
-    warnings. Points are in the dimensionless parameters of FitProblem; `wall_time` is in s."""
+    """Result of a fit that began at the point `start` (n,) and ended at the solution `x` (n,), with
+    intervals and warnings. Points are in the dimensionless parameters of FitProblem; `wall_time` is
+    in s."""
     first, last = problem.residuals(start), problem.residuals(x)
     misfit, jacobian = problem.misfit(last), problem.jacobian(x)
     half, correlation = _uncertainty(problem, jacobian, misfit)
@@ -254,8 +255,8 @@ def _uncertainty(
     is wider than the bounds; and correlations (n, n) of the values.
 
     `jacobian` (numbers, n) is FitProblem.jacobian() at the fitted point, `misfit` the sum of
-    squared residuals per degree of freedom. Where it exceeds 1, the intervals are wider by its
-    root.
+    squares of the weighted residuals per degree of freedom. Where it exceeds 1, the intervals are
+    wider by its root.
     """
     width = problem.bounds[1] - problem.bounds[0]
     _, singular, rows = np.linalg.svd(jacobian * width, full_matrices=False)
@@ -301,8 +302,9 @@ def _warnings(
 
 
 def save_fit(fit: Fit, folder: Path) -> list[str]:
-    """Writes the scenario with the fitted values, tables, the figure of the residuals and a page to
-    a folder. Returns the names of the files. Raises InputError if one cannot be written."""
+    """Writes the scenario with the fitted values, tables, the figure of the residuals and a
+    Markdown page to a folder. Returns the names of the files. Raises InputError if one cannot be
+    written."""
     save_scenario(folder, fit.scenario)
     tables = {
         "parameters": fit.parameters.reset_index(),

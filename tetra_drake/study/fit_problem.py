@@ -62,8 +62,9 @@ class Parameter(NamedTuple):
 
 
 def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -> Parameter:
-    """Parameter for a scenario key, within its bounds. Raises InputError, naming `source`, if key
-    or bounds cannot be used."""
+    """Parameter for a scenario key; its start is the scenario's value. `bounds` are the least and
+    the greatest value: texts with units, or numbers in SI. Raises InputError, naming `source`, if
+    key or bounds cannot be used."""
     place = f"parameters.{key}"
     values = scenario.model_dump()
     starts = [value_at(values, each) for each in separate(key)]
@@ -163,7 +164,7 @@ class FitProblem:
 
     def sums_of_squares(self, points: np.ndarray) -> np.ndarray:
         """Sums (k,) of the squares of the weighted residuals at k points (k, n), which are
-        simulated in parallel; a huge number where a simulation fails."""
+        simulated in parallel; 1e200 where a simulation fails."""
         self._evaluate(list(points))
         residuals = np.array([self.residuals_at(point) for point in points])
         return np.nan_to_num((residuals**2).sum(axis=1), nan=HUGE)
@@ -187,8 +188,8 @@ class FitProblem:
         return np.column_stack(columns)
 
     def misfit(self, residuals: np.ndarray) -> float:
-        """Sum of the squared weighted residuals per degree of freedom, about 1 for a right
-        model."""
+        """Sum of the squares of these weighted residuals (numbers,) per degree of freedom, about 1
+        for a right model."""
         return float(residuals @ residuals) / max(1, residuals.size - len(self.parameters))
 
     def tell(self, residuals: np.ndarray) -> None:
@@ -225,14 +226,14 @@ class FitProblem:
                 write_whole(files[name], _seal(name, numbers.tobytes()) + numbers.tobytes())
 
     def _name(self, x: np.ndarray) -> str:
-        """Name of the evaluation of a point, and of its file: a digest of the data, keys and
-        values."""
+        """Name of the evaluation of a point, and of its file: a hexadecimal digest of the data, and
+        of keys and values of the parameters."""
         keys = [parameter.key for parameter in self.parameters]
         text = f"{self.digest} {keys} {(x * self.scale).tolist()}"
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
 def _seal(name: str, content: bytes) -> bytes:
-    """Digest (SEAL bytes) of the name and the content of an evaluation's file, by which a damaged
-    file is found."""
+    """Digest (SHA-256, 32 bytes) of the name and the content of an evaluation's file, by which a
+    damaged file is found."""
     return hashlib.sha256(name.encode() + content).digest()

@@ -54,7 +54,7 @@ _SIZE, _UNCERTAINTY = Field(ge=-MOST, le=MOST), Field(ge=LEAST, le=MOST)
 
 
 class Prediction(NamedTuple):
-    """Numbers that one scenario predicts for one measurement, to compare with the measured ones."""
+    """Numbers that one scenario predicts for one measurement, in the order of the measured ones."""
 
     values: np.ndarray
     """Numbers (numbers,) in SI; NaN if there is none."""

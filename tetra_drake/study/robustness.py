@@ -97,9 +97,10 @@ class Judgement:
     relative change of the key), draw (the draw that start or terrain seed are taken from)."""
 
     def compared(self, table: pandas.DataFrame) -> pandas.DataFrame:
-        """A table of this Judgement with three more columns: undisturbed (distance of the same gait
-        without disturbances, m), change (distance minus undisturbed), kept (True if the gait loses
-        at most 10 % of the undisturbed distance and meets the requirements)."""
+        """A copy of `table`, one of the tables of this Judgement, with three more columns:
+        undisturbed (distance of the same gait without disturbances, m), change (distance minus
+        undisturbed, m), kept (True if the gait loses at most 10 % of the undisturbed distance and
+        meets the requirements)."""
         before = table["gait"].map(self.undisturbed.set_index("gait")["distance"])
         change = table["distance"] - before
         kept = (change >= -LOSS * before.abs()) & (table["missed"] == "")  # False where NaN
@@ -107,9 +108,9 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Default disturbances: a spread of `percent` for all uncertain numbers of a scenario, and for
-    the initial positions. A number is uncertain if its setting is declared as Varied in the
-    code."""
+    """Default disturbances: each uncertain number of a scenario gets a random factor within
+    1 ± percent / 100. Each body starts displaced along each axis, by up to this share of the
+    shortest strut. A number is uncertain if its setting is declared as Varied in the code."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):
@@ -146,7 +147,7 @@ def robustness(
         percent: size of the default disturbances in percent, used in place of the scenario's.
         draws: number of draws.
         seed: seed of the draws.
-        alone: also simulates each disturbance alone.
+        alone: True to simulate also each disturbance alone.
         workers: number of threads, see simulate_many().
 
     Raises:
@@ -194,10 +195,11 @@ def robustness(
 def _simulated(
     scenario: Scenario, plan: Sequence[_Planned], gaits: Mapping[Any, Gait], workers: int | None
 ) -> list[dict[str, Any]]:
-    """Simulates each gait in each draw of the plan. Returns a row per simulation: the labels that
-    the plan gives to the draw, and the columns that all tables of Judgement have.
+    """Simulates each gait in each draw of disturbances. Returns a row per simulation: the labels of
+    the draw, and the columns that all tables of Judgement have.
 
-    `gaits` are by the key that the column `gait` gets; `workers` is the number of threads.
+    `plan` has pairs: the labels of a draw by column, and the draw. `gaits` are by the key that the
+    column `gait` gets; `workers` is the number of threads.
 
     A robot that cannot start is a failure; it may have been displaced into a step of the terrain.
     """
@@ -239,8 +241,8 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
     - undisturbed: distance (m) without disturbances
     - 5 %, 25 %, 50 %, 75 %, 95 % (quantiles) and mean of the distance (m) over the draws that did
       not fail
-    - kept: share of all draws that the gait keeps, so that it loses at most 10 % of the undisturbed
-      distance and meets the requirements
+    - kept: share of all draws where the gait loses at most 10 % of the undisturbed distance and
+      meets the requirements of the scenario
     - mean_low, mean_high, kept_low, kept_high: 95 % confidence intervals
     - failed, missed: numbers of draws that failed, and that miss a requirement
     """
@@ -263,7 +265,7 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
     and for the initial positions (start) and the terrain, the most harmful one first. Columns:
 
     - median: absolute change of the distance (m) by this change alone, median over the simulations
-    - worst: most negative change of the distance; failed: number of failures
+    - worst: most negative change of the distance (m); failed: number of failures
     - correlation: Spearman's rank correlation between the factor of a key and the distance over the
       draws of a gait that did not fail; mean over the gaits. NaN for start and terrain, and if all
       distances of a gait are equal
@@ -286,8 +288,8 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
 
 
 def chance(draws: int) -> float:
-    """Largest absolute rank correlation that is likely by chance with this number of draws: 95 % of
-    the correlations of as many unrelated numbers are smaller in absolute value."""
+    """Largest absolute value of a rank correlation that is likely by chance with this number of
+    draws: 95 % of the correlations between unrelated numbers, one pair per draw, are smaller."""
     return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
 
 

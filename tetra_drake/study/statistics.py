@@ -29,20 +29,20 @@ def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> 
 
 
 def resampled(values: np.ndarray, generator: np.random.Generator) -> np.ndarray:
-    """Bootstrap resamples (RESAMPLES, n) of n values: each row has n of them, drawn with
-    replacement."""
+    """Bootstrap resamples (2000, n) of n values: each row has n of them, drawn with replacement."""
     return values[generator.integers(len(values), size=(RESAMPLES, len(values)))]
 
 
 def interval_of_resamples(resamples: np.ndarray) -> tuple[float, float]:
-    """Ends (low, high) of the middle 95 % of the statistics of bootstrap resamples: the confidence
-    interval."""
+    """Ends (low, high) of the 95 % confidence interval of a statistic. `resamples` has its values,
+    one per bootstrap resample; the interval is their middle 95 %."""
     low, high = np.quantile(resamples, [0.025, 0.975])
     return float(low), float(high)
 
 
 def share_interval(count: int, total: int) -> tuple[float, float]:
-    """Wilson score interval (95 %) of the share `count` / `total`.
+    """Wilson score interval (95 %) of the share `count` / `total`: its ends low and high, between 0
+    and 1; NaN if `total` is 0.
 
     Its width is positive even if the share is 0 or 1: 40 of 40 give 91 to 100 %.
     """
@@ -67,6 +67,7 @@ def interquartile_mean(values: npt.ArrayLike, axis: int = -1) -> Any:
 
 
 def json_rows(table: pandas.DataFrame) -> list[dict[Any, Any]]:
-    """Rows of a table as JSON objects, including the index. Infinities and NaN are null."""
+    """Rows of a table as dictionaries for JSON, including the index. Infinities and NaN become
+    None."""
     rows = table.reset_index().to_dict("records")
     return [{key: json_number(value) for key, value in row.items()} for row in rows]

@@ -118,8 +118,8 @@ def _values(key: str, given: Any) -> Collection[Any]:
 
 
 def with_joined_changes(scenario: Scenario, by_joined: Mapping[str, Any]) -> Scenario:
-    """The scenario with changed values by key; keys joined by commas get the same value. See
-    Scenario.with_changes().
+    """A copy of the scenario with changed values. `by_joined` has the value for a key, or for
+    several keys joined by commas, which all get it. See Scenario.with_changes().
 
     Raises InputError, naming the key. If a limit makes two keys of a section depend on each other,
     the message advises to join them, such as "friction.static, friction.kinetic".

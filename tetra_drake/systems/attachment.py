@@ -49,8 +49,8 @@ def DeclareOutput(
 ) -> None:
     """Declares a vector output port of a system, without keeping the system alive.
 
-    `read`, given the system and a context, computes the values; an array is flattened row by row.
-    `sources` are the tickets of all that the values depend on.
+    The port has `size` numbers. `read`, given the system and a context, computes them; an array is
+    flattened row by row. `sources` are the tickets of all that the values depend on.
     """
     # A reference to the system in its port would keep it alive for ever.
     this: Any = weakref.proxy(system)
@@ -100,11 +100,14 @@ class Nodes(NamedTuple):
 class BodyStates(LeafSystem):
     """State of the bodies of a plant, as if they were free. The system has no state.
 
-    | port               | shape   | unit | meaning                                      |
-    |--------------------|---------|------|----------------------------------------------|
-    | body_poses         |         | SI   | list of the poses X_WB, from the plant       |
-    | spatial_velocities |         | SI   | list of the velocities V_WB, from the plant  |
-    | state              | (13*n,) | SI   | [q; v] of the n bodies other than the world  |
+    | port               | in, out | shape    | unit | meaning                                     |
+    |--------------------|---------|----------|------|---------------------------------------------|
+    | body_poses         | in      | abstract | SI   | list of the poses X_WB, from the plant      |
+    | spatial_velocities | in      | abstract | SI   | list of the velocities V_WB, from the plant |
+    | state              | out     | (13*n,)  | SI   | [q; v] of the n bodies other than the world |
+
+    As for free bodies in Drake, q has a quaternion (w first) and a position per body, and v an
+    angular and a linear velocity in the world frame.
     """
 
     def __init__(self, plant: MultibodyPlant) -> None:
@@ -127,11 +130,12 @@ class BodyStates(LeafSystem):
 class BodyForces(LeafSystem):
     """Forces on the bodies of a plant, as a list that the plant reads. The system has no state.
 
-    | port              | shape  | unit   | meaning                                           |
-    |-------------------|--------|--------|---------------------------------------------------|
-    | generalized_force | (6*n,) | N m, N | [t_W; f_W] at the origins of the n bodies other   |
-    |                   |        |        | than the world                                    |
-    | spatial_forces    |        | N m, N | list of ExternallyAppliedSpatialForce             |
+    | port              | in, out | shape    | unit   | meaning                                    |
+    |-------------------|---------|----------|--------|--------------------------------------------|
+    | generalized_force | in      | (6*n,)   | N m, N | [t_W; f_W] at the origin of each of the n  |
+    |                   |         |          |        | bodies other than the world                |
+    | spatial_forces    | out     | abstract | N m, N | list of ExternallyAppliedSpatialForce, for |
+    |                   |         |          |        | bodies whose force is not zero             |
     """
 
     def __init__(self, plant: MultibodyPlant) -> None:
@@ -158,8 +162,10 @@ def checked_numbers(
     source: str, key: str, given: npt.ArrayLike, *, count: int, least: float = -math.inf
 ) -> np.ndarray:
     """Array (count,) from an argument that is one number for all entries, or has a number for each.
-    Raises InputError, which names `source` and `key`, unless they are finite and at least
-    `least`."""
+
+    Raises InputError unless the numbers are finite and at least `least`. Its message names
+    `source`, the class or function, and `key`, the argument.
+    """
     found = np.full(count, np.nan)
     with contextlib.suppress(TypeError, ValueError):
         found[:] = given
@@ -171,8 +177,8 @@ def checked_numbers(
 
 
 def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None:
-    """Raises InputError, which names `source` and `key`, unless the constants of a law are finite
-    numbers of 0 or more."""
+    """Raises InputError unless the constants of a law, by their names, are finite numbers of 0 or
+    more. Its message names `source`, the function, `key`, the argument, and the constant."""
     for name, value in constants.items():
         if not (isinstance(value, numbers.Real) and 0.0 <= float(value) < math.inf):
             problem = f"found {value!r:.60}, expected a number of 0 or more"
@@ -180,8 +186,11 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
 
 
 def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:
-    """Raises InputError, which names `source`, unless a system called `name` can be attached to a
-    plant of the builder: it must be finalized and have a mass matrix that can be inverted."""
+    """Raises InputError unless a system called `name` can be attached to a plant of the builder.
+
+    The builder must not have built its diagram, the name must be free, and the plant must be
+    finalized and have a mass matrix that can be inverted. The message names `source`, the function.
+    """
     check_type(source, "builder", builder, DiagramBuilder)
     check_type(source, "name", name, str)
     if builder.already_built():
@@ -203,15 +212,16 @@ def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, n
 def check_part(
     source: str, key: str, builder: DiagramBuilder, system: System, kind: type[System]
 ) -> None:
-    """Raises InputError, which names `source` and `key`, unless a system has the class `kind` and
-    was added to the builder."""
+    """Raises InputError unless a system has the class `kind` and was added to the builder. Its
+    message names `source`, the function, and `key`, the argument."""
     check_type(source, key, system, kind)
     if not any(part is system for part in builder.GetSystems()):
         raise InputError(source, key, "is no system of the builder; add it first")
 
 
 def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> None:
-    """Raises InputError, which names `source` and `key`, unless a frame is in the plant."""
+    """Raises InputError unless a frame is in the plant, at a finite position. Its message names
+    `source`, the function, and `key`, the argument."""
     check_type(source, key, frame, Frame)
     if frame.GetParentPlant() is not plant:
         raise InputError(source, key, f"found frame '{frame.name()}' of another plant")
@@ -220,7 +230,8 @@ def check_frame(source: str, key: str, plant: MultibodyPlant, frame: Frame) -> N
 
 
 def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> None:
-    """Connects a system that exerts forces to a plant: its ports `state` and `generalized_force`.
+    """Connects a system that exerts forces to a plant: its input port `state` (13*n,) and its
+    output port `generalized_force` (6*n,), for the plant's n bodies other than the world.
 
     Its force is added to the forces of all systems that were connected to the plant before. The
     plant must be finalized.

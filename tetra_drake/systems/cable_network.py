@@ -57,18 +57,22 @@ class CableNetwork(LeafSystem):
     | ends              | (6*pieces,)    | m      | per piece: position of start, then end   |
     | drive_rates       | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
-    Inputs are `state`, `signals` and `drives`. A row of `cable_forces` has the direction (3) from
-    end a to end b, length, tension, derivative of the tension by the rate, and rate.
+    The 7 numbers of a cable are the direction from end a to end b in the world (3), the length (m),
+    the tension (N), the derivative of the tension by the rate (N s/m), and the rate (m/s).
+
+    A drive is the state of the actuator of one driven cable: a free length (m) or a tension (N).
+    The port `signals` exists only if there are any, `drives` and `drive_rates` only if the kind of
+    actuators has states.
 
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
-    loop. Where the model is `slack`, a cable goes slack instead of pushing. The port `signals`
-    exists only if there are any, `drives` and `drive_rates` only if the kind of actuators has
-    states. A cable whose ends meet has no direction: the outputs raise SimulationFailure.
+    loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
+    has no direction: the outputs raise SimulationFailure.
     """
 
     def __init__(self, model: Model, *, names: Sequence[str], signals: int) -> None:
-        """Cables of a model, which has their constants and the bodies. `names` are the cables'
-        names, for errors. `signals` is the number m of signals."""
+        """Makes the system for the cables of `model`, which has their constants, their actuators
+        and the bodies. `names` are the cables' names, for errors. `signals` is the number m of
+        signals, not the signals themselves."""
         super().__init__()
         self._names = names
         bodies, count = model.bodies.mass.size, model.cables.signal.size
@@ -105,8 +109,8 @@ class CableNetwork(LeafSystem):
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
     ) -> np.ndarray:
-        """The table `cable_forces` (cables, 7). Writes the generalized force to `force` (6*n,), if
-        given.
+        """The numbers of the port `cable_forces` as a table (cables, 7). Writes the generalized
+        force to `force` (6*n,), if given.
 
         With `moves_only`, the inputs other than the state are not read: only lengths and rates are
         valid. Raises SimulationFailure if a number of a cable is not finite although the state is.
@@ -173,6 +177,9 @@ def AddCables(
     `signals` of the returned system if cables are actuated.
 
     Args:
+        builder: the builder that the plant was added to; the cables are added to it.
+        plant: the plant whose bodies the cables pull.
+        cables: the cables: names, ends and constants.
         actuated: for each signal, in the order of the signals, the names of the cables that it
             drives. The keys name the signals, in errors only. By default all cables are passive.
         actuation: kind of the actuators, Force() by default. Kinds with states are added as the
@@ -265,6 +272,8 @@ def _cable_table(
     cables: Sequence[Cable], actuated: Mapping[str, Sequence[str]], nodes: Nodes
 ) -> np.ndarray:
     """Records (cables,) of dtype laws.cable.CABLE: nodes, signal and constants of each cable.
+
+    `actuated` has the names of the cables that each signal drives; see AddCables().
 
     Raises InputError if `actuated` has an unknown cable, or a cable twice.
     """

@@ -57,9 +57,10 @@ def MakeTensegrityDiagram(
 
     Subsystems:
 
-    - cpg: with `cpg.signals: live` the network, otherwise its signals, computed beforehand. A robot
-      without oscillators has no cpg.
-    - feedback: only if `cpg.feedback` is not empty
+    - cpg: if the scenario has `cpg.signals: live`, the network, integrated with the robot (a live
+      network); otherwise its signals, computed beforehand. A robot without oscillators has no cpg.
+    - steering: only for a live network
+    - feedback: only if the scenario's `cpg.feedback` is not empty
     - cables_actuators: only if the kind of actuators has states, as winches have
     - state_forces: only if struts touch, or nodes of bodies are held, joined or loaded
     - controller: in place of cpg and start_up, a system with the output port `signals`, and any
@@ -67,11 +68,13 @@ def MakeTensegrityDiagram(
       `lengths`, `rates`, `tensions` and `normal_forces`: ports of the same name are connected. See
       SampledController and robot.command.controlled_robot().
 
-    `steering` replaces the gait's turn. Input port: turn (of a live network). Output ports: state
-    (from plant), signals (start_up or controller), drives (actuators), tensions and lengths
-    (cables), normal_forces, friction_forces and modes (ground). For shapes and units, see the
-    systems. With `meshcat`, a SceneGraph shows struts, spheres and cables there during a
-    simulation; pages and films are made from trajectories.
+    `steering`, a function from the time (s) to the turn, replaces the gait's turn, -1 to 1. Input
+    port of the diagram: turn, only of a live network. Output ports, with their subsystems in
+    parentheses: state (plant), signals (start_up or controller), drives (cables_actuators),
+    tensions and lengths (cables), normal_forces, friction_forces and modes (ground). The classes
+    Steering, CableNetwork and GroundContact have their shapes and units. With `meshcat`, a
+    SceneGraph shows struts, spheres and cables there during a simulation; pages and films are made
+    from trajectories.
 
     Raises InputError if there is neither a gait nor a controller, or a port of the controller has
     another name or size.
@@ -153,8 +156,8 @@ def _AddPlant(
 
 
 def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
-    """The cables of a structure, for AddCables(). `nodes` are the frames of its nodes, in their
-    order, from AddNodes()."""
+    """The cables of a structure, for AddCables(). `nodes` are the frames at the structure's nodes,
+    in the order of the nodes, from AddNodes()."""
     return [
         Cable(
             name,
@@ -176,8 +179,9 @@ def _AddFeedback(
     signals: OutputPort,
     ground: System,
 ) -> None:
-    """Adds `feedback` to the diagram. Its inputs are `state`, `signals`, modes of the `ground`, and
-    the states of actuators if there are any; its output goes to `cpg`."""
+    """Adds `feedback` to the diagram. Its inputs are the ports `state` and `signals`, `mode_table`
+    of the system `ground`, and the states of actuators if they have any. Its output goes to the
+    system `cpg`, which must be in the diagram."""
     builder.AddNamedSystem("feedback", feedback)
     builder.Connect(state, feedback.GetInputPort("state"))
     builder.Connect(signals, feedback.GetInputPort("signals"))
@@ -198,8 +202,8 @@ def _AddController(
     size: int,
 ) -> OutputPort:
     """Adds `controller` to the diagram. Its input ports are connected to `state` and to the ports
-    of `sources` with the same names. Returns its port `signals`. Raises InputError for a port of
-    another name or size."""
+    of `sources` with the same names. Returns its output port `signals`, which must have `size`
+    numbers. Raises InputError for a port of another name or size."""
     if not controller.HasOutputPort("signals"):
         ports = map(controller.get_output_port, range(controller.num_output_ports()))
         found = ", ".join(port.get_name() for port in ports) or "no output ports"
@@ -232,10 +236,11 @@ def _AddSignals(
     builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
 ) -> OutputPort:
     """Adds the systems `cpg` and `start_up` to the diagram. Returns the output port of `start_up`,
-    with the signals of the cables.
+    with the signals (m,) of the cables.
 
-    `cpg` is a live network with its `steering`, or a source of signals that were computed
-    beforehand.
+    `cpg` is a live network, integrated with the robot, with a system `steering`; or it is a source
+    of signals that were computed beforehand. `steering`, a function from the time (s) to the turn,
+    replaces the gait's turn.
     """
     cpg, size = robot.scenario.cpg, robot.structure.signals
     if not size:

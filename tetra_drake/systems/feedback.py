@@ -19,19 +19,23 @@ class Feedback(LeafSystem):
 
     The system has no state.
 
-    | port       | shape          | unit   | meaning                                           |
-    |------------|----------------|--------|---------------------------------------------------|
-    | state      | (13*n,)        | SI     | [q; v] of n free bodies, from the plant           |
-    | signals    | (m,)           | N      | signals of the cables                             |
-    | drives     | (drives,)      | m or N | states of the actuators                           |
-    | mode_table | (12 contacts,) | SI     | port of GroundContact, with the state of contacts |
-    | feedback   | (2m,)          | 1      | output: f of thesis Eq. 7, for 2m neurons         |
+    | port       | in, out | shape          | unit   | meaning                                  |
+    |------------|---------|----------------|--------|------------------------------------------|
+    | state      | in      | (13*n,)        | SI     | [q; v] of n free bodies, from the plant  |
+    | signals    | in      | (m,)           | N      | actuator signals, one per oscillator     |
+    | drives     | in      | (drives,)      | m or N | states of the actuators: free length or  |
+    |            |         |                |        | tension of each driven cable             |
+    | mode_table | in      | (12*contacts,) | SI     | state of the contacts, from the port of  |
+    |            |         |                |        | GroundContact                            |
+    | feedback   | out     | (2m,)          | 1      | f of thesis Eq. 7, for the neurons of m  |
+    |            |         |                |        | oscillators                              |
 
     The port `drives` exists only if the kind of actuators has states.
     """
 
     def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
-        """Feedback with a gain per pathway, in the order of laws.feedback.PATHWAYS.
+        """Makes the feedback of a robot. `gains` (pathways,) has a gain for each pathway, which
+        leads from one kind of reading to the neurons; laws.feedback.PATHWAYS has their order.
 
         Raises InputError if lengths are fed back and the robot has no equilibrium to compare with.
         """

@@ -40,27 +40,29 @@ from tetra_drake.systems.attachment import (
 class GroundContact(LeafSystem):
     """Normal force (thesis Eq. 1) and friction at m contact nodes, on any terrain.
 
-    | port              | shape   | unit   | meaning                                           |
-    |-------------------|---------|--------|---------------------------------------------------|
-    | state             | (13*n,) | SI     | [q; v] of n bodies, as if free                    |
-    | generalized_force | (6*n,)  | N m, N | [t_W; f_W] at each body's origin                  |
-    | normal_forces     | (m,)    | N      | along the normal of the surface, by contact node  |
-    | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
-    | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
-    |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
-    | mode_table        | (12 m,) | SI     | table `modes` of laws.contact, row by row: modes, |
-    |                   |         |        | stick point and more, by contact node             |
-    | ground_forces     | (3 m,)  | N      | along t1, t2 and n, by contact node               |
+    | port              | in/out | shape   | unit   | meaning                                      |
+    |-------------------|--------|---------|--------|----------------------------------------------|
+    | state             | in     | (13*n,) | SI     | [q; v] of n bodies, as if free               |
+    | generalized_force | out    | (6*n,)  | N m, N | [t_W; f_W] at each body's origin             |
+    | normal_forces     | out    | (m,)    | N      | along the ground's normal, never negative    |
+    | friction_forces   | out    | (2*m,)  | N      | per node: along the tangents t1 and t2       |
+    | modes             | out    | (3*m,)  | 1      | per node: 1 if it touches, otherwise 0; then |
+    |                   |        |         |        | its direction of slip along t1 and t2, which |
+    |                   |        |         |        | is 0 and 0 if it sticks                      |
+    | mode_table        | out    | (12*m,) | SI     | the discrete state, 12 numbers per node      |
+    | ground_forces     | out    | (3*m,)  | N      | per node: friction along t1, t2, then normal |
 
-    On flat ground t1 and t2 are x and y; otherwise see `laws.terrain`; `laws.friction`
-    explains modes.
+    The ground's forces act on the nodes, or on the lowest points of round feet. On flat ground t1
+    and t2 are the axes x and y of the world; otherwise see `laws.terrain`.
 
-    The discrete state is `modes` of `laws.contact`. Deflections follow from the stick points, so
-    no continuous state has to be reset. Modes are updated at the end of a step; Initialize() sets
-    them from the pose.
+    The discrete state has 12 numbers per node: the three of `modes`, the stick point (m) where the
+    bristle is not deflected, and the heading and orientation of the node's body; see
+    `laws.contact`. Deflections follow from the stick points, so no continuous state has to be
+    reset. The discrete state is updated at the end of a step; Initialize() sets it from the pose.
 
-    With `witness`, a step also ends where a mode changes, to within Drake's isolation window:
-    0.01 s times the accuracy of Context.SetAccuracy().
+    `model` has the bodies, the ground and its contact nodes. With `witness`, a step also ends where
+    a mode changes, to within Drake's isolation window: 0.01 s times the accuracy of
+    Context.SetAccuracy().
     """
 
     def __init__(self, model: Model, *, witness: bool = False) -> None:
@@ -106,11 +108,13 @@ class GroundContact(LeafSystem):
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
     ) -> tuple[bool, float]:
-        """Predicts changes of the modes. Returns whether one changes if a step ends now, and the
-        time (s) from now to the next change, at most `horizon` (s).
+        """Predicts when a node will touch or leave the ground, stick or slip: a change of mode.
 
-        `acceleration` (6*n,) is dv/dt of the bodies. The prediction assumes that the acceleration
-        of each node is constant.
+        Returns True if a mode changes at once when a step ends now, and the time (s) from now to
+        the next change, at most `horizon` (s). The state in `context` is not changed.
+
+        `acceleration` (6*n,) is dv/dt of the bodies, with v as in the port `state`. The prediction
+        assumes that the acceleration of each node is constant.
         """
         state, modes = self._state.Eval(context), self._modes(context).copy()
         return self._next_change(self._parts, state, acceleration, modes, horizon)
@@ -136,8 +140,8 @@ class GroundContact(LeafSystem):
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
 
     def _table(self, context: Context, force: np.ndarray | None = None) -> np.ndarray:
-        """The table `ground_forces` (contacts, 3) in N. Writes the generalized force to `force`
-        (6*n,), if given."""
+        """The forces of the port `ground_forces` as a table (contacts, 3) in N. Writes the
+        generalized force to `force` (6*n,), if given."""
         state, modes = self._state.Eval(context), self._modes(context)
         self._compute_forces(self._parts, state, modes, self._force if force is None else force)
         return self._forces.ground_forces
@@ -160,9 +164,10 @@ def AddGroundContact(
 
     The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is one
     radius for all spheres, or a radius for each. If it is 0, the ground touches the origins
-    themselves. Make `ground` with robot.ground.make_surface(), or use a robot's ground; the robot's
-    own feet are ignored. For `witness` see GroundContact. The ports have the contact nodes in the
-    order of `frames`. This example puts a scenario's ground under the tip of a link:
+    themselves. Make `ground` with robot.ground.make_surface(), or use a robot's ground: its contact
+    nodes and their radii are then replaced by `frames` and `radius`. For `witness` see
+    GroundContact. The ports have the contact nodes in the order of `frames`. This example puts a
+    scenario's ground under the tip of a link:
 
     >>> given = load_scenario("coulomb")
     >>> surface = make_surface(given.ground, given.friction, given.terrain)

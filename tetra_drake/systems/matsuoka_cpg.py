@@ -13,16 +13,18 @@ from tetra_drake.systems.attachment import DeclareOutput
 class MatsuokaCpg(LeafSystem):
     """Network of n Matsuoka oscillators (thesis Eq. 7-9).
 
-    | port     | shape | unit | meaning                                                      |
-    |----------|-------|------|--------------------------------------------------------------|
-    | tonic    | (2n,) | 1    | u0 of Eq. 7, by neuron; default from the constructor         |
-    | feedback | (2n,) | 1    | f of Eq. 7, by neuron; default 0                             |
-    | signals  | (n,)  | N    | gain (y_extensor - y_flexor), by oscillator                  |
-    | neurons  | (2n,) | 1    | y = max(0, u); neurons 2k, 2k+1: extensor, flexor of the k-th |
+    | port     | in, out | shape | unit | meaning                                               |
+    |----------|---------|-------|------|-------------------------------------------------------|
+    | tonic    | in      | (2n,) | 1    | u0 of thesis Eq. 7, by neuron; without a connection   |
+    |          |         |       |      | `tonic` of the constructor                            |
+    | feedback | in      | (2n,) | 1    | f of thesis Eq. 7, by neuron; without a connection 0  |
+    | signals  | out     | (n,)  | N    | gain * (y_extensor - y_flexor), by oscillator         |
+    | neurons  | out     | (2n,) | 1    | outputs y = max(0, u) of the neurons                  |
 
-    The continuous state is u (2n,), then v (2n,): inner states and self-inhibitions. The outputs
-    depend only on the state, so a feedback loop around the network is not algebraic. The signals
-    begin at t = 0, without a start-up time. See `Robot.network` for the robot's network, and
+    Neurons 2k and 2k + 1 are the extensor and the flexor of oscillator k, from 0 on. The continuous
+    state is u (2n,), then v (2n,): inner states and self-inhibitions. The outputs depend only on
+    the state, so a feedback loop around the network is not algebraic. The signals begin at t = 0,
+    without a start-up time. See `Robot.network` for the robot's network, and
     diagrams/entrainment.py for a loop around a single oscillator.
     """
 
@@ -34,7 +36,8 @@ class MatsuokaCpg(LeafSystem):
         initial_state: npt.ArrayLike,
         gain: float = 1.0,
     ) -> None:
-        """`tonic` is the input u0 without a connected port: a number, or a value per neuron.
+        """`network` has the constants of the neurons and their connections. `tonic` is the input
+        u0 without a connected port: a number, or a value per neuron.
         `initial_state` (4n,) is u of all neurons, then v. `gain` is the force (N) per unit of y."""
         super().__init__()
         neurons = len(network.inhibition)
@@ -64,7 +67,8 @@ class MatsuokaCpg(LeafSystem):
         derivatives.SetFromVector(neurons[:, oscillator.U_RATE : oscillator.V_RATE + 1].T.ravel())
 
     def _neurons(self, context: Context) -> np.ndarray:
-        """Table `neurons` of laws.oscillator, a row per neuron, from the continuous state."""
+        """Table `neurons` of laws.oscillator, a row per neuron (2n rows), made from the continuous
+        state in `context`. It is a copy."""
         return oscillator.make_neurons(context.get_continuous_state_vector().value())
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:

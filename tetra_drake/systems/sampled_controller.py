@@ -19,17 +19,19 @@ Law = Callable[[float, Readings], npt.ArrayLike]
 
 
 class HeldSignals(LeafSystem):
-    """Source of a robot's signals, which holds them until new ones are set.
+    """Source of a robot's signals, which holds them until Hold() sets new ones.
 
-    | port          | shape         | unit | meaning                                               |
-    |---------------|---------------|------|-------------------------------------------------------|
-    | signals       | (m,)          | N    | signals of the cables                                 |
+    | port    | in, out | shape | unit | meaning                                            |
+    |---------|---------|-------|------|----------------------------------------------------|
+    | signals | out     | (m,)  | N    | actuator signals, one per group of driven cables   |
 
-    The signals change as the actions of engines.simulation.Simulation do: linearly, within one
-    `cpg.listing_step`. Only at t = 0 they are set at once. The discrete state is the signals before
-    the change (m,) and after it (m,), and the time (s) of its beginning. At the start both are the
-    robot's first signals. The output depends on state and time alone, so there is no
-    algebraic loop.
+    After Hold(), the output changes linearly from the old signals to the new ones, within one
+    network step, the scenario's `cpg.listing_step` (s). Only at t = 0 it changes at once. The
+    actions of engines.simulation.Simulation act in the same way.
+
+    The discrete state (2m + 1,) is the m signals before the latest change, the m signals after it,
+    and the time (s) of its beginning. At the start both are the robot's first signals. The output
+    depends on state and time alone, so there is no algebraic loop.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -41,7 +43,8 @@ class HeldSignals(LeafSystem):
 
     def Hold(self, context: Context, signals: np.ndarray) -> None:
         """Sets the signals (m,) in N that are held from now on. `context` is the system's own, and
-        is changed. After t = 0 they are reached within one `cpg.listing_step`."""
+        is changed. After t = 0 the output reaches them within one network step,
+        `cpg.listing_step`."""
         context.SetDiscreteState(self._state_from_now(context, signals))
 
     def _state_from_now(self, context: Context, signals: np.ndarray) -> np.ndarray:
@@ -60,20 +63,25 @@ class HeldSignals(LeafSystem):
 class SampledController(HeldSignals):
     """Controller of a robot: a function that sets the held signals in each control period.
 
-    | port          | shape         | unit | meaning                                               |
-    |---------------|---------------|------|-------------------------------------------------------|
-    | state         | (13*n,)       | SI   | [q; v] of n free bodies, from the plant               |
-    | cable_forces  | (7 cables,)   | SI   | table of laws.cable, row by row, from the cables      |
-    | ground_forces | (3 contacts,) | N    | table of laws.contact, row by row, from the ground    |
-    | signals       | (m,)          | N    | signals of the cables; see HeldSignals                |
+    | port          | in, out | shape         | unit | meaning                                     |
+    |---------------|---------|---------------|------|---------------------------------------------|
+    | state         | in      | (13*n,)       | SI   | [q; v] of n free bodies, from the plant     |
+    | cable_forces  | in      | (7*cables,)   | SI   | from the port of CableNetwork: per cable    |
+    |               |         |               |      | direction (3), length, tension, derivative  |
+    |               |         |               |      | of the tension by the rate, rate of length  |
+    | ground_forces | in      | (3*contacts,) | N    | from the port of GroundContact: per contact |
+    |               |         |               |      | node friction along t1 and t2, normal force |
+    | signals       | out     | (m,)          | N    | actuator signals, one per group of driven   |
+    |               |         |               |      | cables                                      |
 
-    The state is updated at multiples of the period, from t = 0 on. Steps of the simulation also end
-    where a change of the signals ends.
+    The function gets the inputs as Readings. It is called at multiples of the period, from t = 0
+    on. The discrete state, the linear change to new signals and its duration are the same as in
+    HeldSignals. Steps of the simulation also end where such a change ends.
     """
 
     def __init__(self, robot: Robot, law: Law, *, period: float) -> None:
-        """Controller that calls `law` once in each `period` (s). `law` gets the time (s) and the
-        robot's Readings, and returns the signals (m,) in N."""
+        """Makes a controller that calls `law` once in each `period` (s). `law` gets the time (s)
+        and the robot's Readings, and returns the signals (m,) in N."""
         super().__init__(robot)
         self._law, self._structure = law, robot.structure
         cables, contacts = len(robot.structure.cables), len(robot.structure.contacts)

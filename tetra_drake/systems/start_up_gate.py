@@ -18,15 +18,16 @@ _LONGER_THAN_ANY_SIMULATION = 1e9  # s; the period of an event that happens once
 
 
 class StartUpGate(Diagram):
-    """Switch whose output is zero before the start-up time, and its input after it (listing B.1).
+    """Switch whose output is zero before the start-up time, and equals its input from then on.
 
-    | port    | shape | unit | meaning                       |
-    |---------|-------|------|-------------------------------|
-    | ungated | (m,)  | N    | signals of the oscillators    |
-    | signals | (m,)  | N    | zeros, later the same signals |
+    | port    | in, out | shape | unit | meaning                                              |
+    |---------|---------|-------|------|------------------------------------------------------|
+    | ungated | in      | (m,)  | N    | signals of the m oscillators                         |
+    | signals | out     | (m,)  | N    | zeros before `start_up` (s), then equal to `ungated` |
 
-    An event at the start-up time switches Drake's PortSwitch. So an integration step ends exactly
-    at the jump. Without events no Python code runs.
+    `size` is the number m of signals. The thesis switches the signals in the same way (listing
+    B.1). An event at the start-up time switches Drake's PortSwitch. So an integration step ends
+    exactly at the jump. Without events no Python code runs.
     """
 
     def __init__(self, size: int, *, start_up: float) -> None:
@@ -45,11 +46,12 @@ class StartUpGate(Diagram):
 
 
 class _Timer(LeafSystem):
-    """Selector for a PortSwitch: port `before` until the start-up time, then port `after`.
+    """Selector of the input port that a PortSwitch passes on. The discrete state (1,) is 0 before
+    the time `start_up` (s), then 1.
 
-    | port     | type           | meaning            |
-    |----------|----------------|--------------------|
-    | selector | InputPortIndex | `before`, `after`  |
+    | port     | in, out | type           | meaning                                                |
+    |----------|---------|----------------|--------------------------------------------------------|
+    | selector | out     | InputPortIndex | `before` until the time `start_up`, `after` from then  |
     """
 
     def __init__(self, *, start_up: float, before: InputPortIndex, after: InputPortIndex) -> None:

@@ -15,13 +15,14 @@ from tetra_drake.robot.robot import Robot
 class StateForces(LeafSystem):
     """Forces of struts that touch, anchors, joints and constant loads. The system has no state.
 
-    | port              | shape   | unit   | meaning                                 |
-    |-------------------|---------|--------|-----------------------------------------|
-    | state             | (13*n,) | SI     | [q; v] of n free bodies, from the plant |
-    | generalized_force | (6*n,)  | N m, N | [t_W; f_W] at each body's origin        |
+    | port              | in, out | shape   | unit   | meaning                                 |
+    |-------------------|---------|---------|--------|-----------------------------------------|
+    | state             | in      | (13*n,) | SI     | [q; v] of n free bodies, from the plant |
+    | generalized_force | out     | (6*n,)  | N m, N | [t_W; f_W] at each body's origin        |
 
-    See `laws.capsules` and `laws.forces`. The forces are continuous, so no step has to
-    end where struts begin to touch. But long steps could carry struts through each other.
+    An anchor holds a node by a damped spring; a load is a constant force on a node. See
+    `laws.capsules` and `laws.forces`. The forces are continuous, so no step has to end where struts
+    begin to touch. But long steps could carry struts through each other.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -39,7 +40,7 @@ class StateForces(LeafSystem):
         """Longest step (s), at most `horizon`, that cannot carry a strut through another.
 
         Args:
-            context: the system's context.
+            context: the system's own context, from which the bodies' motion is read.
             horizon: upper limit (s).
         """
         return self._touch(self._parts, self._state.Eval(context), horizon, self._force)

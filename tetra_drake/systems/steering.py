@@ -13,11 +13,14 @@ from tetra_drake.robot.network import checked_turn
 class Steering(LeafSystem):
     """Tonic input of the oscillators as a function of the turn. The system has no state.
 
-    | port  | shape | unit | meaning                                                         |
-    |-------|-------|------|-----------------------------------------------------------------|
-    | turn  | (1,)  | 1    | -1 to 1; at 1 only the left oscillators have input; default     |
-    |       |       |      | from the constructor; other values raise InputError             |
-    | tonic | (2m,) | 1    | output: u0 of thesis Eq. 7 for the neurons of m oscillators     |
+    | port  | in, out | shape | unit | meaning                                                |
+    |-------|---------|-------|------|--------------------------------------------------------|
+    | turn  | in      | (1,)  | 1    | -1 to 1: at 1 only the oscillators on the robot's left |
+    |       |         |       |      | have input, at -1 only those on its right; without a   |
+    |       |         |       |      | connection `turn` of the constructor                   |
+    | tonic | out     | (2m,) | 1    | u0 of thesis Eq. 7 for the neurons of m oscillators    |
+
+    A turn outside -1 to 1 raises InputError.
     """
 
     def __init__(
@@ -26,7 +29,8 @@ class Steering(LeafSystem):
         *,
         turn: float | Callable[[float], float],
     ) -> None:
-        """`tonic_input` gives u0 (2m,) for a turn. `turn` is a number or a function of time (s)."""
+        """`tonic_input` gives u0 (2m,) for a turn, an array (). `turn` is used if the port has no
+        connection: a number, or a function from the time (s) to the turn."""
         super().__init__()
         self._tonic_input, self._default = tonic_input, turn
         self._turn = self.DeclareVectorInputPort("turn", 1)

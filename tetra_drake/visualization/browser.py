@@ -21,15 +21,15 @@ _SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 def find_browser() -> str | None:
-    """Path of an installed Chromium or Chrome."""
+    """Path of an installed Chromium or Chrome; None if there is none."""
     return next((path for path in map(shutil.which, _NAMES) if path), None)
 
 
 @contextlib.contextmanager
 def launch_browser() -> Iterator[Browser]:
-    """A headless browser that draws WebGL without a graphics card.
+    """Context manager: a headless browser that draws WebGL without a graphics card.
 
-    Raises InputError if none is installed, without playwright, or if the browser fails.
+    Raises InputError if no browser or no playwright is installed, or if the browser fails.
     """
     check_package("playwright", extra="video", source="browser")
     from playwright.sync_api import Error, sync_playwright
@@ -59,8 +59,8 @@ def wait_until_loaded(page: Page) -> None:
 
 
 def do(page: Page, call: str, *arguments: object) -> None:
-    """Calls a function of the page (see film.js), such as "show", and waits until the page is
-    drawn."""
+    """Calls a function of a replay page's script film.js by its name `call`, such as "show", with
+    these arguments, and waits until the page is drawn."""
     page.evaluate(
         """async ([call, given]) => {
             film[call](...given);

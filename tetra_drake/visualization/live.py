@@ -36,7 +36,8 @@ _POLLING_PERIOD = 0.1  # s, while no browser is connected
 class LiveView:
     """Viewer that shows a simulation in Meshcat, not faster than real time.
 
-    See engines.engine.Viewer. The simulation waits until a browser is connected.
+    An engine calls wants() and show() (see engines.batch.Viewer). The simulation waits until a
+    browser is connected.
     """
 
     def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
@@ -60,7 +61,8 @@ class LiveView:
         return time >= self._due
 
     def show(self, frame: xarray.Dataset) -> None:
-        """Shows one sample of a trajectory. Waits until its time has come in real time."""
+        """Shows one sample of a trajectory (`time` has length 1). Waits until as much real time has
+        passed as simulated time; at first, until a browser is connected."""
         now = float(frame["time"].values[0])
         if self._started is not None:
             time.sleep(max(0.0, self._started + now - time.monotonic()))
@@ -74,7 +76,7 @@ class LiveView:
 
 
 def open_view(scenario: Scenario, *, say: Say) -> LiveView:
-    """Opens a view in a new Meshcat and passes its address to `say`."""
+    """Opens a view in a new Meshcat server. `say` gets a line of text with its web address."""
     meshcat = quiet_meshcat(MeshcatParams(host="localhost"))
     say(f"open {meshcat.web_url()} in a browser, which starts the simulation")
     return LiveView(meshcat, scenario)

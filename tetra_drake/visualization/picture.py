@@ -28,8 +28,8 @@ _SQUARES = np.arange(-30, 31)
 
 
 def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
-    """Picture (height, width, 3) of a robot with its nodes at p_WN (nodes, 3) in m. The camera
-    follows the robot, and looks from the same side as in a replay."""
+    """RGB picture (height, width, 3), 0 to 255, of a robot with its nodes at p_WN (nodes, 3) in the
+    world frame, in m. The camera follows the robot, and looks from the same side as in a replay."""
     structure = robot.structure
     around = structure.p_WN - structure.p_WN.mean(axis=0)
     camera = p_WN.mean(axis=0) + camera_position(1.2 * around, np.zeros(3))
@@ -76,8 +76,9 @@ def picture(robot: Robot, p_WN: np.ndarray) -> np.ndarray:
 
 
 def _seen(points: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projections (..., 2) of points (..., 3) onto the picture, and distances (...) of the points
-    from the camera along the view."""
+    """Projections (..., 2) of points (..., 3), to the right and up, onto the plane at the distance
+    1 before the camera; and distances (...) of the points from the camera along the view. Points
+    and `camera` (3,) are positions in the world frame, in m."""
     right, up, forward = view_axes()
     offset = points - camera
     depth = offset @ forward
@@ -85,5 +86,6 @@ def _seen(points: np.ndarray, camera: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _widths(radii: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """Widths in points of lines with radii in m, from the distances (lines, 2) of their ends."""
+    """Widths (lines,) on the picture, in points of 1/72 in, of cylinders with these radii (m).
+    `depth` (lines, 2) has the distances (m) of their ends from the camera along the view."""
     return np.asarray(72.0 * _HEIGHT / _DPI * radii / VIEW_SLOPE / depth.mean(axis=1))

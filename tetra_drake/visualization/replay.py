@@ -81,6 +81,9 @@ def save_replay(
     Every frame is a sample of the trajectory; the page interpolates between frames.
 
     Args:
+        path: the HTML file to write.
+        robot: the robot that moved.
+        trajectory: its motion and forces over time; see results.trajectory.
         title: name of the gait, a colon, and a short result, such as "walks 14 in".
         viewer: file for Meshcat's script. Pages can share it, which makes them much smaller. It is
             written if it does not exist. By default the script is in the page.
@@ -105,8 +108,16 @@ def save_replay(
 def replay_page(
     *, robot: Robot, trajectory: xarray.Dataset, title: str, address: str = ""
 ) -> tuple[str, str]:
-    """A page that replays a trajectory, as HTML, and Meshcat's script, which is only in the page if
-    it is not read from an `address`. See save_replay()."""
+    """Makes a page that replays a trajectory.
+
+    Args:
+        robot, trajectory, title: see save_replay().
+        address: URL from which the page reads Meshcat's script (JavaScript), relative to the page.
+            By default the script is in the page itself.
+
+    Returns:
+        The page as HTML, and the script for the file at `address`; "" if there is no address.
+    """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     p_WN = trajectory["p_WN"].values
@@ -137,10 +148,11 @@ def replay_page(
 
 
 def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
-    """Data for film.js: the objects of the scene and their motion.
+    """Data for the page's script film.js: the objects of the scene and their motion.
 
-    A motion has one row per number, with the differences from frame to frame in units of
-    RESOLUTION. The first difference is from 0. Such rows compress well.
+    `frames` are the samples of a trajectory to show. Each number that moves, such as an x
+    coordinate, has a row of its differences from frame to frame in whole units of RESOLUTION. The
+    first difference is from 0. Such rows compress well.
     """
     structure = robot.structure
     bodies, contacts = structure.bodies, structure.contacts
@@ -199,7 +211,8 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
 
 
 def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
-    """Forces (frames, contacts, 3) of the ground on the robot, in the world frame, in N."""
+    """Forces (frames, contacts, 3) of the ground on the contact nodes, in the world frame, in N.
+    `frames` are samples of a trajectory."""
     friction, normal = frames["friction_force"].values, frames["normal_force"].values
     forces = np.concatenate([friction, normal[..., np.newaxis]], axis=-1)
     if robot.ground.flat:
@@ -211,8 +224,9 @@ def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
 
 
 def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
-    """The robot's distance in each frame. If the objective is about turning, its change of
-    heading."""
+    """What the page writes at each frame: the distance walked in the scenario's unit of length, or
+    the change of heading in degrees if the objective is about turning. Keys: `what` (a verb),
+    `unit`, `digits` (decimals) and `values` (frames,)."""
     structure, objective = robot.structure, robot.scenario.objective
     if structure.points_ahead and looks_for_turns(objective):
         heading = np.rad2deg(path_of_centre(frames, structure).heading)
@@ -225,15 +239,16 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
 
 
 def _steps(values: np.ndarray) -> list[list[int]]:
-    """Differences between frames of values (frames, ...), in whole units of
-    RESOLUTION. Row i has the differences of number i of the frames, from 0 on."""
+    """Differences from frame to frame of values (frames, ...), in whole units of RESOLUTION. There
+    is a row (frames,) for each number of a frame, flattened; its first difference is from 0."""
     rows = np.rint(values.reshape(len(values), -1).T / RESOLUTION).astype(int)
     steps: list[list[int]] = np.diff(rows, prepend=0).tolist()
     return steps
 
 
 def frame_samples(times: np.ndarray) -> np.ndarray:
-    """Indices of the samples to show, including the first and the last.
+    """Indices of the samples of a trajectory to show, including the first and the last: at most
+    FRAMES_PER_SECOND per second.
 
     `times` (samples,) are in s and evenly spaced.
     """
@@ -254,6 +269,7 @@ def quiet_meshcat(params: MeshcatParams) -> Meshcat:
 
 
 def pack_page(page: str, *, title: str) -> str:
-    """A compressed page that unpacks itself in the browser. `title` is plain text."""
+    """Compresses a page (HTML) into a page that unpacks itself in the browser. `title` is plain
+    text."""
     packed = base64.b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)

@@ -78,7 +78,8 @@ length."""
 
 
 def add_robot(meshcat: Meshcat, structure: Structure) -> None:
-    """Adds bodies (struts and nodes) and cables to the scene. place_robot() moves them."""
+    """Adds bodies (struts and nodes) and cables to the scene. They have no place yet:
+    place_robot() moves them to their poses."""
     names, p_BN = structure.node_names, structure.p_BN
     strut_radius, node_radius = drawn_radii(structure)
     shades = _mixed("rear", "lead", np.linspace(0.0, 1.0, len(structure.bodies)))
@@ -99,7 +100,9 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
 def place_robot(
     meshcat: Meshcat, structure: Structure, frame: xarray.Dataset, *, per_newton: float
 ) -> None:
-    """Moves bodies and cables to their poses in `frame`, one sample of a trajectory."""
+    """Moves bodies and cables to their poses in `frame`, one sample of a trajectory (`time` has
+    length 1). Nodes on the ground get their colour. `per_newton` is the drawn radius of a cable per
+    newton of tension (m/N)."""
     for body, name in enumerate(structure.bodies):
         turn = Quaternion(frame["q_WB"].values[0, body])
         position = frame["p_WB"].values[0, body]
@@ -119,7 +122,7 @@ def place_robot(
 
 
 def node_paths(structure: Structure) -> list[str]:
-    """Path of each node in the scene."""
+    """Path of each node in the tree of Meshcat, such as "/robot/T1/node T1 top"."""
     named = zip(structure.body_of_node, structure.node_names, strict=True)
     return [f"/robot/{body}/node {name}" for body, name in named]
 
@@ -142,21 +145,22 @@ def cable_paths(structure: Structure) -> list[str]:
 
 
 def drawn_radii(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
-    """Drawn radii of struts (struts,) and nodes (nodes,), in m. A node is at least 1.8 times as
-    thick as the thinnest strut."""
+    """Drawn radii of struts (struts,) and nodes (nodes,), in m: their own, but at least
+    least_drawn_radius() for a strut and 1.8 times as much for a node."""
     least = least_drawn_radius(structure)
     return structure.strut_radius.clip(min=least), structure.node_radius.clip(min=1.8 * least)
 
 
 def least_drawn_radius(structure: Structure) -> float:
-    """Drawn radius (m) of the thinnest strut."""
+    """Drawn radius (m) of the thinnest strut: its own, but at least the longest strut's length
+    divided by SLENDERNESS."""
     longest = structure.strut_table.length.max(initial=0.0)
     return max(structure.least_radius, float(longest) / SLENDERNESS)
 
 
 def radius_per_newton(structure: Structure, tension: float) -> float:
-    """Drawn radius of a cable per newton of tension. A cable with `tension` (N) has the radius
-    THICKEST."""
+    """Drawn radius of a cable per newton of tension (m/N). A cable with `tension` (N) is drawn with
+    THICKEST times the radius of the thinnest strut."""
     return THICKEST * least_drawn_radius(structure) / max(tension, 1e-9)
 
 
@@ -175,10 +179,10 @@ def set_surroundings(
     """Adds floor and light and sets the camera. Without ground there is no floor. The light casts
     shadows.
 
-    The floor surrounds `points` (..., 3), and the camera sees nodes at all of `seen` (..., 3), both
-    in m.
-    Where a contact node is drawn larger than its foot, the floor is drawn lower than the ground, by
-    the least difference.
+    The floor surrounds `points` (..., 3), such as all positions of the nodes over time. The camera
+    sees nodes at all of `seen` (..., 3). Both are in the world frame, in m.
+    Where contact nodes are drawn larger than they are, the floor is drawn lower than the ground by
+    the least difference of radii, so that they do not seem to sink in.
     """
     thick = drawn_radii(robot.structure)[1].max() * np.vstack([np.eye(3), -np.eye(3)])
     seen = (seen.reshape(-1, 1, 3) + thick).reshape(-1, 3)
@@ -209,8 +213,8 @@ def set_surroundings(
 
 
 def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: float) -> None:
-    """Adds the floor around `points` (..., 3), with lines around its squares. `reach` (m) is half
-    of the robot's length."""
+    """Adds the floor around `points` (..., 3) in m, with lines around its squares. `reach` is half
+    of the robot's length (m); margins of the floor are multiples of it."""
     ground, units = robot.ground, robot.scenario.units
     x_y, side = points.reshape(-1, 3)[:, :2], units.squares * units.square
     margin = (FLOOR_MARGIN if ground.flat else UNEVEN_MARGIN) * reach
@@ -248,11 +252,12 @@ def _add_floor(meshcat: Meshcat, robot: Robot, points: np.ndarray, *, reach: flo
 
 
 def floor_points(ground: Ground, corners: np.ndarray, units: Units) -> np.ndarray:
-    """Points of the ground (rows, columns, 3) in m, between corners (2, 2) in whole squares.
+    """Points of the ground (rows, columns, 3) in m, between two corners.
 
-    Rows are along x, columns along y. There are points at every line, or at every dark line on flat
-    ground beyond MOST_SQUARES. Where the ground bends, there are points in between, as many as
-    MOST_POINTS allows.
+    `corners` (2, 2) are the least and the greatest (x, y), as whole multiples of the side of a
+    square (units.square). Rows are along x, columns along y. There are points at every line, or at
+    every dark line on flat ground beyond MOST_SQUARES. Where the ground bends, there are points in
+    between, as many as MOST_POINTS allows.
     """
     (x_low, y_low), (x_high, y_high) = corners
     side = units.square
@@ -273,7 +278,8 @@ def floor_points(ground: Ground, corners: np.ndarray, units: Units) -> np.ndarra
 
 
 def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit vectors (3,) of the camera: to the right, up, and forward."""
+    """Unit vectors (3,) of the camera in the world frame: to the right, up, and forward (the
+    direction of view)."""
     forward = np.array(VIEW) / np.linalg.norm(VIEW)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -281,7 +287,8 @@ def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Position of a camera that looks at `target` (3,) and sees all `points` (points, 3)."""
+    """Position (3,) of a camera that looks at `target` (3,) along VIEW and sees all `points`
+    (points, 3). All are in the world frame, in m."""
     right, up, forward = view_axes()
     offset = points - target
     for_width = np.abs(offset @ right) / (ASPECT * VIEW_SLOPE) - offset @ forward
@@ -299,13 +306,15 @@ def _rgb(name: str) -> np.ndarray:
 
 
 def _mixed(first: str, second: str, share: np.ndarray) -> np.ndarray:
-    """Mixtures (..., 3) of two named colours. `share` (...) is the share of the second."""
+    """Mixtures (..., 3), RGB from 0 to 1, of two colours by their names in COLOURS. `share` (...),
+    from 0 to 1, is the share of the second."""
     return _rgb(first) + share[..., np.newaxis] * (_rgb(second) - _rgb(first))
 
 
 def _add_relief(meshcat: Meshcat, floor: np.ndarray, *, scale: float) -> None:
-    """Adds the surface through the points of the floor (rows, columns, 3), with walls around it.
-    Higher points are lighter."""
+    """Adds the surface through the points of the floor (rows, columns, 3) in m, with walls around
+    it. Higher points are lighter. `scale` is the robot's size (see Blueprint.scale); the height of
+    the walls grows with it."""
     z = floor[..., 2]
     share = (z - z.min()) / max(np.ptp(z), 0.1 * INCH * scale)
     colours = _mixed("low", "high", share)

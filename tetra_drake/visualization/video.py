@@ -94,7 +94,8 @@ def make_video(
 
 
 def _frames(page: Page, times: np.ndarray, say: Say) -> Iterator[bytes]:
-    """Pictures of a replay page at these times (s), as the bytes of their pixels."""
+    """Screenshots of a replay page at these times (s) of the simulation, as the bytes of their RGB
+    pixels. `say` gets a line of text about the progress every 50 screenshots."""
     for number, time in enumerate(times.tolist()):
         do(page, "show", time)
         yield picture_of(page).tobytes()
@@ -103,7 +104,8 @@ def _frames(page: Page, times: np.ndarray, say: Say) -> Iterator[bytes]:
 
 
 def encode(frames: Iterable[bytes], path: Path, *, size: tuple[int, int], fps: float) -> None:
-    """Writes a video of frames (bytes of RGB pixels) by ffmpeg.
+    """Writes a video of frames (bytes of RGB pixels) by ffmpeg. `size` is width and height in
+    pixels, `fps` the number of frames per second.
 
     Raises InputError unless ffmpeg takes all frames and ends well.
     """

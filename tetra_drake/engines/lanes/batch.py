@@ -64,7 +64,8 @@ class LaneBatch(Batch):
         record: bool = False,
         threads: int = 1,
     ) -> None:
-        """See Engine.start(). Compiles the kernel if necessary."""
+        """Puts robots at their start; for the arguments see Engine.start(). Compiles the kernel if
+        necessary."""
         places = places or len(robots)
         first = self._first = Prepared.of(robots[0], record=record)
         super().__init__(first.driven.robot.structure, places)
@@ -203,7 +204,8 @@ class LaneBatch(Batch):
         )
 
     def motion(self, place: int) -> Motion:
-        """Recorded motion of the robot in a place, up to now."""
+        """Recorded motion of the robot in place number `place` of the batch, up to its present
+        time."""
         log, kept = self._log, slice(self._log.kept[place])
         tables = log.times, log.states, log.signals, log.modes, log.drives
         return Motion(*(table[place, kept].copy() for table in tables))
@@ -236,8 +238,9 @@ class LaneThread:
         heights: np.ndarray,
         readings: Readings,
     ) -> None:
-        """Makes lanes for robots like `first`. The other arguments are tables with a row per robot,
-        which all threads share; `heights` (places, heights) of the terrains are in m."""
+        """Makes idle lanes for robots like `first`. The other arguments are tables with a row per
+        place of the batch, which all threads share: see Log, Places and Readings. `heights`
+        (places, heights) of the terrains are in m."""
         width = processor_lanes()
         self._lane_places = np.zeros_like(log.place)
         self._queue, self._waiting = np.zeros_like(places.queue), np.zeros_like(places.waiting)
@@ -278,13 +281,14 @@ class LaneThread:
         self._queue[NEXT], self._queue[LAST] = 0, len(places)
 
     def leave(self, place: int) -> None:
-        """Takes the robot of a place out of its lane, or out of the queue."""
+        """Takes the robot in place number `place` of the batch out of its lane, or out of the queue
+        of waiting robots, wherever it is. Its state is not saved."""
         self.waiting = [other for other in self.waiting if other != place]
         self._status[self._lane_places == place] = loop.IDLE
 
     def simulate(self, wall_times: np.ndarray, *, briefly: bool) -> None:
-        """Simulates until all robots have ended or paused. With `briefly` it returns earlier; see
-        Batch.advance().
+        """Simulates until all robots of this thread have ended or paused. With `briefly` it returns
+        after one call of the kernel, at most some 30 ms.
 
         The wall time (s) is divided equally among the robots and added to `wall_times` (places,).
         """
@@ -298,7 +302,7 @@ class LaneThread:
 
 
 def processor_lanes() -> int:
-    """Number of robots that a core of this processor simulates at once.
+    """Number of lanes, the robots that a core of this processor simulates at once: 4 or 8.
 
     It is the same for any number of robots, so that one kernel is compiled. The results do not
     depend on it. Eight doubles fill a register of AVX-512. With narrower

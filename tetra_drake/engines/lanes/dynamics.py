@@ -31,11 +31,12 @@ U, W, D, WEIGHT, LINE_COLUMNS = 0, 3, 6, 9, 10
 add_cables()), the damping times the time, and the number of columns."""
 
 
-Pairs: TypeAlias = tuple[tuple[int, int], ...]
+BodyPairs: TypeAlias = tuple[tuple[int, int], ...]
 
 
 class Solver(NamedTuple):
-    """Block layout and elimination order of the implicit matrix; see implicit_matrix()."""
+    """Positions of the 6 x 6 blocks of the implicit matrix in memory, and the order of elimination
+    of the bodies; see implicit_matrix()."""
 
     schedule: Schedule
     coupled: Table
@@ -51,7 +52,7 @@ class Solver(NamedTuple):
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """The solver for the coupled bodies of a robot."""
+        """The solver for a robot, whose bodies are coupled in pairs by cables and joints."""
         couplings, joints, routes = robot.couplings, robot.joints, robot.cables.routes
         body_of = np.full(len(robot.p_BN), WORLD)
         sizes = np.diff(robot.first_node)
@@ -67,7 +68,7 @@ class Solver(NamedTuple):
 
     @classmethod
     @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
-    def _of(cls, bodies: int, coupled: Pairs, jointed: Pairs, on_paths: Pairs) -> Self:
+    def _of(cls, bodies: int, coupled: BodyPairs, jointed: BodyPairs, on_paths: BodyPairs) -> Self:
         """The solver for the pairs of bodies that straight cables, joints and paths join."""
         schedule = Schedule.of(bodies, [*coupled, *jointed, *(p for p in on_paths if p[0] < p[1])])
         blocks = schedule.blocks | {(body, body): body for body in range(bodies)}
@@ -106,8 +107,7 @@ def _swapped(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> tuple[np.ndarra
 
 @inlined
 def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table) -> None:
-    """Writes the accelerations of bodies under forces `force` (6*bodies,) to `acceleration` (6
-    bodies,).
+    """Writes the accelerations (6*bodies,) of bodies under `force` (6*bodies,) to `acceleration`.
 
     Each body has 6 numbers, rotation before translation, in the world frame. `inertia_W` is
     Forces.inertia: the inertia of each body about the world's axes.
@@ -127,8 +127,8 @@ def accelerate(robot: Model, inertia_W: Table, force: Table, acceleration: Table
 
 @inlined
 def momentum(robot: Model, inertia_W: Table, velocity: Table, body: int) -> tuple[Real, ...]:
-    """Momentum of body number `body`: its mass matrix times its velocity, part of `velocity` (6
-    bodies,).
+    """Momentum (6 numbers) of body number `body`: its mass matrix times its part of `velocity`
+    (6*bodies,), the velocities of all bodies.
 
     Each body has 6 numbers, rotation before translation, in the world frame. `inertia_W` is
     Forces.inertia: the inertia of each body about the world's axes.
@@ -155,12 +155,14 @@ def implicit_matrix(
     lines: Table,
     blocks: Table,
 ) -> None:
-    """Writes the implicit matrix of a step to `blocks`: mass matrix + time * damping matrix + time²
-    * stiffness of contacts and anchors.
+    """Writes the implicit matrix of a step, which multiplies the unknown velocity rates, to
+    `blocks`: mass matrix + time * damping matrix + time² * stiffness of contacts and anchors.
 
     `blocks` (blocks, 6, 6) has a block per body and per pair of coupled bodies; see module sparse.
-    `time` is in s, a share of the step. The damping of cables, normal forces and stiction makes the
-    equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
+    Of a symmetric block only the upper half is written. `state` and `modes` are at the beginning of
+    the step, and `forces` was computed for them. `time` is in s, a share of the step. The damping
+    of cables, normal forces and stiction makes the equations stiff. `lines` (CABLES_AT_ONCE,
+    LINE_COLUMNS) is scratch memory.
     """
     for body in range(robot.bodies.mass.size):
         for r in range(BLOCK):
@@ -230,12 +232,13 @@ def add_cables(
     lᵀ.
 
     `pair` is the number of a pair of bodies that cables join. At most CABLES_AT_ONCE (6) of its
-    cables are added, from cable `first` on. `time` is in s; `lines` is scratch memory, a row per
-    cable.
+    cables are added, from cable number `first` of the robot on. `time` is in s; `lines` is scratch
+    memory, a row per cable. The cables' directions and dampings are read from `forces`.
 
     The 12 numbers of l, times the velocities of both bodies, are the rate of the cable's length.
-    With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and w =
-    p_b x d. The sum over cables is a product of two columns of `lines`.
+    With the cable's direction d and its ends p_a and p_b, relative to the origins of their bodies,
+    l = (u, -d, w, d), u = d x p_a and w = p_b x d. The sum over cables is a product of two columns
+    of `lines`.
     """
     last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
     for j in range(CABLES_AT_ONCE):
@@ -333,7 +336,8 @@ def add_joint(nodes: Table, a: int, b: int, block: int, k: Real, blocks: Table) 
 
 @inlined
 def put(value: Real, adds: bool, block: int, r: int, c: int, blocks: Table) -> None:
-    """Writes a number to row r and column c of a block, or adds it to the number there if `adds`.
+    """Writes a number to row r and column c of block number `block` of `blocks`, or adds it to the
+    number there if `adds`.
 
     If all blocks were set to zero first, to add only, a step would take 2 to 5 % longer.
     """
@@ -350,7 +354,8 @@ Column = tuple[Real, Real, Real, Real, Real, Real]
 
 @inlined
 def column(lines: Table, c: int) -> Column:
-    """Column c of `lines` (6, LINE_COLUMNS): a number for each of 6 cables."""
+    """Column c of the table `lines` (6, LINE_COLUMNS) of add_cables(): a number for each of 6
+    cables."""
     return lines[0, c], lines[1, c], lines[2, c], lines[3, c], lines[4, c], lines[5, c]
 
 
@@ -362,7 +367,7 @@ def weighted(w: Column, x: Column) -> Column:
 
 @inlined
 def product(x: Column, y: Column) -> Real:
-    """Scalar product of two columns."""
+    """Scalar product of two columns of add_cables(): a sum over 6 cables."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2] + x[3] * y[3] + x[4] * y[4] + x[5] * y[5]
 
 
@@ -378,8 +383,9 @@ def add_contact(
 ) -> None:
     """Adds the contact of a foot to the implicit matrix `blocks`, in lanes where the foot touches.
 
-    The foot is contact node number `i`. The contact is time * damping + time² * stiffness, `time`
-    in s.
+    The foot is contact node number `i`. What is added is time * damping + time² * stiffness of the
+    ground, along its normal and its tangents, with `time` in s. `state`, `modes` and `forces` are
+    only read.
     """
     nodes, frames, law = forces.nodes, forces.frames, named(contact.NormalForce, ground.normal)
     touches, node, body = modes[i, contact.CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
@@ -409,8 +415,9 @@ def add_diagonal(
 ) -> None:
     """Adds Jᵀ diag(k_x, k_y, k_z) J of a node to its body's block of the implicit matrix.
 
-    `node` is a row of `nodes`; `k` is along the world's axes. The node is at p from the body's
-    origin. J = [-[p]x 1] gives the node's velocity from the body's.
+    `node` is the node's row in `nodes`, `body` the number of its body. `k` is (k_x, k_y, k_z),
+    along the world's axes. The node is at p from the body's origin, in the world frame. J = [-[p]x
+    1] gives the node's velocity from the body's.
     """
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     k_x, k_y, k_z = k
@@ -438,7 +445,7 @@ def add_off_diagonal(
     """Adds Jᵀ K J of a node to its body's block of the implicit matrix. `k` is k_xy, k_xz and k_yz,
     the elements of the symmetric matrix K beside its diagonal, which is 0 here.
 
-    For J see add_diagonal().
+    For J and the other arguments see add_diagonal().
     """
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     xy, xz, yz = k

@@ -71,8 +71,8 @@ SCRATCH_ROWS = 3
 
 
 class Constants(NamedTuple):
-    """Constants of the simulations in the lanes, in SI units. Tables without a shape have one
-    number."""
+    """Constants of the simulations in the lanes, in SI units: each lane has its own. Tables without
+    a shape have one number per lane."""
 
     robot: Model
     solver: Solver
@@ -103,8 +103,8 @@ class Constants(NamedTuple):
 class LaneState(NamedTuple):
     """State of the simulations in the lanes, with scratch memory.
 
-    The fields before `step.end` are the whole state of a simulation. Only they are kept while a
-    robot waits for a lane; see places.Places.
+    The fields from `clock` to `tally`, and `step.state`, the bodies' state, are the whole state of
+    a simulation. Only they are kept while a robot waits for a lane; see places.Places.
     """
 
     clock: Annotated[Table, CLOCK_ROWS]
@@ -133,7 +133,8 @@ class LaneState(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Times at which each simulation stops or is sampled, and its samples; a row per robot."""
+    """Times at which each simulation stops or is sampled, and its samples; a row per place of the
+    batch, which is a robot's index there."""
 
     place: Annotated[Table, "lanes", int]
     """Row of these tables for the robot in each lane; see `places`."""
@@ -165,10 +166,11 @@ class Log(NamedTuple):
 @merged
 def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
     """Tries one step in each lane, with a length of its own. A lane whose error is too large stays
-    where it is, and plans a shorter step.
+    where it is, and plans a shorter step. Changes the tables of `lanes` and `log` in place.
 
     `live` is True if the network is integrated together with the robot; otherwise signals are
-    samples. Returns True if a simulation has reached its pause or has failed.
+    interpolated between samples. Returns True if a simulation has ended: at the time up to which it
+    was to run, or by a failure. Samples of motions that are recorded go to `log`.
     """
     clock, ended = lanes.clock, False
     if any_lane((clock[STATUS] == RUNNING) & (clock[TIME] >= clock[MARK])):
@@ -223,8 +225,9 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
 
 @inlined
 def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
-    """Writes the signals (N) at the end of the step to `lanes.end_signals`. For a live network,
-    integrated together with the robot, they are a prediction."""
+    """Writes the signals (N) at the end of the step to `lanes.end_signals`. `live` is True if the
+    network is integrated together with the robot; then the signals are a prediction, corrected at
+    the end of the step. Otherwise they are interpolated between samples."""
     clock = lanes.clock
     if live:
         feel(constants, lanes, log, clock[TIME], lanes.step.state)
@@ -239,8 +242,9 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
 
 @inlined
 def move_on(lanes: LaneState, is_running: Truth, accepted: Truth) -> None:
-    """Copies the end of the step to the state, in lanes that accept the step. Counts the steps,
-    tried in lanes that run and taken in lanes that accept."""
+    """Copies the end of the step to the state in `lanes`, where the mask `accepted` is true. Counts
+    the tried steps of lanes where `is_running` is true, and the taken steps of lanes that
+    accept."""
     clock, state = lanes.clock, lanes.step.state
     for i in range(state.size):
         state[i] = select(accepted, lanes.step.end[i], state[i])
@@ -276,8 +280,8 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def fate(constants: Constants, lanes: LaneState) -> Real:
-    """Status of each lane after a step: RUNNING, or the kind of its failure. It has no meaning in
-    lanes that do not run."""
+    """Status of each lane after a step: RUNNING (1), or the number of its failure: TOO_FAST,
+    STEP_TOO_SMALL or TOO_MANY_EVALUATIONS. It has no meaning in lanes that do not run."""
     state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):
@@ -292,8 +296,9 @@ def fate(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> None:
-    """Integrates the networks of the thesis's listing ahead of the robots, until every running lane
-    has the samples of its signals before and after the time `until` (s).
+    """Integrates networks that do not depend on the robots, as in the thesis's listing, ahead of
+    the robots: until every running lane has the samples of its signals before and after the time
+    `until` (s), a time per lane. Writes the samples (N) to the ring buffers `log.recent`.
 
     Other lanes run too, as far as their ring buffers allow. So steps for a single lane are rare.
     """
@@ -321,8 +326,9 @@ def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> 
 
 @inlined
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
-    """Writes the inputs of a live network to `lanes.inputs`: tonic input and feedback. They are for
-    the robot's `state` (13*bodies,) at a time (s)."""
+    """Writes the inputs of the neurons of a live network, tonic input plus feedback, to
+    `lanes.inputs`. They are for the robot's `state` (13*bodies,) at a time (s). A live network is
+    integrated together with the robot."""
     steer(constants, lanes, log, time / constants.period[0])
     sense(constants.senses, constants.gains, state, lanes.modes, lanes.forces, lanes.inputs)
     for i in range(lanes.inputs.size):
@@ -331,10 +337,11 @@ def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Ta
 
 @inlined
 def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> None:
-    """Writes the tonic input of the neurons to `lanes.tonic`, for the steering at `sample`. Does
-    nothing if the steering is constant.
+    """Writes the tonic input of the neurons to `lanes.tonic`, for the turn at `sample`. Does
+    nothing if the turn is constant.
 
-    `sample` is a position in `log.turns`, the steering over time: an index with a fraction.
+    `sample` is a position, in each lane, in the lane's row of `log.turns`, the turns (-1 to 1) over
+    time: an index with a fraction.
     """
     turns = log.turns.shape[1]
     if turns == 1:
@@ -354,7 +361,8 @@ def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> Non
 @inlined
 def drive(constants: Constants, lanes: LaneState) -> None:
     """Writes the signals (N) of a live network at the end of the step to `lanes.end_signals`: the
-    gain times the oscillators' outputs, but 0 before the start-up time."""
+    gain times the oscillators' outputs, but 0 before the start-up time. `lanes.neurons` must be at
+    the end of the step already."""
     oscillator.oscillator_output(lanes.neurons, lanes.output)
     active, gain = lanes.clock[ACTIVE] != 0.0, constants.gain[0]
     for k in range(lanes.output.size):
@@ -365,9 +373,12 @@ def drive(constants: Constants, lanes: LaneState) -> None:
 def interpolate(
     constants: Constants, lanes: LaneState, log: Log, lane: int, time: float, signals: Table
 ) -> None:
-    """Writes the signals of one lane at a time (s) to its column of `signals` (m, W), in N. They
-    are linear between samples: of the listing's network, a command or a controller. They are 0
-    before the start-up time."""
+    """Writes the signals (N) of lane number `lane` at a time (s) to its column of `signals` (m, W),
+    where W is the number of lanes.
+
+    They are linear between the samples in `log.recent`, which come from a network that does not
+    depend on the robot, a command or a controller. They are 0 before the start-up time.
+    """
     if by_lane(lanes.clock)[ACTIVE, lane] == 0.0:
         for k in range(signals.shape[0]):
             signals[k, lane] = 0.0
@@ -385,15 +396,15 @@ def interpolate(
 
 @inlined
 def row_of(sample: int, log: Log) -> int:
-    """Row of sample number `sample` of the signals in the ring buffer `log.recent`: the number
-    modulo the rows, a power of two."""
+    """Row of sample number `sample` of the signals in a robot's ring buffer in `log.recent`: the
+    number modulo the number of rows, which is a power of two."""
     return sample & (log.recent.shape[1] - 1)
 
 
 @merged
 def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
-    """Sets the next mark and the present signals, in lanes that have reached their mark. A mark is
-    a time at which a step must end.
+    """Sets the next mark and the present signals in `lanes`, for lanes that have reached their
+    mark. A mark is a time at which a step must end.
 
     A lane that has reached its pause gets the status DONE. Returns True if there is one. `live` is
     True if the network is integrated together with the robot.
@@ -423,8 +434,9 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
 
 @inlined
 def next_mark(log: Log, place: int, time: float) -> float:
-    """Next time (s), after `time` (s), at which a step of the robot in a place must end: a mark,
-    its pause, or the end of a change of its controller's signals."""
+    """Next time (s), after `time` (s), at which a step of the robot in row `place` of `log` must
+    end: the next entry of `log.marks`, its pause, or the end of a change of its controller's
+    signals."""
     mark = min(log.marks[place, log.passed[place]], log.until[place])
     if log.change_ends[place] > time:
         mark = min(mark, log.change_ends[place])
@@ -433,8 +445,9 @@ def next_mark(log: Log, place: int, time: float) -> float:
 
 @merged
 def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
-    """Records the samples that are due within the step in the tables of `log`, in lanes that accept
-    the step. All but the contact modes are interpolated."""
+    """Writes the samples of the motion that are due within the step to the tables of `log`, for
+    lanes that accept the step. Contact modes are the ones during the step; all else is
+    interpolated. `live` is True if the network is integrated together with the robot."""
     clock, modes, accepted = by_lane(lanes.clock), by_lane(lanes.modes), by_lane(lanes.scratch)
     signals = np.empty((lanes.signals.size, log.place.size))
     for lane in range(log.place.size):
@@ -466,7 +479,7 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
 
 @inlined
 def column(table: Table, lane: int) -> np.ndarray:
-    """Copy (size,) of one lane of a table (size, W)."""
+    """Copy (size,) of the numbers of lane number `lane` of a table (size, W), with W lanes."""
     copy = np.empty(table.shape[0])
     for k in range(copy.size):
         copy[k] = table[k, lane]

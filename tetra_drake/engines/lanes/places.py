@@ -30,7 +30,8 @@ NEXT, LAST = range(2)
 
 
 class Places(NamedTuple):
-    """State and constants of each robot, and the queue of waiting robots; a row per robot."""
+    """State and constants of each robot of a batch, and the queue of robots that wait for a lane. A
+    row of a table is a place, the index of a robot in the batch."""
 
     states: Annotated[Table, "places", "numbers"]
     """The numbers of LaneState before `step.end`."""
@@ -46,8 +47,8 @@ class Places(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Memory of the tables of all lanes: a column per lane, with its numbers in the order of a row
-    of `Places`."""
+    """Memory of the tables of all lanes, for copies from and to Places: (numbers, W), a column for
+    each of W lanes, with its numbers in the order of a row of `Places`."""
 
     states: Table
     constants: Table
@@ -98,8 +99,8 @@ def advance(parts: LaneParts, rounds: int) -> None:
 
 @functools.partial(compiled, nogil=True)
 def exchange(parts: LaneParts) -> None:
-    """Moves robots that have ended from their lanes back to the tables, and waiting robots from the
-    tables to idle lanes."""
+    """Copies the states of robots that have ended from their lanes back to their rows of the tables
+    of Places, and puts waiting robots from the tables into idle lanes."""
     constants, lanes, log, memory, places, _, _ = unpacked(parts)
     clock, held, queue = by_lane(lanes.clock), by_lane(lanes.signals), places.queue
     searched = by_lane(lanes.forces.near_struts.p_WN)
@@ -137,8 +138,8 @@ def exchange(parts: LaneParts) -> None:
 
 @inlined
 def read_paused(lanes: LaneState, log: Log, to: Readings) -> None:
-    """Writes the readings of robots that have reached their pause to `to`, in the rows of their
-    places.
+    """Writes the readings of robots that have reached their pause to `to`, each in the row of its
+    place, the robot's index in the batch.
 
     Call it before the clearance is computed. For this the nodes' positions are computed again in
     all lanes, which changes their last digits.

@@ -45,8 +45,8 @@ class Prepared:
 
     @classmethod
     def of(cls, driven: DrivenRobot, *, record: bool) -> Prepared:
-        """Prepares a robot for a lane. Raises InputError if gait or steering do not fit the
-        scenario."""
+        """Prepares a robot for a lane, at t = 0. With `record`, its trajectory is sampled. Raises
+        InputError if gait or steering do not fit the scenario."""
         robot, model, structure = driven.robot, driven.robot.model, driven.robot.structure
         scenario, turns, solver = robot.scenario, driven.turns, Solver.of(model)
         cpg, engine = scenario.cpg, scenario.settings_of(Compiled)

@@ -56,7 +56,7 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 class StepMemory(NamedTuple):
-    """Memory of a step from `state` to `end` (13*bodies,)."""
+    """Memory of a step from `state` to `end`, the states [q; v] (13*bodies,) of the bodies."""
 
     state: Annotated[Table, "13 * bodies"]
     end: Annotated[Table, "13 * bodies"]
@@ -149,9 +149,12 @@ def take_step(
 def compute_end_forces(
     robot: Model, work: StepMemory, modes: Table, forces: Forces, signals: Table, write_parts: bool
 ) -> None:
-    """Writes the forces at work.end to work.end_force. Torques are converted to the mass matrix at
-    the beginning of the step: the angular accelerations stay the same. With `write_parts`, the
-    forces of cables and ground are also written to `forces`."""
+    """Writes the generalized forces (6*bodies,) at the state work.end to work.end_force.
+
+    Torques are converted to the mass matrix at the beginning of the step: the angular accelerations
+    stay the same. `signals` (m,) are in N, `modes` are the contact modes during the step. `forces`
+    is working memory; with `write_parts` it then holds the forces of cables and ground.
+    """
     force = work.end_force
     move_robot(robot, work.end, forces)
     compute_forces(robot, work.end, modes, signals, write_parts, forces, force)
@@ -166,8 +169,8 @@ def compute_end_forces(
 
 @inlined
 def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real:
-    """Largest component of k1 + k2, as the acceleration (m/s²) of a body or, for rotations, of its
-    nodes and feet. NaN if a component is NaN.
+    """Largest absolute component of k1 + k2, as the acceleration (m/s²) of a body or, for
+    rotations, of its nodes and feet. NaN if a component is NaN.
 
     With the stages k1 and k2 (6*bodies,) of ROS2, (k1 + k2) / 2 times the step is the difference to
     the first-order solution. The spin of a thin bar about its axis does not count, unless it moves
@@ -196,8 +199,8 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
 
 @inlined
 def motion_at(nodes: Table, row: int, turn: Vector3) -> Real:
-    """Largest component of turn x p. `turn` is an angular rate of a body, and p the vector from its
-    origin to the node in a row of `nodes`."""
+    """Largest absolute component of turn x p. `turn` is an angular velocity or acceleration of a
+    body, and p the vector from its origin to the node in row number `row` of `nodes`."""
     x, y, z = cross(turn, vector_at(nodes, row, P_BN_W))
     return larger(larger(abs(x), abs(y)), abs(z))
 

@@ -24,7 +24,8 @@ BLOCK = 6
 
 
 class Schedule(NamedTuple):
-    """Positions of the blocks of a sparse matrix, in the order of elimination."""
+    """Positions of the 6 x 6 blocks of a sparse symmetric matrix in the table `blocks` (blocks, 6,
+    6), in the order of elimination. Block i of the first ones is body i's own."""
 
     order: Table
     """Body at each position of the elimination (bodies,)."""
@@ -92,7 +93,8 @@ def minimum_degree_order(bodies: int, pairs: Iterable[tuple[int, int]]) -> np.nd
 
 @inlined
 def factorise(blocks: Table, schedule: Schedule) -> None:
-    """Factorises `blocks` in place: L D Lᵀ with 1 / D on the diagonal.
+    """Factorises the matrix `blocks` (blocks, 6, 6) in place: L D Lᵀ, with 1 / D in place of D, and
+    D Lᵀ above the diagonal.
 
     A number stays in a variable while all products of a body are subtracted. A loop over the pivots
     would read and write it once per pivot.
@@ -117,8 +119,8 @@ def factorise(blocks: Table, schedule: Schedule) -> None:
 
 @inlined
 def reduce_block(blocks: Table, i: int, a: int) -> None:
-    """Applies the factors of body i's own block to block `a`, which couples it to a later body: the
-    first part of the elimination of body i in factorise()."""
+    """Applies the factors of body i's own block to block number `a`, in place. Block `a` couples
+    body i to a later body. This is the first part of the elimination of body i in factorise()."""
     f_01, _, _, _, _, _ = factors(blocks, i, i, 1)
     f_02, f_12, _, _, _, _ = factors(blocks, i, i, 2)
     f_03, f_13, f_23, _, _, _ = factors(blocks, i, i, 3)
@@ -153,8 +155,8 @@ def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, end: int, produ
 
 @inlined
 def factors(blocks: Table, i: int, k: int, c: int) -> tuple[Real, ...]:
-    """Column c of block k in the row of body i, each number divided by the pivot of its row. The
-    inverse pivots are on the diagonal of block i."""
+    """Column c (6 numbers) of block number k, which is in the row of body i, each number divided by
+    the pivot of its row. The inverse pivots are on the diagonal of block i."""
     return (
         blocks[k, 0, c] * blocks[i, 0, 0],
         blocks[k, 1, c] * blocks[i, 1, 1],
@@ -167,7 +169,8 @@ def factors(blocks: Table, i: int, k: int, c: int) -> tuple[Real, ...]:
 
 @inlined
 def reduced(x: Real, column: tuple[Real, ...], blocks: Table, k: int, c: int) -> Real:
-    """x minus the scalar product of `column`, a column of factors(), and column c of block k."""
+    """x minus the scalar product of `column`, six numbers of factors(), and column c of block
+    number k."""
     x = x - column[0] * blocks[k, 0, c] - column[1] * blocks[k, 1, c] - column[2] * blocks[k, 2, c]
     return (
         x - column[3] * blocks[k, 3, c] - column[4] * blocks[k, 4, c] - column[5] * blocks[k, 5, c]

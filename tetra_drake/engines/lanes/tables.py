@@ -10,16 +10,16 @@ from tetra_drake.kernels.lanes import FieldArray, lane_table
 
 
 def numbers_of(values: Any) -> np.ndarray:
-    """All real numbers of nested NamedTuples of arrays, in one row (numbers,), field after
-    field."""
+    """All numbers of the float64 arrays in nested NamedTuples, in one row (numbers,), field after
+    field. Arrays of indices are left out."""
     if isinstance(values, tuple):
         return np.concatenate([np.zeros(0), *map(numbers_of, values)])
     return values.ravel() if _is_real(values) else np.zeros(0)
 
 
 def shared(values: Any) -> Any:
-    """Parts of NamedTuples of arrays that are the same in all lanes: indices, Booleans, and the
-    shapes of the tables of real numbers."""
+    """Parts of NamedTuples of arrays that must be the same in all lanes, as nested tuples that can
+    be compared: indices, Booleans, and the shapes of the tables of float64 numbers."""
     if isinstance(values, tuple):
         return tuple(map(shared, values))
     if not isinstance(values, np.ndarray):
@@ -50,13 +50,14 @@ def views(values: Any, numbers: np.ndarray, *, lanes: bool = False) -> Any:
 
 
 def numbered(values: Any) -> Any:
-    """NamedTuples like `values` with each real number replaced by its index in numbers_of()."""
+    """NamedTuples like `values` with each float64 number replaced by its index in the row of
+    numbers_of()."""
     return views(values, np.arange(numbers_of(values).size, dtype=float))
 
 
 def in_lanes(values: Any, width: int) -> tuple[Any, np.ndarray]:
-    """Tables in lanes for NamedTuples of arrays, and their memory (numbers, lanes). All lanes have
-    the numbers of `values`. They share the arrays of indices."""
+    """NamedTuples like `values` whose tables have `width` lanes, and the tables' memory (numbers,
+    width). At first all lanes have the numbers of `values`. They share the arrays of indices."""
     numbers = numbers_of(values)
     memory = lane_table(numbers.shape, width).array
     memory[:] = numbers[:, np.newaxis]

@@ -25,7 +25,8 @@ from tetra_drake.laws.vectors import put_vector
 
 
 class Touching(NamedTuple):
-    """Contacts of struts that are part of the implicit matrix; further ones are explicit."""
+    """Contacts between struts that the implicit matrix of a step takes into account; the forces of
+    further contacts are explicit."""
 
     along: Annotated[Table, "6 * touches * bodies"]
     """Derivatives g of the struts' distances, one vector per contact, one after the other."""
@@ -45,12 +46,12 @@ class Touching(NamedTuple):
 def add_touching(
     robot: Model, schedule: Schedule, forces: Forces, time: Real, blocks: Table, touching: Touching
 ) -> None:
-    """Writes the contacts of struts for the implicit matrix to `touching`, in the state of
-    `forces`.
+    """Writes the contacts between struts for the implicit matrix to `touching`, at the node
+    positions in `forces`.
 
-    `blocks` is the factorised matrix without them, and stays so. `time` is in s, a share of the
-    step. Forces on nodes are overwritten. Each lane numbers its own contacts, so that it does not
-    depend on the other lanes.
+    `blocks` is the factorised matrix without them, and is not changed. `time` is in s, a share of
+    the step. The forces on nodes in `forces` are overwritten. Each lane numbers its own contacts,
+    so that it does not depend on the other lanes.
     """
     near, nodes, vector = forces.near_struts, forces.nodes, touching.vector
     law = named(contact.NormalForce, robot.strut_contact.normal)
@@ -86,11 +87,12 @@ def add_touching(
 def put_contact(
     touching: Touching, takes_place: Truth, place: Real, spring: Real, damping: Real
 ) -> None:
-    """Stores a contact of struts in lanes where `takes_place`, as contact number `place` of the
-    lane.
+    """Stores a contact of two struts in `touching`, in lanes where the mask `takes_place` is true,
+    as contact number `place` of the lane.
 
-    Its vector g, the derivative of the struts' distance, is in `touching.vector`. Its weight w in
-    the implicit matrix is `spring` + `damping`.
+    Its vector g, the derivative of the struts' distance, is read from `touching.vector`. Its weight
+    w in the implicit matrix is `spring` + `damping`, both in kg: the stiffness times time², and
+    the damping coefficient times the time.
     """
     size = touching.vector.size
     count = touching.count[0]
@@ -120,8 +122,9 @@ def product(vectors: Table, k: int, x: Table) -> Real:
 
 @inlined
 def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Table) -> None:
-    """Solves the factorised system with the contacts of `touching`. `x` (6*bodies,) is the
-    right-hand side, and is overwritten by the solution."""
+    """Solves the linear system of the matrix that factorise() has left in `blocks`, plus the
+    contacts of `touching`. `x` (6*bodies,) is the right-hand side, and is overwritten by the
+    solution."""
     solve(blocks, schedule, x)
     for k in range(touching.count[0]):
         scale = touching.factor[k] * product(touching.along, k, x)
@@ -131,8 +134,8 @@ def solve_touching(blocks: Table, schedule: Schedule, touching: Touching, x: Tab
 
 @inlined
 def subtract_springs(touching: Touching, factor: Real, k1: Table, k2: Table) -> None:
-    """Subtracts factor * K * k1 from k2, where K is time² * the stiffness matrix of the contacts.
-    k1 and k2 (6*bodies,) are the stages of the step."""
+    """Subtracts factor * K * k1 from k2, in place. K is time² * the stiffness matrix of the
+    contacts in `touching`, k1 and k2 (6*bodies,) are the stages of the step."""
     for k in range(touching.count[0]):
         scale = factor * touching.spring[k] * product(touching.along, k, k1)
         for n in range(k2.size):

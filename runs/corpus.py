@@ -1,0 +1,175 @@
+"""Structures of the literature and of public files, measured: statics, and rest on three engines.
+
+    python runs/corpus.py [NAME ...]
+
+The structures are files of tests/data/corpus. Each is brought to equilibrium, then simulated for
+one second from there on the compiled engine, the Drake diagram and MuJoCo. A structure without
+weight or with anchors has no ground; others stand on one. Bars of plane models cross, so struts do
+not touch each other.
+
+Writes measured.json and README.md in that folder. Without names, the structures that have no
+numbers yet are measured; so an interrupted run goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tetra_drake.engines.engine import engine_of
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.files import write_whole
+from tetra_drake.formatting import TextTable
+from tetra_drake.laws.capsules import NoStrutContact
+from tetra_drake.laws.terrain import Nothing
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.study.equilibrium import EquilibriumStudy, robot_of_file, study_equilibrium
+
+FOLDER = Path(__file__).parents[1] / "tests" / "data" / "corpus"
+MEASURED, KNOWN, PAGE = FOLDER / "measured.json", FOLDER / "known.yaml", FOLDER / "README.md"
+ENGINES = {"compiled": Compiled(), "drake": Drake(), "mujoco": Mujoco()}
+SECONDS = {"simulation.duration": 1.0, "simulation.steady_from": 0.5}
+ABOUT = """# Structures of the literature
+
+Made by `python runs/corpus.py` from the files of this folder; each names its source. Rest: the
+largest displacement of a node within one second from the equilibrium. Speed: simulated time per
+wall time, one robot on the compiled engine. Masses are in kg, frequencies in Hz."""
+
+
+def names() -> list[str]:
+    """Names of the structures, in the order of the alphabet."""
+    return sorted(file.stem for file in FOLDER.glob("*.yaml") if file != KNOWN)
+
+
+def robot_of(name: str) -> Robot:
+    """Robot of a structure in equilibrium: on the ground if only the ground bears it."""
+    file = FOLDER / f"{name}.yaml"
+    structure = read_structure(file)
+    if structure.gravity and not structure.anchors:
+        return robot_of_file(str(file))
+    parts = {"terrain": Nothing(), "strut_contact": NoStrutContact(), "engine": Mujoco()}
+    scenario = load_scenario("prism").with_sections(name=name, robot=structure, **parts)
+    friction = scenario.friction.without_bristles()
+    return Robot.of(scenario.with_sections(friction=friction), at_rest=True)
+
+
+def rest(robot: Robot, engine: str) -> SimulationResult:
+    """One second of a robot that starts in equilibrium and whose actuators rest."""
+    scenario = robot.scenario.with_sections(engine=ENGINES[engine]).with_numbers(SECONDS)
+    passive = dataclasses.replace(robot, scenario=scenario).without_network()
+    still = np.zeros((2, passive.structure.signals))
+    driven = DrivenRobot(robot=passive, name="rest", samples=still)
+    return engine_of(scenario).simulate(driven, record=True)
+
+
+def quantity(study: EquilibriumStudy, what: str) -> float:
+    """A number of an equilibrium by its name, such as "tension side", "distance a b" or, with a
+    slash, the ratio of two: "length side/base"."""
+    kind, _, named = what.partition(" ")
+    values = [_value(study, kind, part.split()) for part in named.split("/")]
+    return values[0] / values[1] if len(values) > 1 else values[0]
+
+
+def _value(study: EquilibriumStudy, kind: str, named: list[str]) -> float:
+    """A number of a kind. `named` are a group of cables, or the one or two nodes that it is of."""
+    states, mechanisms = len(study.statics.self_stresses), study.statics.mechanisms
+    if kind in ("tension", "length"):
+        return float(study.cables.loc[study.cables["group"] == named[0], kind].mean())
+    if kind in ("height", "distance", "twist"):
+        p_WN = study.nodes.loc[named, ["x", "y", "z"]].to_numpy()
+        if kind == "height":
+            return float(p_WN[0, 2])
+        if kind == "distance":
+            return float(np.linalg.norm(p_WN[1] - p_WN[0]))
+        centre = study.nodes[["x", "y"]].to_numpy().mean(axis=0)
+        first, second = np.arctan2(*(p_WN[:, :2] - centre).T[::-1])
+        return float(abs((np.degrees(second - first) + 180.0) % 360.0 - 180.0))
+    return float(
+        {
+            "states": states,
+            "mechanisms": mechanisms,
+            "states-mechanisms": states - mechanisms,
+            "mass": study.robot.structure.mass.sum(),
+            "load": study.nodes["load"].sum(),
+            "frequency": study.frequencies.min(initial=np.inf),
+        }[kind]
+    )
+
+
+def measured(name: str) -> dict[str, Any]:
+    """Numbers of a structure: statics, known quantities as found here, rest on each engine."""
+    study = study_equilibrium(robot_of(name))
+    structure = study.robot.structure
+    row: dict[str, Any] = {
+        "bodies": len(structure.bodies),
+        "cables": len(structure.cables),
+        "states": len(study.statics.self_stresses),
+        "mechanisms": study.statics.mechanisms,
+        "mass": float(structure.mass.sum()),
+        "frequency": quantity(study, "frequency"),
+    }
+    known = parse_yaml(KNOWN.read_text(encoding="utf-8"), KNOWN).get(name, {})
+    row["known"] = [[what, to, quantity(study, what), by] for what, (to, by) in known.items()]
+    for engine in ENGINES:
+        try:
+            result = rest(study.robot, engine)
+        except (InputError, SimulationFailure) as error:
+            row[engine] = str(error)
+            continue
+        p_WN = result.trajectory.p_WN.values
+        row[engine] = float(np.linalg.norm(p_WN - p_WN[0], axis=2).max())
+        if engine == "compiled":  # once more: it is compiled by now
+            row["speed"] = 1.0 / rest(study.robot, engine).wall_time
+    return row
+
+
+def page(rows: dict[str, dict[str, Any]]) -> str:
+    """Content of README.md."""
+    table, numbers = [], []
+    for name, row in sorted(rows.items()):
+        text = (FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
+        source = re.search(r"^# source: (.*(?:\n#   .*)*)", text, re.MULTILINE)
+        title = text.splitlines()[0].removeprefix("# ")
+        about = f"{title}; {source[1] if source else ''}".replace("\n#   ", " ")
+        counts = [str(row[key]) for key in ("bodies", "cables", "states", "mechanisms")]
+        rates = [f"{row[key]:.4g}" for key in ("mass", "frequency", "speed")]
+        moved = [row[engine] for engine in ENGINES]
+        shown = [m if isinstance(m, str) else f"{1e6 * m:.2g}" for m in moved]
+        table.append([f"[{name}]({name}.yaml)", about, *counts, *rates, *shown])
+        for what, known, ours, by in row["known"]:
+            numbers.append([name, what, f"{known:.6g}", f"{ours:.6g}", by])
+    headings = ["structure", "source", "bodies", "cables", "self-stress states", "mechanisms"]
+    headings += ["mass", "lowest frequency", "speed", *(f"rest, {e}, um" for e in ENGINES)]
+    known = TextTable(["structure", "quantity", "known", "ours", "by"], numbers)
+    parts = [ABOUT, TextTable(headings, table).markdown(), "## Known numbers", known.markdown()]
+    return "\n\n".join(parts) + "\n"
+
+
+def main(chosen: list[str]) -> None:
+    """Measures structures and writes the page after each."""
+    rows = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else {}
+    rows = {name: row for name, row in rows.items() if name in names()}
+    for name in chosen or [name for name in names() if name not in rows]:
+        rows[name] = measured(name)
+        print(name, json.dumps(rows[name]))
+        write_whole(MEASURED, json.dumps(rows, indent=1, sort_keys=True) + "\n")
+        write_whole(PAGE, page(rows))
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        sys.exit(f"corpus.py: {error}")

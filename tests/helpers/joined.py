@@ -1,0 +1,224 @@
+"""Structures with cables over rings and with ball joints, and their motions by analysis."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from helpers.anchored import BAR, scenario_of, supported_prism
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.scenario import Scenario
+
+G = 9.80665
+HEAVY, LIGHT, STIFFNESS, REACH = 0.2, 0.1, 1e3, 0.2
+EXACT = {"rtol": 1e-10, "atol": 1e-12}
+
+ROPE = {"stiffness": STIFFNESS, "damping": 0.0}
+ATWOOD: dict[str, Any] = {
+    "nodes": {"a": [-0.1, 0, 0.5], "r": [-0.1, 0, 1], "s": [0.1, 0, 1], "b": [0.1, 0, 0.5]},
+    "cables": {"rope": ROPE | {"pairs": [["a", "r", "s", "b"]], "tension": LIGHT * G}},
+    "masses": {"a": HEAVY, "b": LIGHT},
+    "anchors": {"r": "xyz", "s": "xyz"},
+    "loads": {"a": [0.0, 0.0, (HEAVY - LIGHT) * G]},
+}
+"""A heavy and a light mass on a cable over two rings, held in balance by a load."""
+
+STRING: dict[str, Any] = {
+    "nodes": {"a": [-REACH, 0, 1], "p": [0, 0, 1], "b": [REACH, 0, 1]},
+    "cables": {"string": ROPE | {"pairs": [["a", "p", "b"]], "free_length": 0.38}},
+    "masses": {"p": LIGHT},
+    "anchors": {"a": "xyz", "b": "xyz"},
+    "gravity": 0.0,
+}
+"""A bead on a string between two walls."""
+
+STIFF = {"stiffness": 1e6, "time_constant": 1e-3}
+UPPER, LOWER = 0.4, 0.3
+DOUBLE: dict[str, Any] = {
+    "nodes": {
+        "a": [0, 0, 0],
+        "b": [0, 0, -UPPER],
+        "c": [0, 0, -UPPER],
+        "d": [0, 0, -UPPER - LOWER],
+    },
+    "struts": {"bar": BAR | {"pairs": [["a", "b"], ["c", "d"]]}},
+    "joints": {"knee": STIFF | {"nodes": ["b", "c"]}},
+    "anchors": {"a": "xyz"},
+    "anchor_stiffness": 1e6,
+}
+"""Two bars that hang one below the other."""
+
+HINGED: dict[str, Any] = {
+    "nodes": {
+        "a": [0, -0.2, 1],
+        "b": [0, 0.2, 1],
+        "c": [0, -0.2, 1],
+        "d": [0, 0.2, 1],
+        "e": [0, 0, 0.7],
+    },
+    "struts": {
+        "post": BAR | {"pairs": [["a", "b"]]},
+        "flap": BAR | {"pairs": [["c", "d"], ["c", "e"], ["d", "e"]]},
+    },
+    "joints": {"left": STIFF | {"nodes": ["a", "c"]}, "right": STIFF | {"nodes": ["b", "d"]}},
+    "anchors": {"a": "xyz", "b": "xyz"},
+    "anchor_stiffness": 1e6,
+}
+"""A triangle that hangs from a fixed bar on a hinge of two joints."""
+
+
+RHOMBUS: dict[str, Any] = {
+    "nodes": {"l": [-1, 0, 0.5], "r": [1, 0, 0.5], "u": [0, 0.6, 0.5], "d": [0, -0.6, 0.5]},
+    "struts": {"bar": BAR | {"pairs": [["l", "u"], ["u", "r"], ["r", "d"], ["d", "l"]]}},
+    "pinned": ["l", "r", "u", "d"],
+    "anchors": dict.fromkeys("lrud", "z"),
+    "cables": {
+        "long": {"pairs": [["l", "r"]], "stiffness": 1e3, "damping": 5.0, "tension": 100.0},
+        "cross": {"pairs": [["u", "d"]], "stiffness": 1e3, "damping": 5.0, "tension": 60.0},
+    },
+    "gravity": 0.0,
+}
+"""Four bars that are pinned to a rhombus, with a cable along each diagonal. Without the anchors it
+would fold out of its plane."""
+
+
+def with_arm(**changes: object) -> Scenario:
+    """The shipped prism on supports, with an arm on a ball joint and a driven cable over a ring at
+    the arm's end."""
+    prism = supported_prism().robot.model_dump()
+    shoulder = prism["nodes"]["n3"]
+    hand = [shoulder[0] + 0.06, shoulder[1] + 0.02, shoulder[2] + 0.05]
+    arm = BAR | {"pairs": [["s", "h"]]}
+    rope = {"pairs": [["n0", "h", "n4"]], "stiffness": 200.0, "damping": 1.0, "tension": 4.0}
+    tree = prism | {
+        "nodes": prism["nodes"] | {"s": shoulder, "h": hand},
+        "struts": prism["struts"] | {"arm": arm},
+        "cables": prism["cables"] | {"rope": rope},
+        "joints": {"shoulder": {"nodes": ["n3", "s"]}},
+        "bodies": {"arm": {"struts": ["arm"], "mass": 0.03, "inertia": [4e-5, 3e-5, 2e-5]}},
+        "actuated": prism["actuated"] | {"rope": ["rope n4 h n0"]},
+    }
+    return scenario_of(tree, **changes)
+
+
+def released() -> Robot:
+    """Atwood's machine without its load."""
+    robot = Robot.of(scenario_of(ATWOOD, duration=0.4))
+    structure = dataclasses.replace(robot.structure, node_load=0.0 * robot.structure.node_load)
+    model = robot.model._replace(loads=structure.loads)
+    return dataclasses.replace(robot, structure=structure, model=model)
+
+
+def as_atwood(robot: Robot, times: np.ndarray) -> np.ndarray:
+    """Weights on an elastic rope: the difference of momenta grows with the difference of weights,
+    and the stretch s oscillates: s'' = 2 g - k s (1 / m + 1 / n)."""
+    per_mass = 1.0 / HEAVY + 1.0 / LIGHT
+    middle, square = 2.0 * G / (STIFFNESS * per_mass), STIFFNESS * per_mass
+    before = LIGHT * G / STIFFNESS
+    stretch = middle + (before - middle) * np.cos(np.sqrt(square) * times)
+    moment = 0.5 * (HEAVY - LIGHT) * G * times**2
+    heavy = (moment + LIGHT * (stretch - before)) / (HEAVY + LIGHT)
+    start = np.array(robot.structure.p_WN)
+    moved = np.tile(start, (len(times), 1, 1))
+    names = robot.structure.node_names
+    moved[:, names.index("a"), 2] -= heavy
+    moved[:, names.index("b"), 2] -= stretch - before - heavy
+    return moved
+
+
+def plucked() -> Robot:
+    return Robot.of(scenario_of(STRING | {"offsets": [[0.0, 0.0, 0.06]]}, duration=1.0))
+
+
+def as_a_string(robot: Robot, times: np.ndarray) -> np.ndarray:
+    """m z'' = -2 T z / l, with the length l of each half and the tension T = k (2 l - l0)."""
+
+    def rate(_: float, y: np.ndarray) -> list[float]:
+        half = np.hypot(REACH, y[0])
+        return [y[1], -2.0 * STIFFNESS * (2.0 * half - 0.38) * y[0] / half / LIGHT]
+
+    z = solve_ivp(rate, (0.0, times[-1]), [0.06, 0.0], t_eval=times, **EXACT).y[0]
+    moved = np.tile(robot.structure.p_WN, (len(times), 1, 1))
+    moved[:, robot.structure.node_names.index("p"), 2] = 1.0 + z
+    return moved
+
+
+def turned(robot: Robot, angles: dict[int, float], pivots: dict[int, np.ndarray]) -> Robot:
+    """A robot whose bodies are turned by angles (rad) about the y axis, each about a pivot (two
+    positions: before and after)."""
+    p_WB, q_WB = robot.structure.p_WB.copy(), robot.structure.q_WB.copy()
+    for body, angle in angles.items():
+        c, s = np.cos(angle), np.sin(angle)
+        before, after = pivots[body]
+        rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        p_WB[body] = after + rotation @ (p_WB[body] - before)
+        q_WB[body] = [np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0]
+    structure = dataclasses.replace(robot.structure, p_WB=p_WB, q_WB=q_WB)
+    return dataclasses.replace(robot, structure=structure)
+
+
+def along(angle: np.ndarray) -> np.ndarray:
+    """Directions (times, 3) of a bar that hangs down and is turned by angles (times,) about y."""
+    return np.stack([-np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=-1)
+
+
+LEANS = 0.5, 1.0
+
+
+def folded() -> Robot:
+    """The double pendulum with both bars aslant."""
+    robot = Robot.of(scenario_of(DOUBLE, duration=3.0))
+    knee = np.array([0.0, 0.0, -UPPER]), UPPER * along(np.array(LEANS[0]))
+    pivots = {0: np.zeros((2, 3)), 1: np.array(knee)}
+    return turned(robot, dict(enumerate(LEANS)), pivots)
+
+
+def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
+    """Lagrange's equations of two bars, for their angles from the vertical."""
+    m, n = robot.structure.mass
+    i, j = robot.structure.mass * robot.structure.unit_inertia[:, 0]
+
+    def rate(_: float, y: np.ndarray) -> np.ndarray:
+        a, b, a_rate, b_rate = y
+        across = 0.5 * n * UPPER * LOWER
+        mixed, bent = across * np.cos(a - b), across * np.sin(a - b)
+        inertia = [
+            [i + 0.25 * m * UPPER**2 + n * UPPER**2, mixed],
+            [mixed, j + 0.25 * n * LOWER**2],
+        ]
+        force = [
+            -bent * b_rate**2 - (0.5 * m + n) * G * UPPER * np.sin(a),
+            bent * a_rate**2 - 0.5 * n * G * LOWER * np.sin(b),
+        ]
+        return np.concatenate([y[2:], np.linalg.solve(inertia, force)])
+
+    start, span = [*LEANS, 0.0, 0.0], (0.0, times[-1])
+    upper, lower = solve_ivp(rate, span, start, t_eval=times, **EXACT).y[:2]
+    knee = UPPER * along(upper)
+    return np.stack([0.0 * knee, knee, knee, knee + LOWER * along(lower)], axis=1)
+
+
+def ajar() -> Robot:
+    """The triangle on its hinge, turned by 0.5 rad."""
+    robot = Robot.of(scenario_of(HINGED, duration=1.0))
+    return turned(robot, {1: LEANS[0]}, {1: np.tile([0.0, 0.0, 1.0], (2, 1))})
+
+
+def as_a_flap(robot: Robot, times: np.ndarray) -> np.ndarray:
+    """A pendulum about the hinge, with the inertia of the triangle."""
+    structure = robot.structure
+    hinge = structure.node_names.index("c")
+    lever = structure.p_BN[hinge, 2]
+    square = G * lever / (structure.unit_inertia[1, 1] + lever**2)
+    span, start = (0.0, times[-1]), [LEANS[0], 0.0]
+    angle = solve_ivp(
+        lambda _, y: [y[1], -square * np.sin(y[0])], span, start, t_eval=times, **EXACT
+    ).y[0]
+    moved = np.tile(structure.p_WN, (len(times), 1, 1))
+    moved[:, structure.node_names.index("e")] = [0.0, 0.0, 1.0] + 0.3 * along(angle)
+    for node in ("a", "b", "c", "d"):
+        moved[:, structure.node_names.index(node)] = [0.0, -0.2 if node in "ac" else 0.2, 1.0]
+    return moved

@@ -1,0 +1,150 @@
+"""Graphs of structure files: struts and cables, the bodies that struts make, and pinned nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from tetra_drake.settings.quantities import Keyed
+from tetra_drake.settings.refusals import hint, refuse
+from tetra_drake.settings.section import Tree, tree_value
+
+NodeT = TypeVar("NodeT", bound=Hashable)
+
+
+class HasPairs(Protocol):
+    """Group of struts or cables."""
+
+    @property
+    def pairs(self) -> list[list[str]]: ...
+
+
+class Member(NamedTuple):
+    """A strut or a cable of a structure file."""
+
+    key: str
+    """Key in the file, such as "cables.side.pairs[0]"."""
+    group: str
+    nodes: tuple[str, ...]
+    """Nodes from one end to the other; a cable that runs over rings has more than two."""
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Name in the order of the file, such as "side n1 n2", and with the nodes reversed."""
+        return " ".join((self.group, *self.nodes)), " ".join((self.group, *self.nodes[::-1]))
+
+
+def members(key: str, groups: Mapping[str, HasPairs]) -> Iterator[Member]:
+    """Struts or cables in the order of the file. `key` is their section, such as "struts"."""
+    for name, group in groups.items():
+        for place, nodes in enumerate(group.pairs):
+            yield Member(f"{key}.{name}.pairs[{place}]", name, tuple(nodes))
+
+
+def struts_by_name(struts: Iterable[Member]) -> dict[str, list[int]]:
+    """Indices of struts by the names that `bodies` may use: a group, such as "bar", or one strut,
+    such as "bar a b", whose nodes may have either order."""
+    found: dict[str, list[int]] = {}
+    for index, strut in enumerate(struts):
+        for name in (strut.group, *strut.names):
+            found.setdefault(name, []).append(index)
+    return found
+
+
+def components(groups: Iterable[Sequence[NodeT]]) -> list[list[NodeT]]:
+    """Connected components of a graph that has edges between all nodes of each group. Each is a
+    list of nodes, in the order of the groups."""
+    first_node: dict[NodeT, NodeT] = {}
+    for group in groups:
+        start, *others = (first_node.setdefault(node, node) for node in group)
+        for joined in others:
+            if start != joined:
+                first_node |= {node: start for node, old in first_node.items() if old == joined}
+    found: dict[NodeT, list[NodeT]] = {}
+    for node, start in first_node.items():
+        found.setdefault(start, []).append(node)
+    return [*found.values()]
+
+
+class _Group(BaseModel):
+    pairs: list[list[str]]
+
+
+class _Body(BaseModel):
+    struts: list[str] = []
+    nodes: list[str] = []
+
+
+class _Pinned(BaseModel):
+    """The parts of a structure file that pinned nodes change."""
+
+    pinned: list[str]
+    nodes: Keyed[str, Any]
+    struts: Keyed[str, _Group] = {}
+    bodies: Keyed[str, _Body] = {}
+    joints: Keyed[str, Any] = {}
+
+    def bodies_at_nodes(self, lists: list[list[str]]) -> list[list[int]]:
+        """Indices of the lists of nodes that are on one body, for each body. Nodes that are not
+        pinned weld lists together, and so do the entries of `bodies`. The last lists are the nodes
+        of these entries."""
+        welded: list[list[str | int]] = []
+        for index, nodes in enumerate(lists):
+            welded.append([index, *(node for node in nodes if node not in self.pinned)])
+        named, first = struts_by_name(members("struts", self.struts)), len(lists) - len(self.bodies)
+        for index, body in enumerate(self.bodies.values(), start=first):
+            welded.append([index, *(i for name in body.struts for i in named.get(name, ()))])
+        found = components(welded)
+        return [[part for part in body if isinstance(part, int)] for body in found]
+
+    def expand(self) -> None:
+        """Gives each body but the first at a pinned node a copy of the node and a joint to it."""
+        struts = [*members("struts", self.struts)]
+        lists = [pair for group in self.struts.values() for pair in group.pairs]
+        lists += [body.nodes for body in self.bodies.values()]
+        bodies = self.bodies_at_nodes(lists)
+        for place, node in enumerate(self.pinned):
+            if node not in self.nodes:
+                found = f"found unknown node '{node}'; {hint(node, self.nodes)}"
+                refuse(f"pinned[{place}]", found)
+            here = [[lists[i] for i in sorted(body) if node in lists[i]] for body in bodies]
+            _, *others = here = [body for body in here if body] or [[]]
+            if not others:
+                expected = "expected a node that struts of two bodies share"
+                refuse(f"pinned[{place}]", f"found '{node}', {expected}")
+            number = 2
+            for body in others:
+                while (copy := f"{node}-{number}") in self.nodes or copy in self.joints:
+                    number += 1
+                self.nodes[copy], self.joints[copy] = self.nodes[node], {"nodes": [node, copy]}
+                for nodes in body:
+                    nodes[:] = [copy if one == node else one for one in nodes]
+
+        renamed = dict[str, str]()
+        for old, new in zip(struts, members("struts", self.struts), strict=True):
+            renamed |= dict.fromkeys(old.names, new.names[0])
+        for entry in self.bodies.values():
+            entry.struts = [renamed.get(name, name) for name in entry.struts]
+
+
+def with_joints(tree: Tree) -> Tree:
+    """Content of a structure file with joints in place of its pinned nodes.
+
+    Struts that share a pinned node are one body there only if they also share another node, or if
+    `bodies` joins them. The first body keeps the node. Each other one has a copy of it, named
+    "l-2", "l-3" and so on for the node l, and a joint with the name of the copy.
+
+    Raises InputError, naming the key, for a pinned node that no two bodies share.
+    """
+    tree = tree_value(tree)
+    try:
+        given = _Pinned.model_validate(tree)
+    except ValidationError:  # the check of the whole structure tells what is wrong
+        return tree
+    given.expand()
+    for key, parts in (("struts", given.struts), ("bodies", given.bodies)):
+        inner = {name: part.model_dump(exclude_unset=True) for name, part in parts.items()}
+        tree[key] = {name: tree[key][name] | part for name, part in inner.items()}
+    return tree | {"nodes": given.nodes, "joints": given.joints, "pinned": []}
