@@ -76,7 +76,7 @@ class EquilibriumStudy:
 
     def lowest_frequencies(self, count: int = 5) -> np.ndarray:
         """The lowest of `frequencies`, at most `count` (frequencies,), in Hz. For a large robot
-        they are found by Lanczos iterations."""
+        they are found by Lanczos iterations, to six digits."""
         if len(self.robot.structure.bodies) < _LARGE:
             return self.frequencies[:count]
         matrices = _vibration(self.robot, Unactuated(self.robot.model))
