@@ -52,6 +52,10 @@ HOLD = 30.0
 force over the largest body's radius. This force can have such a stiffness along motions that the
 springs do not resist."""
 
+SPARSE_FROM = 20
+"""Number of bodies from which an envelope is found for the stiffness matrix; finding one takes
+longer than a factorisation of few bodies."""
+
 POWER_STEPS = 10
 """Number of inverse power iterations for the least stable motion of a balanced robot."""
 
@@ -293,9 +297,13 @@ class Envelope(NamedTuple):
 
     @classmethod
     def of(cls, matrix: bsr_array) -> Envelope:
-        """The envelope of a matrix (6*n, 6*n) with 6 x 6 blocks."""
+        """The envelope of a matrix (6*n, 6*n) with 6 x 6 blocks; the whole upper half if it is
+        small."""
+        bodies = len(matrix.indptr) - 1
+        if bodies < SPARSE_FROM:
+            return cls(np.arange(bodies), np.full(6 * bodies, 6 * bodies))
         graph = csr_array((np.ones(len(matrix.indices)), matrix.indices, matrix.indptr))
-        by_index = cls._in_order(np.arange(len(matrix.indptr) - 1), graph)
+        by_index = cls._in_order(np.arange(bodies), graph)
         narrow = cls._in_order(reverse_cuthill_mckee(graph, symmetric_mode=True), graph)
         return narrow if narrow.work < 0.5 * by_index.work else by_index
 
@@ -307,6 +315,11 @@ class Envelope(NamedTuple):
         return cls(order, np.repeat(6 * np.maximum.accumulate(last) + 6, 6))
 
     @property
+    def widest(self) -> int:
+        """Length of the longest row, from its diagonal on."""
+        return int((self.ends - np.arange(self.ends.size)).max())
+
+    @property
     def work(self) -> float:
         """Work of a factorisation, as for a full matrix whose size cubed is this number."""
         return 3.0 * float(((self.ends - np.arange(self.ends.size)) ** 2).sum())
@@ -315,7 +328,8 @@ class Envelope(NamedTuple):
 class Factor(NamedTuple):
     """Cholesky factor of a sparse symmetric matrix; see factorise()."""
 
-    matrix: np.ndarray
+    rows: np.ndarray
+    """Rows of the factor, each from its diagonal on (6*n, longest row)."""
     envelope: Envelope
 
     @classmethod
@@ -323,19 +337,17 @@ class Factor(NamedTuple):
         """The factor of a matrix (6*n, 6*n) with 6 x 6 blocks and `shift` added to its diagonal.
         None if a pivot is at most `least`."""
         envelope = Envelope.of(matrix)
-        bodies, position = len(envelope.order), np.argsort(envelope.order)
-        factor = np.zeros((bodies, 6, bodies, 6))  # only the envelope takes memory
-        rows = np.repeat(np.arange(bodies), np.diff(matrix.indptr))
-        factor[position[rows], :, position[matrix.indices]] = matrix.data
-        full = factor.reshape(6 * bodies, 6 * bodies)
-        np.fill_diagonal(full, full.diagonal() + shift)
-        return cls(full, envelope) if factorise(full, envelope.ends, least) else None
+        factor = np.zeros((envelope.ends.size, envelope.widest))
+        position = np.argsort(envelope.order)
+        put_blocks(matrix.indptr, matrix.indices, matrix.data, position, factor)
+        factor[:, 0] += shift
+        return cls(factor, envelope) if factorise(factor, envelope.ends, least) else None
 
     def solved(self, right: np.ndarray) -> np.ndarray:
         """Solution (6*n,) for a right-hand side (6*n,)."""
         order, x = self.envelope.order, np.empty((right.size // 6, 6))
         x[order] = solve(
-            self.matrix, self.envelope.ends, right.reshape(-1, 6)[order].ravel()
+            self.rows, self.envelope.ends, right.reshape(-1, 6)[order].ravel()
         ).reshape(-1, 6)
         return x.ravel()
 
@@ -368,36 +380,51 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def factorise(matrix: Table, ends: Table, least: float) -> bool:
-    """Replaces the upper half of a symmetric `matrix` (n, n), diagonal included, in place by its
-    Cholesky factor U, with matrix = UᵀU. Entries below the diagonal stay. Returns True if this
-    succeeds. Returns False, with the work half done, if a pivot is at most `least`.
+def put_blocks(first: Table, columns: Table, blocks: Table, position: Table, rows: Table) -> None:
+    """Writes the upper half of a matrix to `rows`, as factorise() takes it. The matrix has 6 x 6
+    `blocks` in compressed rows; body i's unknowns move to the position position[i]."""
+    for i in range(position.size):
+        for k in range(first[i], first[i + 1]):
+            for r in range(6):
+                row = 6 * position[i] + r
+                for c in range(6):
+                    column = 6 * position[columns[k]] + c
+                    if column >= row:
+                        rows[row, column - row] = blocks[k, r, c]
 
-    Row i is 0 from column ends[i] on; see Envelope. LAPACK is not used because its threads wait for
-    each other on busy processors.
+
+@compiled
+def factorise(rows: Table, ends: Table, least: float) -> bool:
+    """Replaces the upper half of a symmetric matrix, in place by its Cholesky factor U, with
+    matrix = UᵀU. Returns True if this succeeds. Returns False, with the work half done, if a pivot
+    is at most `least`.
+
+    `rows` (n, longest row) has each row of the matrix from its diagonal on. Row i is 0 from column
+    ends[i] on; see Envelope. LAPACK is not used because its threads wait for each other on busy
+    processors.
     """
-    for i in range(matrix.shape[0]):
-        end = ends[i]
-        if not matrix[i, i] > least:
+    for i in range(ends.size):
+        length = ends[i] - i
+        if not rows[i, 0] > least:
             return False
-        matrix[i, i:end] /= np.sqrt(matrix[i, i])
-        for row in range(i + 1, end):
-            if matrix[i, row] != 0.0:  # mostly 0, as bodies have few neighbours
-                matrix[row, row:end] -= matrix[i, row] * matrix[i, row:end]
+        rows[i, :length] /= np.sqrt(rows[i, 0])
+        for k in range(1, length):
+            if rows[i, k] != 0.0:  # mostly 0, as bodies have few neighbours
+                rows[i + k, : length - k] -= rows[i, k] * rows[i, k:length]
     return True
 
 
 @compiled
-def solve(factor: Table, ends: Table, right: Table) -> Table:
-    """Solution x (n,) of matrix x = right, for a vector `right` (n,). `factor` (n, n) is what
-    factorise() made of the matrix, with the same `ends` (n,)."""
+def solve(rows: Table, ends: Table, right: Table) -> Table:
+    """Solution x (n,) of matrix x = right, for a vector `right` (n,). `rows` is what factorise()
+    made of the matrix, with the same `ends` (n,)."""
     n, x = right.size, right.copy()
     for i in range(n):
-        x[i] /= factor[i, i]
-        x[i + 1 : ends[i]] -= factor[i, i + 1 : ends[i]] * x[i]
+        x[i] /= rows[i, 0]
+        x[i + 1 : ends[i]] -= rows[i, 1 : ends[i] - i] * x[i]
     for i in range(n - 1, -1, -1):
-        after = (factor[i, i + 1 : ends[i]] * x[i + 1 : ends[i]]).sum()
-        x[i] = (x[i] - after) / factor[i, i]
+        after = (rows[i, 1 : ends[i] - i] * x[i + 1 : ends[i]]).sum()
+        x[i] = (x[i] - after) / rows[i, 0]
     return x
 
 
