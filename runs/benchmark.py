@@ -3,13 +3,15 @@
     python runs/benchmark.py [TABLE ...]
 
 Prints tables in Markdown for tetra_drake/engines/README.md. The gaits are random gaits with seeds
-0, 1 ... on the scenario `thesis`. Without names, all tables except `integrators` are printed:
+0, 1 ... on the scenario `thesis`. Without names, all tables except `integrators` and `sizes` are
+printed:
 
     engines        speed and error of the engines
     integrators    speed and error for settings of the diagram; takes longest
     batches        speed of the compiled engine with many gaits at a time
     grounds        speed by ground and network
     controlled     speed of robots that are controlled, on all cores
+    sizes          CPU time of rows of tetrahedra by their number, on the compiled engine and Drake
 
 Errors are differences of distances from converged simulations of the compiled engine. For MuJoCo,
 with its different ground, they are from converged simulations of MuJoCo. Times are only meaningful
@@ -47,6 +49,7 @@ BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time
 GROUND_BATCH = 30  # gaits at a time on each ground
 CONTROLLED = (1, 8, 64, 512)  # robots at a time
 ROLLOUT_PERIODS = 50  # control periods that MuJoCo simulates
+SIZES = (5, 12, 24, 48, 96, 200)  # bodies
 ROUNDS = 3  # measurements; their medians count
 
 ENGINES = {
@@ -263,19 +266,44 @@ def controlled_table(scenario: Scenario) -> str:
     return TextTable(["control periods per second", *map(str, CONTROLLED)], rows).markdown()
 
 
+def cpu_time(scenario: Scenario) -> tuple[float, int]:
+    """CPU time (s) of one simulation, and the number of its steps."""
+    walk(brief(scenario), 1, cores=1, lanes=True)
+    started = time.process_time()
+    (result,) = walk(scenario, 1, cores=1, lanes=True)
+    return time.process_time() - started, result.integrator.steps
+
+
+def sizes_table(scenario: Scenario) -> str:
+    """Table of the CPU time of rows of tetrahedra by their number. Oscillators are coupled to their
+    neighbours only; otherwise the network would need most of the time of long rows."""
+    rows = []
+    for bodies in SIZES:
+        row = scenario.with_changes({"robot.tetrahedra": bodies, "cpg.reach": 1})
+        compiled, steps = cpu_time(row.with_changes({"engine": "!Compiled {}"}))
+        diagram, _ = cpu_time(row.with_changes({"engine": "!Drake {}"}))
+        per_second = diagram / scenario.simulation.duration
+        rows.append([str(bodies), f"{1e6 * compiled / steps / bodies:.2f}", f"{per_second:.3g}"])
+    headings = ["bodies", "compiled: µs per step and body", "drake: s per simulated second"]
+    return TextTable(headings, rows).markdown()
+
+
 TABLES = {"batches": batches_table, "grounds": grounds_table, "controlled": controlled_table}
+MORE_TABLES = {"sizes": sizes_table}
 
 
 def main(names: Sequence[str], scenario: Scenario) -> None:
-    """Prints the tables of the given names, or all but `integrators`. Raises InputError."""
-    tables = [*ENGINES, *TABLES]
+    """Prints the tables of the given names, or all but `integrators` and `sizes`.
+
+    Raises InputError."""
+    tables = [*ENGINES, *TABLES, *MORE_TABLES]
     if unknown := {*names} - {*tables}:
         raise InputError("TABLE", "", f"found {listed([*unknown])}, expected {listed(tables)}")
     for name in names or ["engines", *TABLES]:
         if name in ENGINES:
             table = engines_table(scenario, ENGINES[name])
         else:
-            table = TABLES[name](scenario)
+            table = (TABLES | MORE_TABLES)[name](scenario)
         print(f"{table}\n", flush=True)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import Context
 
-from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.drake import MakeSimulator, default_scheme
 from tetra_drake.engines.sampler import Sampler
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.laws.terrain import Rough
@@ -74,3 +74,15 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
             np.testing.assert_array_equal(walk[name].values.ravel(), there[-1][port])
     assert np.abs(there[-1]["friction_forces"]).max() > 0.0
     assert there[-1]["signals"].any()
+
+
+@pytest.mark.parametrize(
+    ("tetrahedra", "damping", "scheme"),
+    [(5, 0.05, "radau3"), (24, 0.05, "radau3"), (48, 0.05, "runge_kutta3"), (48, 0.5, "radau3")],
+)
+def test_large_robots_are_integrated_explicitly_unless_dampers_are_fast(
+    scenario, tetrahedra, damping, scheme
+):
+    changes = {"robot.tetrahedra": tetrahedra, "robot.cables.damping": f"{damping} lbf*s/in"}
+    robot = Robot.of(scenario.with_changes(changes))
+    assert default_scheme(robot) == scheme

@@ -17,7 +17,8 @@ class Stepper:
     """A robot in steps of the compiled engine, without lanes."""
 
     def __init__(self, robot: Model) -> None:
-        self.robot, self.solver, self.forces = robot, Solver.of(robot), Forces.of(robot)
+        self.solver, self.forces = Solver.of(robot), Forces.of(robot)
+        self.robot = robot = self.solver.oriented(robot)
         blocks = len(self.solver.schedule.later)
         self.work = allocate(StepMemory, sizes_of(robot) | {"blocks": blocks})
         self.parts: Parts = Packed((robot, self.solver, self.forces, self.work))
@@ -51,7 +52,7 @@ def written_out(blocks: np.ndarray, solver: Solver) -> np.ndarray:
     for body in range(bodies):
         matrix[body, body] = blocks[body]
     for pair, block in solver.schedule.blocks.items():
-        matrix[pair] = blocks[block]
+        matrix[pair], matrix[pair[::-1]] = blocks[block], blocks[block].T
     upper = np.triu(matrix.swapaxes(1, 2).reshape(6 * bodies, 6 * bodies))
     return upper + np.triu(upper, 1).T
 

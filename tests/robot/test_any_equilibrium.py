@@ -193,7 +193,7 @@ def test_stiffness_is_how_forces_change_where_struts_touch(c, d, pushed):
     structure = Structure.of(scenario.robot.blueprint())
     resting, state = Unactuated(make_model(scenario, structure)), structure.initial_state
     assert (np.abs(force_at_rest(resting, state)).max() > 500.0) == pushed
-    greatest = np.abs(stiffness_at_rest(resting)).max()
+    greatest = abs(stiffness_at_rest(resting)).max()
     assert np.isfinite(greatest)
     for motion, found, expected in changes(resting, state, 1e-7) if pushed else []:
         # The smoothing for parallel struts, 1e-4 of the squares of both lengths, is approximate.

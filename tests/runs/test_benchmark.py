@@ -18,3 +18,13 @@ def test_every_engine_and_ground_is_measured(scenario, monkeypatch, capsys):
     assert all(0.0 <= float(row[2]) <= float(row[3]) < 0.05 for row in engines)
     assert (len(batches), len(batches[0]), len(grounds), len(controlled)) == (1, 3, 4, 6)
     assert all(float(row[1].replace(",", "")) > 0.0 for table in cells for row in table)
+
+
+def test_cost_is_measured_by_size(scenario, monkeypatch, capsys):
+    monkeypatch.setattr(benchmark, "SIZES", (2, 3))
+    benchmark.main(["sizes"], shortly(scenario, 0.1))
+    rows = [
+        line.strip("| ").split("|") for line in capsys.readouterr().out.splitlines()[2:] if line
+    ]
+    assert [int(row[0]) for row in rows] == [2, 3]
+    assert all(float(cell) > 0.0 for row in rows for cell in row)

@@ -100,7 +100,8 @@ def is_stable(robot: Robot, step: float) -> bool:
     taut.forces.near_struts.count[:] = 0
     stiffer = cables.law._replace(stiffness=cables.law.stiffness + 2.0 / step * cables.law.damping)
     taut.model = taut.model._replace(cables=cables._replace(law=stiffer))
-    return bool(eigvalsh(step**2 * stiffness_at_rest(taut), mass_matrix(taut)).max() < 4.0)
+    stiffness = stiffness_at_rest(taut).toarray()
+    return bool(eigvalsh(step**2 * stiffness, mass_matrix(taut)).max() < 4.0)
 
 
 def installed() -> bool:

@@ -10,6 +10,7 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import bsr_array
 
 from tetra_drake.laws import cable, capsules, contact, kinematics
 from tetra_drake.laws.forces import Forces
@@ -33,8 +34,9 @@ class Springs(NamedTuple):
     """Second derivatives (springs, k, k) of the energy with respect to the displacements."""
 
 
-def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
-    """Stiffness matrix (6*bodies, 6*bodies) of a robot on flat ground.
+def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
+    """Stiffness matrix (6*bodies, 6*bodies) of a robot on flat ground. It is sparse: a 6 x 6 block
+    for each body, and two for each pair of bodies that are joined.
 
     The displacement of a body is a rotation vector in rad, then a translation in m, in the world
     frame. The units are N m between rotations, N/m between translations, N otherwise. `forces` are
@@ -43,7 +45,7 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
     bodies = robot.bodies.mass.size
     carriers = np.full(len(robot.p_BN), WORLD)
     carriers[: robot.first_node[-1]] = np.repeat(np.arange(bodies), np.diff(robot.first_node))
-    blocks = np.zeros((bodies + 1, bodies + 1, 6, 6))  # the last blocks are the world's
+    rows, columns, blocks = [], [], []
     for springs in (
         _cables(robot, forces, carriers),
         _pieces(robot, forces, carriers),
@@ -56,8 +58,9 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
         added = motion.transpose(0, 2, 1) @ springs.stiffness @ motion
         ends = np.stack([springs.body_a, springs.body_b], axis=1)
         for i, j in np.ndindex(2, 2):
-            block = added[:, 6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
-            np.add.at(blocks, (ends[:, i], ends[:, j]), block)
+            rows.append(ends[:, i])
+            columns.append(ends[:, j])
+            blocks.append(added[:, 6 * i : 6 * i + 6, 6 * j : 6 * j + 6])
 
     # The forces on the nodes also have a stiffness as the bodies turn. The line of a normal force
     # goes through the centre of a round foot, so that it counts as a force on the node.
@@ -68,9 +71,15 @@ def stiffness_matrix(robot: Model, forces: Forces) -> np.ndarray:
     force[ground.centres[is_round]] += on_rows[ground.contacts[is_round]]
     products = np.einsum("ni,nj->nij", p, force)
     trace = np.einsum("nii,jk->njk", products, np.eye(3))
-    turning = trace - 0.5 * (products + products.transpose(0, 2, 1))
-    np.add.at(blocks[:, :, :3, :3], (carriers, carriers), turning)
-    return blocks[:bodies, :bodies].transpose(0, 2, 1, 3).reshape(6 * bodies, 6 * bodies)
+    turning = np.zeros((len(carriers), 6, 6))
+    turning[:, :3, :3] = trace - 0.5 * (products + products.transpose(0, 2, 1))
+    row, column = np.concatenate([*rows, carriers]), np.concatenate([*columns, carriers])
+    moving = (row != WORLD) & (column != WORLD)
+    place, of_block = np.unique((row * bodies + column)[moving], return_inverse=True)
+    data = np.zeros((len(place), 6, 6))
+    np.add.at(data, of_block, np.concatenate([*blocks, turning])[moving])
+    first = np.searchsorted(place, bodies * np.arange(bodies + 1))
+    return bsr_array((data, place % bodies, first), shape=(6 * bodies, 6 * bodies))
 
 
 def _cables(robot: Model, forces: Forces, carriers: np.ndarray) -> Springs:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia
+from scipy.sparse import bsr_array, csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from tetra_drake.errors import InputError
 from tetra_drake.kernels.compiling import LOGGER, compiled
@@ -32,8 +34,8 @@ MOST_STEPS, LEAST_STEPS = 1000, 10
 """Upper limits of the steps of a search: for few bodies, and for the largest structures."""
 
 MOST_WORK = 2e11
-"""Upper limit of the work of a search, about two minutes: its steps times the cube of the number of
-unknowns. It sets the limit of steps between MOST_STEPS and LEAST_STEPS."""
+"""Upper limit of the work of a search, about two minutes: its steps times the work of a
+factorisation. It sets the limit of steps between MOST_STEPS and LEAST_STEPS."""
 
 FIRST_REACH, LONGEST_REACH, SHORTEST_REACH = 0.05, 0.2, 1e-12
 """Reach (upper limit of a step) as a share of the largest body's radius: at first, at most, and
@@ -49,6 +51,10 @@ HOLD = 30.0
 """Stiffness that is added for a correction (a shift, see _Descent), as a multiple of the greatest
 force over the largest body's radius. This force can have such a stiffness along motions that the
 springs do not resist."""
+
+SPARSE_FROM = 20
+"""Number of bodies from which an envelope is found for the stiffness matrix; finding one takes
+longer than a factorisation of few bodies."""
 
 POWER_STEPS = 10
 """Number of inverse power iterations for the least stable motion of a balanced robot."""
@@ -120,7 +126,7 @@ def find_equilibrium(
         raise InputError(source, "robot", f"{problem} of its weight and loads")
     robot = Unactuated(model)
     descent = _Descent(robot, start)
-    most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
+    most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / max(descent.work, 1.0))))
     announce_at, count = math.inf, 0
     while count < most and descent.step():
         count += 1
@@ -159,7 +165,7 @@ class _Descent:
     def __init__(self, robot: Unactuated, start: np.ndarray) -> None:
         self._robot = robot
         self._reach = FIRST_REACH * self._robot.radius
-        self._shift = self._rounding = 0.0
+        self._shift = self._rounding = self.work = 0.0
         self._arrive(start, force_at_rest(robot, start))
 
     def _arrive(self, state: np.ndarray, force: np.ndarray) -> None:
@@ -170,6 +176,7 @@ class _Descent:
         if not np.isfinite(force).all():
             return
         self._stiffness = stiffness_at_rest(self._robot)
+        self.work = Envelope.of(self._stiffness).work
         self._held = _free_motions(self._robot, state)
         cables = self._robot.model.cables.law.stiffness  # of slack ones, too
         hardest = max(self._stiffness.diagonal().max(), cables.max(initial=0.0))
@@ -266,17 +273,83 @@ class _Descent:
             moved, step = displaced(self._robot, moved, correction), step + correction
         return moved, force, step, gain
 
-    def _factor(self, stiffness: np.ndarray, shift: float) -> np.ndarray | None:
-        """Cholesky's factor, as factorise() leaves it, of `stiffness` (6*n, 6*n) plus `shift` (N/m)
-        on its diagonal; None if this sum is not positive definite."""
-        factor = stiffness + shift * np.eye(len(stiffness))
-        return factor if factorise(factor, 0.5 * self._least) else None
+    def _factor(self, stiffness: bsr_array, shift: float) -> Factor | None:
+        """Cholesky's factor of `stiffness` (6*n, 6*n) plus `shift` (N/m) on its diagonal; None if
+        this sum is not positive definite."""
+        return Factor.of(stiffness, shift, least=0.5 * self._least)
 
-    def _solved(self, factor: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def _solved(self, factor: Factor, force: np.ndarray) -> np.ndarray:
         """Displacements (6*n,) in m under a force (6*n,) in N, for the stiffness whose `factor` is
         from _factor(). Motions of the whole robot that nothing resists are projected out."""
-        step = solve(factor, force)
+        step = factor.solved(force)
         return step - self._held @ (self._held.T @ step)
+
+
+class Envelope(NamedTuple):
+    """Order of the unknowns of a sparse symmetric matrix for factorise(), and the part of its upper
+    half outside which all numbers are 0, also in the factor."""
+
+    order: np.ndarray
+    """Bodies in the order of their unknowns (n,): as they are, or by the reverse algorithm of
+    Cuthill and McKee if this at least halves the work."""
+    ends: np.ndarray
+    """Column behind the last number of each row (6*n,)."""
+
+    @classmethod
+    def of(cls, matrix: bsr_array) -> Envelope:
+        """The envelope of a matrix (6*n, 6*n) with 6 x 6 blocks; the whole upper half if it is
+        small."""
+        bodies = len(matrix.indptr) - 1
+        if bodies < SPARSE_FROM:
+            return cls(np.arange(bodies), np.full(6 * bodies, 6 * bodies))
+        graph = csr_array((np.ones(len(matrix.indices)), matrix.indices, matrix.indptr))
+        by_index = cls._in_order(np.arange(bodies), graph)
+        narrow = cls._in_order(reverse_cuthill_mckee(graph, symmetric_mode=True), graph)
+        return narrow if narrow.work < 0.5 * by_index.work else by_index
+
+    @classmethod
+    def _in_order(cls, order: np.ndarray, graph: csr_array) -> Envelope:
+        row, column = np.argsort(order)[np.array(graph.nonzero())]
+        last = np.zeros(len(order), dtype=np.int64)
+        np.maximum.at(last, row, column)
+        return cls(order, np.repeat(6 * np.maximum.accumulate(last) + 6, 6))
+
+    @property
+    def widest(self) -> int:
+        """Length of the longest row, from its diagonal on."""
+        return int((self.ends - np.arange(self.ends.size)).max())
+
+    @property
+    def work(self) -> float:
+        """Work of a factorisation, as for a full matrix whose size cubed is this number."""
+        return 3.0 * float(((self.ends - np.arange(self.ends.size)) ** 2).sum())
+
+
+class Factor(NamedTuple):
+    """Cholesky factor of a sparse symmetric matrix; see factorise()."""
+
+    rows: np.ndarray
+    """Rows of the factor, each from its diagonal on (6*n, longest row)."""
+    envelope: Envelope
+
+    @classmethod
+    def of(cls, matrix: bsr_array, shift: float, *, least: float) -> Factor | None:
+        """The factor of a matrix (6*n, 6*n) with 6 x 6 blocks and `shift` added to its diagonal.
+        None if a pivot is at most `least`."""
+        envelope = Envelope.of(matrix)
+        factor = np.zeros((envelope.ends.size, envelope.widest))
+        position = np.argsort(envelope.order)
+        put_blocks(matrix.indptr, matrix.indices, matrix.data, position, factor)
+        factor[:, 0] += shift
+        return cls(factor, envelope) if factorise(factor, envelope.ends, least) else None
+
+    def solved(self, right: np.ndarray) -> np.ndarray:
+        """Solution (6*n,) for a right-hand side (6*n,)."""
+        order, x = self.envelope.order, np.empty((right.size // 6, 6))
+        x[order] = solve(
+            self.rows, self.envelope.ends, right.reshape(-1, 6)[order].ravel()
+        ).reshape(-1, 6)
+        return x.ravel()
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
@@ -307,34 +380,51 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def factorise(matrix: Table, least: float) -> bool:
-    """Replaces the upper half of a symmetric `matrix` (n, n), diagonal included, in place by its
-    Cholesky factor U, with matrix = UᵀU. Entries below the diagonal stay. Returns True if this
-    succeeds. Returns False, with the work half done, if a pivot is at most `least`.
+def put_blocks(first: Table, columns: Table, blocks: Table, position: Table, rows: Table) -> None:
+    """Writes the upper half of a matrix to `rows`, as factorise() takes it. The matrix has 6 x 6
+    `blocks` in compressed rows; body i's unknowns move to the position position[i]."""
+    for i in range(position.size):
+        for k in range(first[i], first[i + 1]):
+            for r in range(6):
+                row = 6 * position[i] + r
+                for c in range(6):
+                    column = 6 * position[columns[k]] + c
+                    if column >= row:
+                        rows[row, column - row] = blocks[k, r, c]
 
-    LAPACK is not used because its threads wait for each other on busy processors.
+
+@compiled
+def factorise(rows: Table, ends: Table, least: float) -> bool:
+    """Replaces the upper half of a symmetric matrix, in place by its Cholesky factor U, with
+    matrix = UᵀU. Returns True if this succeeds. Returns False, with the work half done, if a pivot
+    is at most `least`.
+
+    `rows` (n, longest row) has each row of the matrix from its diagonal on. Row i is 0 from column
+    ends[i] on; see Envelope. LAPACK is not used because its threads wait for each other on busy
+    processors.
     """
-    n = matrix.shape[0]
-    for i in range(n):
-        if not matrix[i, i] > least:
+    for i in range(ends.size):
+        length = ends[i] - i
+        if not rows[i, 0] > least:
             return False
-        matrix[i, i:] /= np.sqrt(matrix[i, i])
-        for row in range(i + 1, n):
-            if matrix[i, row] != 0.0:  # mostly 0, as bodies have few neighbours
-                matrix[row, row:] -= matrix[i, row] * matrix[i, row:]
+        rows[i, :length] /= np.sqrt(rows[i, 0])
+        for k in range(1, length):
+            if rows[i, k] != 0.0:  # mostly 0, as bodies have few neighbours
+                rows[i + k, : length - k] -= rows[i, k] * rows[i, k:length]
     return True
 
 
 @compiled
-def solve(factor: Table, right: Table) -> Table:
-    """Solution x (n,) of matrix x = right, for a vector `right` (n,). `factor` (n, n) is what
-    factorise() made of the matrix."""
+def solve(rows: Table, ends: Table, right: Table) -> Table:
+    """Solution x (n,) of matrix x = right, for a vector `right` (n,). `rows` is what factorise()
+    made of the matrix, with the same `ends` (n,)."""
     n, x = right.size, right.copy()
     for i in range(n):
-        x[i] /= factor[i, i]
-        x[i + 1 :] -= factor[i, i + 1 :] * x[i]
+        x[i] /= rows[i, 0]
+        x[i + 1 : ends[i]] -= rows[i, 1 : ends[i] - i] * x[i]
     for i in range(n - 1, -1, -1):
-        x[i] = (x[i] - (factor[i, i + 1 :] * x[i + 1 :]).sum()) / factor[i, i]
+        after = (rows[i, 1 : ends[i] - i] * x[i + 1 : ends[i]]).sum()
+        x[i] = (x[i] - after) / rows[i, 0]
     return x
 
 
@@ -382,12 +472,13 @@ def displace(state: Table, motion: Table, moved: Table) -> None:
     move_bodies(state, motion, 1.0, moved)
 
 
-def stiffness_at_rest(robot: Unactuated) -> np.ndarray:
+def stiffness_at_rest(robot: Unactuated) -> bsr_array:
     """Stiffness matrix (6*n, 6*n) in N/m of the robot without actuation, for displacements as in
-    displaced(). The state is the one of the last call of force_at_rest()."""
+    displaced(); sparse. The state is the one of the last call of force_at_rest()."""
     matrix = stiffness_matrix(robot.model, robot.forces)
-    per_radius = np.tile(np.repeat([1.0 / robot.radius, 1.0], 3), len(matrix) // 6)
-    return per_radius[:, np.newaxis] * matrix * per_radius
+    per_radius = np.repeat([1.0 / robot.radius, 1.0], 3)
+    matrix.data = per_radius[:, np.newaxis] * matrix.data * per_radius
+    return matrix
 
 
 def mass_matrix(robot: Unactuated) -> np.ndarray:

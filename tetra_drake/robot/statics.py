@@ -10,13 +10,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import linalg
+from scipy.sparse import csr_array
 
 from tetra_drake.laws.kinematics import rigid_motions
 from tetra_drake.scenario.blueprint import Segments
 
 TOLERANCE = 1e-6
-"""Singular values below this share of the greatest count as zero. Lengths are in units of the
-structure's size. Coordinates need at least six digits."""
+"""Singular values below this share of the greatest, or of a bound for it, count as zero. Lengths
+are in units of the structure's size. Coordinates need at least six digits."""
 
 
 class Statics(NamedTuple):
@@ -62,7 +64,10 @@ def find_statics(
         apart[each, :, body_of_node[joints[:, 1]]] = -middle
         constraints = np.concatenate([constraints, apart.reshape(-1, 6 * bodies)])
     allowed = null_space(constraints, TOLERANCE)
-    self_stresses = null_space(allowed.T @ wrenches, TOLERANCE)
+    felt = csr_array(allowed.T @ wrenches if len(constraints) else wrenches)
+    products = (felt.T @ felt).toarray()  # its eigenvalues are the squares of singular values
+    least = TOLERANCE**2 * np.abs(products).sum(axis=0).max(initial=0.0)
+    _, self_stresses = linalg.eigh(products, subset_by_value=(-np.inf, least))
     rank = wrenches.shape[1] - self_stresses.shape[1]
 
     idle = []  # spins of straight bodies about their axes; of points about all axes

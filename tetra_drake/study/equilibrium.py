@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas
 from scipy import linalg
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import eigsh
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
@@ -43,8 +45,8 @@ LEAST_FREQUENCY = 0.05
 of a bar about its axis."""
 _LEAST_SQUARE = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
 
-_FREQUENCIES = 5
-"""Number of natural frequencies that are printed."""
+_LARGE = 50
+"""Number of bodies from which the lowest frequencies are computed without the others."""
 _NOISE = 1e-9
 """Forces of anchors up to this share of the greatest are rounding errors."""
 
@@ -65,8 +67,26 @@ class EquilibriumStudy:
     of its anchor on the structure, anchor_x, anchor_y, anchor_z."""
     cables: pandas.DataFrame
     """A row per cable, by its name: group, length, free_length, tension."""
-    frequencies: np.ndarray
-    """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely."""
+
+    @functools.cached_property
+    def frequencies(self) -> np.ndarray:
+        """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely.
+        For hundreds of bodies, lowest_frequencies() is faster."""
+        squares = linalg.eigvalsh(*_vibration(self.robot, Unactuated(self.robot.model)))
+        return np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi)
+
+    def lowest_frequencies(self, count: int = 5) -> np.ndarray:
+        """The lowest of `frequencies`, at most `count` (frequencies,), in Hz. For a large robot
+        they are found by Lanczos iterations, to six digits."""
+        if len(self.robot.structure.bodies) < _LARGE:
+            return self.frequencies[:count]
+        matrices = _vibration(self.robot, Unactuated(self.robot.model))
+        stiffness, mass = map(csc_array, matrices)
+        # The largest 1 / (square - _LEAST_SQUARE) are the lowest squares above this one.
+        squares, _ = eigsh(
+            stiffness, count, mass, sigma=_LEAST_SQUARE, which="LA", v0=np.ones(mass.shape[0])
+        )
+        return np.sqrt(np.sort(squares[squares > _LEAST_SQUARE])) / (2.0 * math.pi)
 
     @functools.cached_property
     def modes(self) -> np.ndarray:
@@ -122,7 +142,6 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
     lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)
     weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
     alone = equilibrium_of(weightless, lifted, equilibrium.state)
-    squares = linalg.eigvalsh(*_vibration(robot, Unactuated(robot.model)))
     return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
@@ -134,7 +153,6 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         ),
         nodes=nodes,
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-        frequencies=np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi),
     )
 
 
@@ -145,7 +163,8 @@ def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.nda
     overwritten."""
     state = robot.equilibrium.state
     force_at_rest(unactuated, state)
-    stiffness = condensed(stiffness_at_rest(unactuated), robot.structure, unactuated, state)
+    rigid = stiffness_at_rest(unactuated).toarray()
+    stiffness = condensed(rigid, robot.structure, unactuated, state)
     return stiffness, mass_matrix(unactuated)
 
 
@@ -200,7 +219,7 @@ def structure_text(study: EquilibriumStudy) -> str:
     robot, statics, structure = study.robot, study.statics, study.robot.structure
     units = robot.scenario.units
     length, force = units.length_name, units.force_name
-    lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
+    lowest = ", ".join(f"{frequency:.3g}" for frequency in study.lowest_frequencies())
     on_ground = ground = ""
     if structure.contacts.size:
         stiffness = units.shown(robot.scenario.ground.stiffness, "N/m")

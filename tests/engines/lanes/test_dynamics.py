@@ -6,7 +6,7 @@ from helpers.anchored import scenario_of
 from helpers.kernels import Stepper
 from helpers.states import disturbed, mass_matrix
 
-from tetra_drake.engines.lanes.dynamics import accelerate
+from tetra_drake.engines.lanes.dynamics import Solver, accelerate
 from tetra_drake.engines.lanes.sparse import BLOCK
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.contact import MODE_COLUMNS
@@ -100,12 +100,30 @@ def held_robot() -> tuple[Model, np.ndarray, np.ndarray]:
     return robot.model, state, np.zeros((0, MODE_COLUMNS))
 
 
+def star_robot() -> tuple[Model, np.ndarray, np.ndarray]:
+    """A bar that cables hold between four bodies, its state, and no contact modes. It is the first
+    body, and eliminated last."""
+    tree = read_structure("prism").model_dump()
+    bar = tree["struts"]["bar"]
+    cable = tree["cables"]["side"] | {"damping": 0.7, "free_length": 0.05}
+    left, right, ends = (["n1", "n5"], ["n2", "n3"], ["n0", "n4"])
+    tree["struts"] = {"bar": bar | {"pairs": [ends, left, right]}}
+    pairs = [[end, other] for end in ends for other in (*left, *right, "up", "far")]
+    tree["cables"] = {"star": cable | {"pairs": pairs}}
+    tree["nodes"] |= {"up": [0.0, 0.01, 0.3], "far": [0.3, 0.0, 0.1]}
+    changes = {"masses": {"up": 0.1, "far": 0.2}, "anchors": {"n0": "xyz"}, "actuated": {}}
+    robot = Robot.of(scenario_of(tree | changes | {"gravity": 0.0}))
+    assert Solver.of(robot.model).schedule.order[0] != 0
+    state = disturbed(robot.structure, 0, pose=1e-3, speed=0.0)
+    return robot.model, state, np.zeros((0, MODE_COLUMNS))
+
+
 RESET = ResetIntegrator(
     stiction_range=1e-4, stiction_damping=70.0, stiction_switch=0.7, proportional_stiction=0.0
 )
 STUCK = Coulomb(static=50.0)
 GROUNDS = [("thesis", Flat(), RESET), ("thesis", UNEVEN, STUCK), ("six_bar", UNEVEN, RESET)]
-GROUNDS += [("mast", Flat(), STUCK), ("held", None, None)]
+GROUNDS += [("mast", Flat(), STUCK), ("held", None, None), ("star", None, None)]
 
 
 @pytest.mark.parametrize(("name", "terrain", "friction"), GROUNDS)
@@ -114,8 +132,8 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(name, terrain, fric
     # on speed switched off, d force / d velocity is minus the damping matrix. (A limit of Coulomb
     # friction would depend on the velocity by the normal force, too.) Gyroscopic torques are left
     # out of the matrix; at these small velocities they hardly count.
-    if name == "held":
-        robot, state, modes = held_robot()
+    if name in ("held", "star"):
+        robot, state, modes = held_robot() if name == "held" else star_robot()
     else:
         scenario = load_scenario(name).with_changes({"terrain": terrain, "friction": friction})
         if name == "six_bar":

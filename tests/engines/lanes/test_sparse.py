@@ -14,6 +14,8 @@ GRAPHS = {
     "all coupled": (3, [(0, 1), (0, 2), (1, 2)]),
     "six-bar": (6, [(a, b) for a, b in itertools.combinations(range(6), 2) if a // 2 != b // 2]),
     "two rows apart": (4, [(0, 2), (1, 3)]),
+    "star": (5, [(0, 1), (0, 2), (0, 3), (0, 4)]),
+    "lattice": (12, [(i, i + 1) for i in range(11) if i % 4 < 3] + [(i, i + 4) for i in range(8)]),
 }
 
 
@@ -56,3 +58,21 @@ def test_a_row_of_bodies_fills_nothing_in():
     schedule = Schedule.of(*GRAPHS["row"])
     assert list(schedule.blocks) == GRAPHS["row"][1]
     assert not schedule.target.size
+
+
+def test_bodies_are_eliminated_in_their_order_unless_another_needs_fewer_products():
+    for graph in ("row", "all coupled", "six-bar"):
+        np.testing.assert_array_equal(
+            Schedule.of(*GRAPHS[graph]).order, np.arange(GRAPHS[graph][0])
+        )
+    star = Schedule.of(*GRAPHS["star"])
+    assert star.order[0] != 0
+    assert not star.target.size
+
+
+def test_a_large_lattice_fills_little_in():
+    side = 20
+    right = [(i, i + 1) for i in range(side**2) if (i + 1) % side]
+    pairs = right + [(i, i + side) for i in range(side**2 - side)]
+    assert len(Schedule.of(side**2, pairs).blocks) < 0.5 * side**3
+    assert len(Schedule.in_order(np.arange(side**2), pairs).blocks) > 0.9 * side**3

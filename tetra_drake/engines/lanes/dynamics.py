@@ -19,7 +19,7 @@ from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
-from tetra_drake.laws.model import WORLD, Model
+from tetra_drake.laws.model import WORLD, Joints, Model
 from tetra_drake.laws.terrain import to_world
 from tetra_drake.laws.vectors import cross, dot, put_vector, vector_at
 
@@ -72,12 +72,37 @@ class Solver(NamedTuple):
         """The solver for the pairs of bodies that straight cables, joints and paths join."""
         schedule = Schedule.of(bodies, [*coupled, *jointed, *(p for p in on_paths if p[0] < p[1])])
         blocks = schedule.blocks | {(body, body): body for body in range(bodies)}
+        either = {(b, a): block for (a, b), block in blocks.items()} | blocks
         of_pairs = [
-            np.array([blocks.get(pair, -1) for pair in pairs], dtype=np.int64)
-            for pairs in (coupled, jointed, on_paths)
+            np.array([found.get(pair, -1) for pair in pairs], dtype=np.int64)
+            for pairs, found in ((coupled, either), (jointed, either), (on_paths, blocks))
         ]
         fill = np.setdiff1d(np.arange(bodies, len(schedule.later)), of_pairs[0])
         return cls(schedule, of_pairs[0], fill, jointed=of_pairs[1], routed=of_pairs[2])
+
+    def oriented(self, robot: Model) -> Model:
+        """The robot for implicit_matrix(). Of the two bodies of a pair or joint, the first one is
+        the one that is eliminated first; cables run from it to the other one."""
+        couplings, cables, joints = robot.couplings, robot.cables, robot.joints
+        position = np.argsort(self.schedule.order)
+        turned = position[couplings.first] > position[couplings.second]
+        first, second = _swapped(couplings.first, couplings.second, turned)
+        of_cables = np.zeros(cables.node_a.size, dtype=bool)
+        count = np.diff(couplings.first_cable)
+        of_cables[couplings.first_cable[0] :][: count.sum()] = np.repeat(turned, count)
+        node_a, node_b = _swapped(cables.node_a, cables.node_b, of_cables)
+        of_joints = position[joints.body_a] > position[joints.body_b]
+        nodes = _swapped(joints.node_a, joints.node_b, of_joints)
+        bodies = _swapped(joints.body_a, joints.body_b, of_joints)
+        return robot._replace(
+            couplings=couplings._replace(first=first, second=second),
+            cables=cables._replace(node_a=node_a, node_b=node_b),
+            joints=Joints(*nodes, *bodies, joints.stiffness, joints.damping),
+        )
+
+
+def _swapped(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return np.where(where, b, a), np.where(where, a, b)
 
 
 @inlined

@@ -68,7 +68,7 @@ class Prepared:
         max_step = np.fmin(engine.max_step, Limits(*model.actuator.limits).time_constant)
         ground = model.ground._replace(heights=None)  # lanes have different numbers of heights
         constants = Constants(
-            robot=model._replace(ground=ground),
+            robot=solver.oriented(model)._replace(ground=ground),
             solver=solver,
             network=driven.network,
             senses=robot.senses,

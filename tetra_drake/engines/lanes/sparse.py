@@ -1,10 +1,10 @@
 """Block-sparse linear systems: symmetric, positive definite, with 6 x 6 blocks per pair of bodies.
 
-Bodies are eliminated in their order. A schedule is made once from the pairs of coupled bodies. A
-system is stored as `blocks` (blocks, 6, 6). Block i is body i's own block; its upper half is used.
-Then, in compressed rows, each body has a block for each later body coupled to it, directly or by
-fill-in. In a row of tetrahedra each body is only coupled to the next one, and the system is
-block-tridiagonal.
+Bodies are eliminated one after the other, which couples the bodies next to them (fill-in). A
+schedule is made once from the pairs of coupled bodies. A system is stored as `blocks` (blocks, 6,
+6). Block i is body i's own block; its upper half is used. Then, in compressed rows, each body has a
+block for each later body coupled to it, directly or by fill-in. *Later* means: eliminated later. In
+a row of tetrahedra each body is only coupled to the next one, and the system is block-tridiagonal.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from collections.abc import Iterable
 from typing import NamedTuple, Self
 
 import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table
@@ -25,9 +27,11 @@ class Schedule(NamedTuple):
     """Positions of the 6 x 6 blocks of a sparse symmetric matrix in the table `blocks` (blocks, 6,
     6), in the order of elimination. Block i of the first ones is body i's own."""
 
+    order: Table
+    """Body at each position of the elimination (bodies,)."""
     first: Table
-    """Index of the first block of each body with a later body (bodies + 1,); the last number is the
-    number of blocks."""
+    """Index of the first block with a later body, for the body at each position (bodies + 1,); the
+    last number is the number of blocks."""
     later: Table
     """Index of the later body of each block (blocks,); of the body itself for its own block."""
     target: Table
@@ -36,31 +40,55 @@ class Schedule(NamedTuple):
 
     @classmethod
     def of(cls, bodies: int, pairs: Iterable[tuple[int, int]]) -> Self:
-        """The schedule for a number of bodies, `bodies`, and the pairs of bodies that are coupled,
-        by their indices."""
-        coupled: list[set[int]] = [set() for _ in range(bodies)]
-        for pair in pairs:
-            coupled[min(pair)].add(max(pair))
-        for body in range(bodies):
+        """The schedule for a number of bodies and the coupled pairs among them. The bodies are
+        eliminated in their order, or in the order of minimum degree if it needs fewer products."""
+        pairs = [*pairs]
+        by_index = cls.in_order(np.arange(bodies), pairs)
+        if not by_index.target.size:
+            return by_index
+        by_degree = cls.in_order(minimum_degree_order(bodies, pairs), pairs)
+        return min(by_index, by_degree, key=lambda schedule: schedule.target.size)
+
+    @classmethod
+    def in_order(cls, order: Table, pairs: Iterable[tuple[int, int]]) -> Self:
+        """The schedule for bodies that are eliminated in a given order (bodies,), with the coupled
+        pairs among them."""
+        bodies, position = len(order), np.argsort(order)
+        coupled: list[set[int]] = [set() for _ in range(bodies)]  # positions of later bodies
+        for a, b in position[np.reshape([*pairs], (-1, 2)).astype(int)].tolist():
+            coupled[min(a, b)].add(max(a, b))
+        for others in coupled:
             # Eliminating a body couples all of its later bodies with each other.
-            for a, b in itertools.combinations(sorted(coupled[body]), 2):
+            for a, b in itertools.combinations(sorted(others), 2):
                 coupled[a].add(b)
         rows = [sorted(others) for others in coupled]
         first = bodies + np.cumsum([0, *map(len, rows)])
         target = [
             first[a] + rows[a].index(b) for row in rows for a, b in itertools.combinations(row, 2)
         ]
-        later = [*range(bodies), *itertools.chain(*rows)]
-        return cls(first, np.array(later), np.array(target, dtype=np.int64))
+        later = [*range(bodies), *(int(order[other]) for row in rows for other in row)]
+        return cls(order, first, np.array(later), np.array(target, dtype=np.int64))
 
     @property
     def blocks(self) -> dict[tuple[int, int], int]:
-        """Index of the block of each pair of bodies (earlier, later) that is coupled, directly or
-        by fill-in, the blocks that only the elimination fills."""
-        bodies = len(self.first) - 1
-        rows = np.repeat(np.arange(bodies), np.diff(self.first)).tolist()
+        """Index of the block of each coupled pair of bodies, directly or by fill-in. The first body
+        of a pair is eliminated before the second."""
+        bodies = len(self.order)
+        rows = np.repeat(self.order, np.diff(self.first)).tolist()
         pairs = zip(rows, self.later[bodies:].tolist(), strict=True)
         return {pair: bodies + k for k, pair in enumerate(pairs)}
+
+
+def minimum_degree_order(bodies: int, pairs: Iterable[tuple[int, int]]) -> np.ndarray:
+    """Order of elimination (bodies,) with little fill-in: the next body is mostly one with the
+    fewest neighbours. SuperLU computes it for a matrix with an entry for each of the `pairs`."""
+    a, b = np.transpose([*pairs])
+    own = np.arange(bodies)
+    entries = np.repeat([2.0 * bodies, 1.0], [bodies, 2 * len(a)])
+    indices = np.concatenate([own, a, b]), np.concatenate([own, b, a])
+    matrix = csc_array((entries, indices), shape=(bodies, bodies))
+    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    return np.argsort(factors.perm_c)
 
 
 @inlined
@@ -72,7 +100,8 @@ def factorise(blocks: Table, schedule: Schedule) -> None:
     would read and write it once per pivot.
     """
     product = 0
-    for i in range(schedule.first.size - 1):
+    for position in range(schedule.order.size):
+        i = schedule.order[position]
         for r in range(BLOCK):  # the body's own block
             inverse = 1.0 / blocks[i, r, r]
             blocks[i, r, r] = inverse
@@ -80,11 +109,11 @@ def factorise(blocks: Table, schedule: Schedule) -> None:
                 factor = blocks[i, r, t] * inverse
                 for c in range(t, BLOCK):
                     blocks[i, t, c] -= factor * blocks[i, r, c]
-        end = schedule.first[i + 1]
-        for a in range(schedule.first[i], end):
+        end = schedule.first[position + 1]
+        for a in range(schedule.first[position], end):
             reduce_block(blocks, i, a)
-        for a in range(schedule.first[i], end):
-            eliminate(blocks, schedule, i, a, product)
+        for a in range(schedule.first[position], end):
+            eliminate(blocks, schedule, i, a, end, product)
             product += end - a - 1
 
 
@@ -109,16 +138,16 @@ def reduce_block(blocks: Table, i: int, a: int) -> None:
 
 
 @inlined
-def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, product: int) -> None:
-    """Eliminates body i from the rows of the later body that block number `a` couples it to; part
-    of factorise(). Changes `blocks` in place. `product` is the index in `schedule.target` of the
-    first product of block `a` with a later block of body i."""
+def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, end: int, product: int) -> None:
+    """Eliminates body i from the rows of the later body that block `a` couples it to; part of
+    factorise(). The body's blocks end before `end`. `product` is the index in `schedule.target` of
+    the first product of block `a`."""
     j = schedule.later[a]
     for t in range(BLOCK):
         column = factors(blocks, i, a, t)
         for c in range(t, BLOCK):
             blocks[j, t, c] = reduced(blocks[j, t, c], column, blocks, a, c)
-        for b in range(a + 1, schedule.first[i + 1]):
+        for b in range(a + 1, end):
             target = schedule.target[product + b - a - 1]
             for c in range(BLOCK):
                 blocks[target, t, c] = reduced(blocks[target, t, c], column, blocks, b, c)
@@ -155,8 +184,9 @@ def solve(blocks: Table, schedule: Schedule, x: Table) -> None:
 
     The numbers of a body are in variables. In a loop over x, each operation would wait for memory.
     """
-    bodies = schedule.first.size - 1
-    for i in range(bodies):
+    bodies = schedule.order.size
+    for position in range(bodies):
+        i = schedule.order[position]
         f = BLOCK * i
         x_0, x_1, x_2, x_3, x_4, x_5 = x[f], x[f + 1], x[f + 2], x[f + 3], x[f + 4], x[f + 5]
         x_0 = x_0 * blocks[i, 0, 0]
@@ -169,7 +199,7 @@ def solve(blocks: Table, schedule: Schedule, x: Table) -> None:
         x_4 = (x_4 - blocks[i, 3, 4] * x_3) * blocks[i, 4, 4]
         x_5 = (x_5 - blocks[i, 3, 5] * x_3 - blocks[i, 4, 5] * x_4) * blocks[i, 5, 5]
         x[f], x[f + 1], x[f + 2], x[f + 3], x[f + 4], x[f + 5] = x_0, x_1, x_2, x_3, x_4, x_5
-        for k in range(schedule.first[i], schedule.first[i + 1]):
+        for k in range(schedule.first[position], schedule.first[position + 1]):
             g = BLOCK * schedule.later[k]
             for c in range(BLOCK):
                 before = blocks[k, 0, c] * x_0 + blocks[k, 1, c] * x_1
@@ -177,9 +207,10 @@ def solve(blocks: Table, schedule: Schedule, x: Table) -> None:
                 after = blocks[k, 3, c] * x_3 + blocks[k, 4, c] * x_4
                 after += blocks[k, 5, c] * x_5
                 x[g + c] -= before + after
-    for i in range(bodies - 1, -1, -1):
+    for position in range(bodies - 1, -1, -1):
+        i = schedule.order[position]
         f = BLOCK * i
-        for k in range(schedule.first[i], schedule.first[i + 1]):
+        for k in range(schedule.first[position], schedule.first[position + 1]):
             g = BLOCK * schedule.later[k]
             for r in range(BLOCK):
                 after = blocks[k, r, 0] * x[g]
