@@ -352,10 +352,10 @@ def pull_cables(
     cable becomes longer. `signals` (m,) in N are the actuator signals.
     """
     robot, _ = unpacked(parts)
-    drive, table = 0, np.zeros((drives.size, DRIVE_COLUMNS))
+    table = np.zeros((drives.size, DRIVE_COLUMNS))
     table[:, DRIVE] = drives
     for i in range(tensions.size):
-        tensions[i], _, drive = pull_of_cable(robot, i, drive, lengths[i], rates[i], signals, table)
+        tensions[i], _ = pull_of_cable(robot, i, lengths[i], rates[i], signals, table)
     drives += step * table[:, RATE]
 
 

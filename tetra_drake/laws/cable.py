@@ -82,6 +82,8 @@ class Cables(NamedTuple):
     node_a: Table
     node_b: Table
     signal: Table
+    drive: Table
+    """Row of each driven cable's actuator in the table `drives` of laws.actuator."""
     law: Any
     """Constants of all cables: a CableLaw of tables (cables,)."""
     routes: Routes
@@ -99,7 +101,8 @@ class Cables(NamedTuple):
             nodes=np.array([node for path in paths for node in path], dtype=np.int64),
             first=np.cumsum([0, *map(len, paths)]),
         )
-        return cls(node_a, node_b, signal, CableLaw.of(cables), routes)
+        drive = np.maximum(0, np.cumsum(signal != PASSIVE) - 1)
+        return cls(node_a, node_b, signal, drive, CableLaw.of(cables), routes)
 
     @property
     def pieces(self) -> Table:

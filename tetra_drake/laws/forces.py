@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
@@ -100,17 +101,15 @@ def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def pull_of_cable(
-    robot: Model, i: int, drive: int, length: Real, rate: Real, signals: Table, drives: Table
-) -> tuple[Real, Real, int]:
-    """Tension (N) of cable i, its derivative by the rate of the length (N s/m), and the row of
-    `drives` for the next cable.
+    robot: Model, i: int, length: Real, rate: Real, signals: Table, drives: Table
+) -> tuple[Real, Real]:
+    """Tension (N) of cable i, and its derivative by the rate of the length (N s/m).
 
     `length` is in m, `rate`, the rate of the length, in m/s, `signals` (signals,) in N. An
     actuation force also acts on a cable that is slack.
 
     `drives` has a row for each actuator with a state, such as a winch. Its state is read; the
-    state's rate and the other columns are written. `drive` is the row of this cable's actuator. The
-    returned row is `drive` + 1 if the cable has such an actuator, otherwise `drive`.
+    state's rate and the other columns are written.
     """
     driver, signal = robot.cables.signal[i], 0.0
     if driver != cable.PASSIVE:
@@ -118,18 +117,19 @@ def pull_of_cable(
     law = cable.law_of(robot.cables, i)
     if driver == cable.PASSIVE or not actuator.has_drive(robot.actuator):
         if not robot.slack:
-            return cable.cable_tension(length, rate, signal, law), law.damping, drive
+            return cable.cable_tension(length, rate, signal, law), law.damping
         elastic = cable.elastic_tension(length - law.free_length, law)
         tension, tension_per_rate = cable.slack_tension(elastic, rate, law)
         tension += signal
-        return maximum(tension, 0.0), select(tension > 0.0, tension_per_rate, 0.0), drive
+        return maximum(tension, 0.0), select(tension > 0.0, tension_per_rate, 0.0)
+    drive = robot.cables.drive[i]
     driven = actuator.actuator_force(
         robot.actuator, drives[drive, actuator.DRIVE], length, rate, signal, law
     )
     drives[drive, actuator.RATE] = driven.rate
     drives[drive, actuator.LIMITED] = driven.limited
     drives[drive, actuator.BESIDE] = driven.beside
-    return driven.tension, driven.tension_per_rate, drive + 1
+    return driven.tension, driven.tension_per_rate
 
 
 @inlined
@@ -142,22 +142,21 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
     `forces.cable_forces`.
     """
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
-    routes, drive = robot.cables.routes, 0
+    routes = robot.cables.routes
     for i in range(parts.shape[0]):
         if routes.first[i] < routes.first[i + 1]:
-            drive = add_routed_cable(robot, i, drive, signals, write_parts, forces)
             continue
         a, b = robot.cables.node_a[i], robot.cables.node_b[i]
         direction, length, rate = span(nodes, a, b)
-        tension, tension_per_rate, drive = pull_of_cable(
-            robot, i, drive, length, rate, signals, drives
-        )
+        tension, tension_per_rate = pull_of_cable(robot, i, length, rate, signals, drives)
         add_vector(scaled(tension, direction), a, kinematics.FORCE, nodes)
         add_vector(scaled(-tension, direction), b, kinematics.FORCE, nodes)
         if write_parts:
             put_vector(direction, i, cable.DIRECTION, parts)
             parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
             parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
+    if routes.nodes.size:
+        add_routed_cables(robot, signals, write_parts, forces)
 
 
 @inlined
@@ -172,35 +171,32 @@ def span(nodes: Table, a: int, b: int) -> tuple[Vector3, Real, Real]:
     return direction, square * per_length, dot(v_AB, direction)
 
 
-@inlined
-def add_routed_cable(
-    robot: Model, i: int, drive: int, signals: Table, write_parts: bool, forces: Forces
-) -> int:
-    """Adds the forces of cable i, which runs over frictionless rings, to the forces on the nodes of
-    its path, in `forces.nodes`. Also writes `forces.route_slopes`. Returns the next row of
-    `drives`; see pull_of_cable()."""
+@functools.partial(compiled, nogil=True)  # a call of its own: inlined, it slows other robots
+def add_routed_cables(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
+    """Adds the forces of the cables that run over frictionless rings; see add_cable_forces(). Also
+    writes `forces.route_slopes`."""
     nodes, routes, slopes = forces.nodes, robot.cables.routes, forces.route_slopes
-    first, last = routes.first[i], routes.first[i + 1] - 1
-    length = rate = 0.0
-    put_vector((0.0, 0.0, 0.0), first, 0, slopes)
-    for k in range(first, last):
-        direction, part, part_rate = span(nodes, routes.nodes[k], routes.nodes[k + 1])
-        length += part
-        rate += part_rate
-        add_vector(scaled(-1.0, direction), k, 0, slopes)
-        put_vector(direction, k + 1, 0, slopes)
-    tension, tension_per_rate, drive = pull_of_cable(
-        robot, i, drive, length, rate, signals, forces.drives
-    )
-    for k in range(first, last + 1):
-        pull = scaled(-tension, vector_at(slopes, k, 0))
-        add_vector(pull, routes.nodes[k], kinematics.FORCE, nodes)
-    if write_parts:
-        parts = forces.cable_forces
-        put_vector(scaled(-1.0, vector_at(slopes, first, 0)), i, cable.DIRECTION, parts)
-        parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
-        parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
-    return drive
+    parts = forces.cable_forces
+    for i in range(parts.shape[0]):
+        first, last = routes.first[i], routes.first[i + 1] - 1
+        if last < first:
+            continue
+        length = rate = 0.0
+        put_vector((0.0, 0.0, 0.0), first, 0, slopes)
+        for k in range(first, last):
+            direction, part, part_rate = span(nodes, routes.nodes[k], routes.nodes[k + 1])
+            length += part
+            rate += part_rate
+            add_vector(scaled(-1.0, direction), k, 0, slopes)
+            put_vector(direction, k + 1, 0, slopes)
+        tension, tension_per_rate = pull_of_cable(robot, i, length, rate, signals, forces.drives)
+        for k in range(first, last + 1):
+            pull = scaled(-tension, vector_at(slopes, k, 0))
+            add_vector(pull, routes.nodes[k], kinematics.FORCE, nodes)
+        if write_parts:
+            put_vector(scaled(-1.0, vector_at(slopes, first, 0)), i, cable.DIRECTION, parts)
+            parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
+            parts[i, cable.TENSION_PER_RATE], parts[i, cable.RATE] = tension_per_rate, rate
 
 
 @inlined

@@ -45,15 +45,16 @@ def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
     bodies = robot.bodies.mass.size
     carriers = np.full(len(robot.p_BN), WORLD)
     carriers[: robot.first_node[-1]] = np.repeat(np.arange(bodies), np.diff(robot.first_node))
+    kinds = [_cables, _supports]
+    if robot.cables.routes.nodes.size:
+        kinds += [_pieces, _paths]
+    if robot.joints.node_a.size:
+        kinds += [_joints]
+    if forces.near_struts.count[0]:
+        kinds += [_touching_struts]
     rows, columns, blocks = [], [], []
-    for springs in (
-        _cables(robot, forces, carriers),
-        _pieces(robot, forces, carriers),
-        _paths(robot, forces, carriers),
-        _joints(robot, forces, carriers),
-        _supports(robot, forces, carriers),
-        _touching_struts(robot, forces, carriers),
-    ):
+    for kind in kinds:
+        springs = kind(robot, forces, carriers)
         motion = np.concatenate([springs.motion_a, springs.motion_b], axis=2)
         added = motion.transpose(0, 2, 1) @ springs.stiffness @ motion
         ends = np.stack([springs.body_a, springs.body_b], axis=1)

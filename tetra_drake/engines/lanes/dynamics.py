@@ -12,7 +12,7 @@ from typing import NamedTuple, Self, TypeAlias
 import numpy as np
 
 from tetra_drake.engines.lanes.sparse import BLOCK, Schedule
-from tetra_drake.kernels.compiling import inlined, merged
+from tetra_drake.kernels.compiling import compiled, inlined, merged
 from tetra_drake.kernels.lanes import Real, Table, any_lane, named, select
 from tetra_drake.laws import contact, inertia
 from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
@@ -185,13 +185,6 @@ def implicit_matrix(
         add_diagonal(forces.nodes, node, body, diagonal, blocks)
         across = damping * x * y, damping * x * z, damping * y * z
         add_off_diagonal(forces.nodes, node, body, across, blocks)
-    add_routed_cables(robot, solver, forces, time, blocks)
-    joints = robot.joints
-    for i in range(joints.node_a.size):
-        k = time * (joints.damping[i] + time * joints.stiffness[i])
-        add_diagonal(forces.nodes, joints.node_a[i], joints.body_a[i], (k, k, k), blocks)
-        add_diagonal(forces.nodes, joints.node_b[i], joints.body_b[i], (k, k, k), blocks)
-        add_joint(forces.nodes, joints.node_a[i], joints.node_b[i], solver.jointed[i], k, blocks)
     for body in range(robot.bodies.mass.size):
         mass, inertia_W = robot.bodies.mass[body], forces.inertia
         if robot.isotropic:
@@ -215,6 +208,8 @@ def implicit_matrix(
         c_x, c_y, c_z = vector_at(anchors.damping, i, 0)
         k = time * (c_x + time * k_x), time * (c_y + time * k_y), time * (c_z + time * k_z)
         add_diagonal(forces.nodes, anchors.nodes[i], anchors.carriers[i], k, blocks)
+    if robot.joints.node_a.size or robot.cables.routes.nodes.size:
+        add_joints_and_routes(robot, solver, forces, time, blocks)
 
 
 @inlined
@@ -282,18 +277,24 @@ def add_cables(
             put(-wd, adds, block, 3 + c, r, blocks)
 
 
-@inlined
-def add_routed_cables(
+@functools.partial(compiled, nogil=True)  # a call of its own: inlined, it slows other robots
+def add_joints_and_routes(
     robot: Model, solver: Solver, forces: Forces, time: Real, blocks: Table
 ) -> None:
-    """Adds the damping of the routed cables to the implicit matrix `blocks`, as time * damping * l
-    lᵀ. `time` is in s.
+    """Adds joints, as time * damping + time² * stiffness, and the damping of routed cables, as time
+    * damping * l lᵀ, to the implicit matrix `blocks`. `time` is in s.
 
     A body's part of l is the sum of (p x s, s) over its nodes on the path, at p from its origin,
     with the derivative s of the cable's length by the node's position.
     """
-    routes, couplings, pair = robot.cables.routes, robot.couplings, 0
-    for i in range(couplings.first_cable[solver.coupled.size], robot.cables.signal.size):
+    joints, nodes = robot.joints, forces.nodes
+    for i in range(joints.node_a.size):
+        k = time * (joints.damping[i] + time * joints.stiffness[i])
+        add_diagonal(nodes, joints.node_a[i], joints.body_a[i], (k, k, k), blocks)
+        add_diagonal(nodes, joints.node_b[i], joints.body_b[i], (k, k, k), blocks)
+        add_joint(nodes, joints.node_a[i], joints.node_b[i], solver.jointed[i], k, blocks)
+    routes, pair = robot.cables.routes, 0
+    for i in range(robot.couplings.first_cable[solver.coupled.size], robot.cables.signal.size):
         damping = time * forces.cable_forces[i, TENSION_PER_RATE]
         for a in range(routes.first[i], routes.first[i + 1]):
             for b in range(routes.first[i], routes.first[i + 1]):
