@@ -47,13 +47,13 @@ def members(key: str, groups: Mapping[str, HasPairs]) -> Iterator[Member]:
             yield Member(f"{key}.{name}.pairs[{place}]", name, tuple(nodes))
 
 
-def struts_by_name(struts: Iterable[Member]) -> dict[str, list[int]]:
-    """Indices of struts by the names that `bodies` may use: a group, such as "bar", or one strut,
-    such as "bar a b", whose nodes may have either order."""
-    found: dict[str, list[int]] = {}
-    for index, strut in enumerate(struts):
+def struts_by_name(struts: Iterable[Member]) -> dict[str, list[Member]]:
+    """Struts by the names that `bodies` may use: a group, such as "bar", or one strut, such as "bar
+    a b", whose nodes may have either order."""
+    found: dict[str, list[Member]] = {}
+    for strut in struts:
         for name in (strut.group, *strut.names):
-            found.setdefault(name, []).append(index)
+            found.setdefault(name, []).append(strut)
     return found
 
 
@@ -102,14 +102,15 @@ class _Pinned(BaseModel):
         Nodes that are not pinned weld struts together, and so do the entries of `bodies`.
         """
         struts = [*members("struts", self.struts)]
-        named = struts_by_name(struts)
+        named, index = struts_by_name(struts), {strut.key: i for i, strut in enumerate(struts)}
         parts = [pair for group in self.struts.values() for pair in group.pairs]
         parts += [body.nodes for body in self.bodies.values()]
-        welded: list[list[str | int]] = []
-        for index, nodes in enumerate(parts):
-            welded.append([index, *(node for node in nodes if node not in self.pinned)])
-        for index, body in enumerate(self.bodies.values(), start=len(struts)):
-            welded.append([index, *(i for name in body.struts for i in named.get(name, ()))])
+        welded: list[list[str | int]] = [
+            [part, *(node for node in nodes if node not in self.pinned)]
+            for part, nodes in enumerate(parts)
+        ]
+        for own, body in zip(welded[len(struts) :], self.bodies.values(), strict=True):
+            own += [index[strut.key] for name in body.struts for strut in named.get(name, ())]
         body_of = {part: i for i, body in enumerate(components(welded)) for part in body}
 
         for place, node in enumerate(self.pinned):
@@ -117,9 +118,9 @@ class _Pinned(BaseModel):
                 found = f"found unknown node '{node}'; {hint(node, self.nodes)}"
                 refuse(f"pinned[{place}]", found)
             here: dict[int, list[list[str]]] = {}
-            for index, nodes in enumerate(parts):
+            for part, nodes in enumerate(parts):
                 if node in nodes:
-                    here.setdefault(body_of[index], []).append(nodes)
+                    here.setdefault(body_of[part], []).append(nodes)
             if len(here) < 2:
                 expected = "expected a node that struts of two bodies share"
                 refuse(f"pinned[{place}]", f"found '{node}', {expected}")
