@@ -65,15 +65,6 @@ def mjcf_tree(file: Path) -> Tree:
     return {key: part for key, part in tree.items() if part}
 
 
-class _MjcfNode(NamedTuple):
-    """Node of a rigid body."""
-
-    root: int
-    """First of the rigid body's bodies in MuJoCo; 0 for the world."""
-    place: np.ndarray
-    """Position (3,) in the world."""
-
-
 class _MjcfPart(NamedTuple):
     """Cable, strut or foot."""
 
@@ -91,7 +82,10 @@ class _MjcfTranslation:
 
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
         mujoco.mj_kinematics(model, self.data)
-        self.nodes: dict[str, _MjcfNode] = {}
+        self.nodes: dict[str, np.ndarray] = {}
+        """Position (3,) of each node in the world."""
+        self.root_of: dict[str, int] = {}
+        """First of the bodies in MuJoCo that make each node's rigid body; 0 for the world."""
         self.notes: dict[str, list[str]] = {}
         """Names of elements that are changed or left out, by what is told of them."""
         is_on_tendon = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
@@ -137,16 +131,21 @@ class _MjcfTranslation:
         ground = 0.0 if level is None or abs(level) < SAME_HEIGHT else level
         rods, feet = self._rods_and_feet(used, is_touching, (level or 0.0) - ground)
         if level is None or not self._nodes_of(_WORLD):  # a free robot may stand in the soft floor
-            lows = [node.place[2] - feet.get(name, 0.0) for name, node in self.nodes.items()]
+            lows = [place[2] - feet.get(name, 0.0) for name, place in self.nodes.items()]
             ground = min([ground, *lows])
+        spheres = [  # a foot of radius 0 has none
+            _MjcfPart("foot", [node], {"diameter": _text(2.0 * radius, "m"), "density": "0 kg/m^3"})
+            for node, radius in feet.items()
+            if radius > 0.0
+        ]
         struts, strut_names = _grouped(rods, "pairs")
         cables, cable_names = _grouped(itertools.starmap(self._cable, paths.items()), "pairs")
         self._close(joints)
         return {
-            "nodes": {n: _coordinates(node.place, ground) for n, node in self.nodes.items()},
+            "nodes": {node: _coordinates(place, ground) for node, place in self.nodes.items()},
             "struts": struts,
             "cables": cables,
-            "spheres": _spheres(feet),
+            "spheres": _grouped(spheres, "nodes")[0],
             "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground),
             "joints": joints,
             "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | anchors,
@@ -185,17 +184,18 @@ class _MjcfTranslation:
 
     def _nodes_of(self, *roots: int) -> list[str]:
         """Names of the nodes of rigid bodies."""
-        return [name for name, node in self.nodes.items() if node.root in roots]
+        return [node for node, root in self.root_of.items() if root in roots]
 
     def _found(self, root: int, place: np.ndarray) -> str | None:
         """Node of a rigid body at a place (3,) in the world; None if there is none."""
-        of_body = ((name, self.nodes[name].place - place) for name in self._nodes_of(root))
-        return next((name for name, way in of_body if np.linalg.norm(way) <= self.near), None)
+        gaps = ((node, np.linalg.norm(self.nodes[node] - place)) for node in self._nodes_of(root))
+        return next((node for node, gap in gaps if gap <= self.near), None)
 
     def _node(self, root: int, place: np.ndarray, name: str) -> str:
         """Node of a rigid body at a place; a new one of this name if there is none."""
         found = self._found(root, place) or _plain(name, self.nodes)
-        self.nodes.setdefault(found, _MjcfNode(root, place))
+        self.nodes.setdefault(found, place)
+        self.root_of.setdefault(found, root)
         return found
 
     def _paths(self) -> Iterator[tuple[int, list[int]]]:
@@ -266,30 +266,30 @@ class _MjcfTranslation:
         model, kinds = self.model, self.mujoco.mjtGeom
         rods: dict[frozenset[str], _MjcfPart] = {}
         feet: dict[str, float] = {}
-        sphere, capsule, cylinder = map(
-            int, [kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE, kinds.mjGEOM_CYLINDER]
-        )
+        is_round = np.isin(model.geom_type, [kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE])
+        is_rod = np.isin(model.geom_type, [kinds.mjGEOM_CYLINDER, kinds.mjGEOM_CAPSULE])
         roots = self.roots[model.geom_bodyid].tolist()
         middles = self._places(model.geom_bodyid, model.geom_pos)
         axes = self.data.geom_xmat[:, 2::3] * model.geom_size[:, 1:2]  # 0 for a sphere
-        is_used = np.isin(roots, used)
-        for geom in sorted(np.flatnonzero(is_used).tolist(), key=model.geom_type.__getitem__):
-            kind, radius = model.geom_type[geom], model.geom_size[geom, 0]
+        of_used = np.flatnonzero(np.isin(roots, used)).tolist()
+        for geom in sorted(of_used, key=model.geom_type.__getitem__):
+            radius = model.geom_size[geom, 0]
             root, name = roots[geom], self._name("geom", geom)
             places = [middles[geom] - axes[geom], middles[geom] + axes[geom]]
-            if is_touching[geom] and kind in (sphere, capsule):
+            if is_touching[geom] and is_round[geom]:
                 for node in [self._node(root, place, name) for place in places]:
                     feet[node] = max(feet.get(node, 0.0), radius + sunk)
             elif is_touching[geom]:
                 self._note("shapes that touch the floor in MuJoCo, but not here", "geom", geom)
             ends = [end for place in places if (end := self._found(root, place))]
-            if kind in (capsule, cylinder) and len({*ends}) == len(places):
+            if is_rod[geom] and len({*ends}) == len(places):
+                given = model.geom(geom).name or "strut"
                 settings = {"diameter": _text(2.0 * radius, "m"), "node_diameter": "0 m"}
                 settings["density"] = "0 kg/m^3"
-                given = model.geom(geom).name or "strut"
                 rods.setdefault(frozenset(ends), _MjcfPart(given, ends, settings))
-        for rod in rods.values():
-            rod.settings.update({"contact_radius": "0 m"} if feet else {})
+        if feet:
+            for rod in rods.values():
+                rod.settings["contact_radius"] = "0 m"
         return [*rods.values()], feet
 
     def _bodies(self, used: list[int], struts: dict[str, _MjcfPart], ground: float) -> Tree:
@@ -338,10 +338,9 @@ class _MjcfTranslation:
         """Moves the second node of each joint with a small gap to the first."""
         for name, joint in joints.items():
             first, second = joint["nodes"]
-            place, node = self.nodes[first].place, self.nodes[second]
-            gap = float(np.linalg.norm(place - node.place))
+            gap = float(np.linalg.norm(self.nodes[first] - self.nodes[second]))
             if self.near < gap <= _LARGEST_GAP * self.near:
-                self.nodes[second] = node._replace(place=place)
+                self.nodes[second] = self.nodes[first]
                 self.notes.setdefault("joints with a gap, which is closed", []).append(name)
 
     def _actuated(self, cables: dict[int, str]) -> Tree:
@@ -390,16 +389,6 @@ class _MjcfTranslation:
         yield "gravity compensation, left out", "body", model.body_gravcomp
         yield "key frames, left out", "key", np.ones(model.nkey)
         yield "flexible parts, left out", "flex", np.ones(model.nflex)
-
-
-def _spheres(feet: dict[str, float]) -> Tree:
-    """Groups of spheres without mass, from the radius of each foot. A foot of radius 0 has none."""
-    found = [
-        _MjcfPart("foot", [node], {"diameter": _text(2.0 * radius, "m"), "density": "0 kg/m^3"})
-        for node, radius in feet.items()
-        if radius > 0.0
-    ]
-    return _grouped(found, "nodes")[0]
 
 
 def _grouped(parts: Iterable[_MjcfPart], key: str) -> tuple[Tree, list[str]]:

@@ -564,13 +564,11 @@ class StructureFile(Section):
 
     def _check_joined(self, blueprint: Blueprint) -> None:
         """Refuses two entries of `bodies` for one body, and two bodies of one name."""
-        entries: dict[int, str] = {}
-        body_of = dict(zip(blueprint.node_names, blueprint.carriers.tolist(), strict=True))
+        body_of = dict(zip(blueprint.node_names, blueprint.body_of_node, strict=True))
         for name, (node, *_) in self._nodes_of_joined().items():
-            earlier = entries.setdefault(body_of[node], name)
-            if earlier != name:
-                problem = f"shares a node with bodies.{earlier}, so that they are one body"
-                refuse(f"bodies.{name}", f"{problem}, expected one entry for it")
+            if body_of[node] != name:
+                problem = f"shares a node with bodies.{name}, so that they are one body"
+                refuse(f"bodies.{body_of[node]}", f"{problem}, expected one entry for it")
         (name, count), *_ = Counter(blueprint.bodies).most_common(1)
         if count > 1:
             key = f"bodies.{name}" if name in self.bodies else f"nodes.{name}"
