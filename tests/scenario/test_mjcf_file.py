@@ -75,12 +75,10 @@ def model_of(robot: Robot) -> Any:
 
 def cables_of(model: Any) -> dict[frozenset[str], list[float]]:
     """Stiffness, damping and free length of each tendon, by its sites."""
-    cables = {}
-    for i, (first, count) in enumerate(zip(model.tendon_adr, model.tendon_num, strict=True)):
-        sites = frozenset(model.site(j).name for j in model.wrap_objid[first : first + count])
-        law = [model.tendon_stiffness[i], model.tendon_damping[i], model.tendon_lengthspring[i, 1]]
-        cables[sites] = law
-    return cables
+    law = [model.tendon_stiffness, model.tendon_damping, model.tendon_lengthspring[:, 1]]
+    paths = np.split(model.wrap_objid, model.tendon_adr[1:])
+    sites = [frozenset(model.site(site).name for site in path) for path in paths]
+    return dict(zip(sites, np.transpose(law).tolist(), strict=True))
 
 
 def driven_by(robot: Robot) -> dict[str, set[frozenset[str]]]:

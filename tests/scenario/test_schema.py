@@ -3,7 +3,6 @@
 import copy
 import json
 import random
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +17,11 @@ from tetra_drake.scenario.shipped import SCENARIOS, STRUCTURES
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.section import parts_in
 
 STRUCTURE_FILES, SCENARIO_FILES = (sorted(each.glob("*.yaml")) for each in (STRUCTURES, SCENARIOS))
 STRUCTURE_TEXTS = [EXAMPLE, *(file.read_text("utf-8") for file in STRUCTURE_FILES)]
 SCENARIO_TEXTS = [file.read_text("utf-8") for file in SCENARIO_FILES]
-
-
-def validator(*, structure: bool) -> Draft202012Validator:
-    schema = json.loads(schema_text(structure=structure))
-    kind = "structure" if structure else "scenario"
-    assert schema["$id"] == f"urn:tetra-drake:{kind}:format-1.schema.json"
-    Draft202012Validator.check_schema(schema)
-    return Draft202012Validator(schema)
 
 
 def without_tags(tree: Any) -> Any:
@@ -38,38 +30,19 @@ def without_tags(tree: Any) -> Any:
     return [without_tags(item) for item in tree] if isinstance(tree, list) else tree
 
 
-def places(tree: Any) -> Iterator[tuple[Any, Any]]:
-    """Each mapping and list in a tree, with each of its keys or indices."""
-    entries = tree.items() if isinstance(tree, dict) else enumerate(tree)
-    for key, value in entries:
-        if key != TAG:
-            yield tree, key
-            if isinstance(value, dict | list):
-                yield from places(value)
-
-
-VALUES = [
-    None,
-    True,
-    -1,
-    0,
-    7,
-    2.5,
-    "n3",
-    "3 kg",
-    "-2 m",
-    "5 N",
-    "5 N/m",
-    "1 lbf*s/in",
-    [],
-    [1],
-    {},
-]
+VALUES = [None, True, -1, 0, 7, 2.5, [], [1], {}]
+VALUES += ["n3", "3 kg", "-2 m", "5 N", "5 N/m", "1 lbf*s/in"]
 
 
 def damage(tree: Any, draw: random.Random) -> None:
     """Changes one place of a tree: another value, a key or an item more or less."""
-    place, key = draw.choice([*places(tree)])
+    parts = (part for part in parts_in(tree) if isinstance(part, dict | list))
+    places = [
+        (part, key)
+        for part in parts
+        for key in (part if isinstance(part, dict) else range(len(part)))
+    ]
+    place, key = draw.choice([(part, key) for part, key in places if key != TAG])
     what = draw.choice(["value", "value", "remove", "repeat"])
     if what == "remove":
         del place[key]
@@ -83,10 +56,13 @@ def damage(tree: Any, draw: random.Random) -> None:
 
 @pytest.mark.parametrize("structure", [True, False])
 def test_what_a_schema_refuses_does_not_load_and_most_of_the_rest_loads(structure, tmp_path: Path):
-    check, file = validator(structure=structure), tmp_path / "mine.yaml"
-    texts, load = SCENARIO_TEXTS, load_scenario
+    kind, texts, load = "scenario", SCENARIO_TEXTS, load_scenario
     if structure:
-        texts, load = STRUCTURE_TEXTS, read_structure
+        kind, texts, load = "structure", STRUCTURE_TEXTS, read_structure
+    schema = json.loads(schema_text(structure=structure))
+    assert schema["$id"] == f"urn:tetra-drake:{kind}:format-1.schema.json"
+    Draft202012Validator.check_schema(schema)
+    check, file = Draft202012Validator(schema), tmp_path / "mine.yaml"
     trees = [parse_yaml(text, "mine.yaml") for text in texts]
     for tree in trees:
         assert [*check.iter_errors(without_tags(tree))] == []

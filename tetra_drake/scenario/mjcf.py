@@ -15,7 +15,6 @@ and sensors are no part of a structure. Everything else that is left out is told
 
 from __future__ import annotations
 
-import functools
 import itertools
 import logging
 import re
@@ -30,6 +29,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.blueprint import TOLERANCE
 from tetra_drake.scenario.mjcf_file import compiled_model
 from tetra_drake.scenario.robot_structure import MOST_NODES
+from tetra_drake.scenario.structure_graph import unused_name
 from tetra_drake.settings.section import Tree
 
 SAME_HEIGHT = 1e-6
@@ -65,15 +65,6 @@ def mjcf_tree(file: Path) -> Tree:
     return {key: part for key, part in tree.items() if part}
 
 
-class _MjcfNode(NamedTuple):
-    """Node of a rigid body."""
-
-    root: int
-    """First of the rigid body's bodies in MuJoCo; 0 for the world."""
-    place: np.ndarray
-    """Position (3,) in the world."""
-
-
 class _MjcfPart(NamedTuple):
     """Cable, strut or foot."""
 
@@ -91,56 +82,70 @@ class _MjcfTranslation:
 
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
         mujoco.mj_kinematics(model, self.data)
-        self.nodes: dict[str, _MjcfNode] = {}
+        self.nodes: dict[str, np.ndarray] = {}
+        """Position (3,) of each node in the world."""
+        self.root_of: dict[str, int] = {}
+        """First of the bodies in MuJoCo that make each node's rigid body; 0 for the world."""
         self.notes: dict[str, list[str]] = {}
         """Names of elements that are changed or left out, by what is told of them."""
-        self.is_linear = _are_linear(mujoco, model)
         is_on_tendon = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
         self.driven = np.where(is_on_tendon, model.actuator_trnid[:, 0], -1)
         """Tendon that each actuator drives (actuators,); -1 for an actuator of something else."""
+        biases = [mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE]
+        has_fixed_gain = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
+        self.is_linear = has_fixed_gain & np.isin(model.actuator_biastype, biases)
+        """True for actuators that are forces or linear springs; False for muscles."""
         size = np.ptp(np.vstack([self.data.site_xpos, self.data.xpos]), axis=0)
         self.near = TOLERANCE * float(np.linalg.norm(size))
         """Distance up to which two points are one node."""
-        for what, kind, is_changed in _changes(mujoco, model):
+        moving = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
+        self.roots = np.where(np.isin(model.body_rootid, moving), model.body_rootid, _WORLD)
+        """First body of the rigid body that each body belongs to (bodies,); 0 for the world. Only a
+        free joint parts a body from the world."""
+        for eq in self._equalities(mujoco.mjtEq.mjEQ_WELD):
+            first, second = sorted(root for root, _ in self._ends_of(eq))
+            self.roots[self.roots == second] = first
+        self.laws = self._laws()
+        """Stiffness, damping and free length of each tendon (tendons, 3)."""
+        for what, kind, is_changed in self._changes():
             for number in np.flatnonzero(is_changed).tolist():
                 self._note(what, kind, number)
 
     def tree(self) -> Tree:
         """Content of the structure file."""
-        model, paths = self.model, dict(self._paths())
+        paths, roots = dict(self._paths()), self.roots[self.model.site_bodyid].tolist()
         connects = self._equalities(self.mujoco.mjtEq.mjEQ_CONNECT)
-        roots = self.roots[model.site_bodyid].tolist()
         on_paths = {*itertools.chain(*paths.values())}
         reached = {root for eq in connects for root, _ in self._ends_of(eq)}
         used = sorted(({roots[site] for site in on_paths} | reached) - {_WORLD})
         for root in sorted({*self.roots.tolist()} - {*used, _WORLD}):
             self._note("bodies that no tendon and no connect reaches, left out", "body", root)
-        node_of = {}
-        for site, root in enumerate(roots):
-            if site in on_paths or root in used:
-                place = self._place(model.site_bodyid[site], model.site_pos[site])
-                node_of[site] = self._node(root, place, self._name("site", site))
+        places = self._places(self.model.site_bodyid, self.model.site_pos)
+        self.node_of = {
+            site: self._node(root, place, self._name("site", site))
+            for site, (root, place) in enumerate(zip(roots, places, strict=True))
+            if site in on_paths or root in used
+        }
         joints, anchors = self._joints(connects)
-        floor, is_touching = self._floor()
-        level = 0.0
-        if floor is not None:
-            level = float(self._place(model.geom_bodyid[floor], model.geom_pos[floor])[2])
-        sunk = level if abs(level) < SAME_HEIGHT else 0.0
-        rods, feet = self._rods_and_feet(used, is_touching, sunk)
-        ground = level - sunk
-        if floor is None or not self._nodes_of(_WORLD):  # a free robot may stand in the soft floor
-            lows = [node.place[2] - feet.get(name, 0.0) for name, node in self.nodes.items()]
+        level, is_touching = self._floor()
+        ground = 0.0 if level is None or abs(level) < SAME_HEIGHT else level
+        rods, feet = self._rods_and_feet(used, is_touching, (level or 0.0) - ground)
+        if level is None or not self._nodes_of(_WORLD):  # a free robot may stand in the soft floor
+            lows = [place[2] - feet.get(name, 0.0) for name, place in self.nodes.items()]
             ground = min([ground, *lows])
+        spheres = [  # a foot of radius 0 has none
+            _MjcfPart("foot", [node], {"diameter": _text(2.0 * radius, "m"), "density": "0 kg/m^3"})
+            for node, radius in feet.items()
+            if radius > 0.0
+        ]
         struts, strut_names = _grouped(rods, "pairs")
-        nodes_of = {tendon: [node_of[site] for site in sites] for tendon, sites in paths.items()}
-        found = [self._cable(tendon, nodes) for tendon, nodes in nodes_of.items()]
-        cables, cable_names = _grouped(found, "pairs")
+        cables, cable_names = _grouped(itertools.starmap(self._cable, paths.items()), "pairs")
         self._close(joints)
         return {
-            "nodes": {n: _coordinates(node.place, ground) for n, node in self.nodes.items()},
+            "nodes": {node: _coordinates(place, ground) for node, place in self.nodes.items()},
             "struts": struts,
             "cables": cables,
-            "spheres": _spheres(feet),
+            "spheres": _grouped(spheres, "nodes")[0],
             "bodies": self._bodies(used, dict(zip(strut_names, rods, strict=True)), ground),
             "joints": joints,
             "anchors": dict.fromkeys(self._nodes_of(_WORLD), "xyz") | anchors,
@@ -161,26 +166,13 @@ class _MjcfTranslation:
         is_active = self.model.eq_active0.astype(bool)
         return np.flatnonzero(is_active & (self.model.eq_type == kind)).tolist()
 
-    @functools.cached_property
-    def roots(self) -> np.ndarray:
-        """First body of the rigid body that each body belongs to (bodies,); 0 for the world. Only a
-        free joint parts a body from its parent."""
-        model = self.model
-        free = model.jnt_bodyid[model.jnt_type == self.mujoco.mjtJoint.mjJNT_FREE].tolist()
-        self.roots = roots = np.zeros(model.nbody, dtype=int)  # _ends_of() reads it
-        for body in range(1, model.nbody):
-            roots[body] = body if body in free else roots[model.body_parentid[body]]
-        for eq in self._equalities(self.mujoco.mjtEq.mjEQ_WELD):
-            first, second = sorted(root for root, _ in self._ends_of(eq))
-            roots[roots == second] = first
-        return roots
+    def _places(self, bodies: Any, points: np.ndarray) -> np.ndarray:
+        """Positions (n, 3) in the world of points (n, 3) of bodies (n,) of MuJoCo. MuJoCo's own
+        position of a site is the body's if it is less than 1e-6 m away."""
+        axes = self.data.xmat[bodies].reshape(-1, 3, 3)
+        return np.asarray(self.data.xpos[bodies] + (axes @ points[:, :, np.newaxis])[:, :, 0])
 
-    def _place(self, body: int, p: np.ndarray) -> np.ndarray:
-        """Position (3,) in the world of the point p (3,) of a body of MuJoCo. MuJoCo's own position
-        of a site is the body's if it is less than 1e-6 m away."""
-        return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ p)
-
-    def _ends_of(self, eq: int) -> Iterator[tuple[int, np.ndarray]]:
+    def _ends_of(self, eq: int) -> list[tuple[int, np.ndarray]]:
         """The two rigid bodies of a connect or weld, each with the point (3,) of the connect on it,
         in the world."""
         model = self.model
@@ -188,22 +180,22 @@ class _MjcfTranslation:
         points = model.eq_data[eq, :6].reshape(2, 3)
         if model.eq_objtype[eq] == int(self.mujoco.mjtObj.mjOBJ_SITE):
             points, ends = model.site_pos[ends], model.site_bodyid[ends]
-        for body, p in zip(ends, points, strict=True):
-            yield int(self.roots[body]), self._place(body, p)
+        return [*zip(self.roots[ends].tolist(), self._places(ends, points), strict=True)]
 
     def _nodes_of(self, *roots: int) -> list[str]:
         """Names of the nodes of rigid bodies."""
-        return [name for name, node in self.nodes.items() if node.root in roots]
+        return [node for node, root in self.root_of.items() if root in roots]
 
     def _found(self, root: int, place: np.ndarray) -> str | None:
         """Node of a rigid body at a place (3,) in the world; None if there is none."""
-        of_body = ((name, self.nodes[name].place - place) for name in self._nodes_of(root))
-        return next((name for name, way in of_body if np.linalg.norm(way) <= self.near), None)
+        gaps = ((node, np.linalg.norm(self.nodes[node] - place)) for node in self._nodes_of(root))
+        return next((node for node, gap in gaps if gap <= self.near), None)
 
     def _node(self, root: int, place: np.ndarray, name: str) -> str:
         """Node of a rigid body at a place; a new one of this name if there is none."""
         found = self._found(root, place) or _plain(name, self.nodes)
-        self.nodes.setdefault(found, _MjcfNode(root, place))
+        self.nodes.setdefault(found, place)
+        self.root_of.setdefault(found, root)
         return found
 
     def _paths(self) -> Iterator[tuple[int, list[int]]]:
@@ -217,7 +209,7 @@ class _MjcfTranslation:
                 self._note("tendons over joints or pulleys, left out", "tendon", tendon)
             elif len({*self.roots[model.site_bodyid[sites]].tolist()}) == 1:
                 self._note("tendons that join a body to itself, left out", "tendon", tendon)
-            elif self._law(tendon)[0] <= 0.0:
+            elif self.laws[tendon, 0] <= 0.0:
                 self._note("tendons without stiffness, left out", "tendon", tendon)
             else:
                 if len(sites) < len(kinds):
@@ -225,74 +217,79 @@ class _MjcfTranslation:
                     self._note(what, "tendon", tendon)
                 yield tendon, sites
 
-    def _law(self, tendon: int) -> tuple[float, float, float]:
-        """Stiffness, damping and free length of a tendon, with the springs and dampers of its
-        actuators."""
+    def _laws(self) -> np.ndarray:
+        """Stiffness, damping and free length of each tendon (tendons, 3), with the springs and
+        dampers of its actuators."""
         model = self.model
-        stiffness, damping = model.tendon_stiffness[tendon], model.tendon_damping[tendon]
-        force = stiffness * model.tendon_lengthspring[tendon, 1]
-        for actuator in np.flatnonzero(self.is_linear & (self.driven == tendon)):
-            gear = model.actuator_gear[actuator, 0]
-            push, per_length, per_rate = model.actuator_biasprm[actuator, :3]
-            stiffness, damping = stiffness - gear**2 * per_length, damping - gear**2 * per_rate
-            force += gear * push
-        return stiffness, damping, force / stiffness if stiffness else 0.0
+        stiffness, damping = model.tendon_stiffness.copy(), model.tendon_damping.copy()
+        force = stiffness * model.tendon_lengthspring[:, 1]
+        springs = self.is_linear & (self.driven >= 0)
+        tendons, gear = self.driven[springs], model.actuator_gear[springs, 0]
+        push, per_length, per_rate = model.actuator_biasprm[springs, :3].T
+        np.subtract.at(stiffness, tendons, gear**2 * per_length)
+        np.subtract.at(damping, tendons, gear**2 * per_rate)
+        np.add.at(force, tendons, gear * push)
+        free_length = np.divide(force, stiffness, out=0.0 * force, where=stiffness != 0.0)
+        return np.stack([stiffness, damping, free_length], axis=1)
 
-    def _cable(self, tendon: int, nodes: list[str]) -> _MjcfPart:
-        """Cable of a tendon, from the nodes at its sites."""
-        law = map(_text, self._law(tendon), ["N/m", "N*s/m", "m"])
+    def _cable(self, tendon: int, sites: list[int]) -> _MjcfPart:
+        """Cable of a tendon over sites."""
+        law = map(_text, self.laws[tendon], ["N/m", "N*s/m", "m"])
         settings = dict(zip(["stiffness", "damping", "free_length"], law, strict=True))
-        path = [node for node, _ in itertools.groupby(nodes)]
+        path = [node for node, _ in itertools.groupby(sites, self.node_of.__getitem__)]
         return _MjcfPart(self._name("tendon", tendon), path, settings)
 
-    def _floor(self) -> tuple[int | None, np.ndarray]:
-        """The first level plane, and a mask (geoms,) of what can touch it."""
+    def _floor(self) -> tuple[float | None, np.ndarray]:
+        """Height of the first level plane, and a mask (geoms,) of what can touch it."""
         model = self.model
         kinds, others = model.geom_contype, model.geom_conaffinity
         is_plane = model.geom_type == self.mujoco.mjtGeom.mjGEOM_PLANE
         is_level = self.data.geom_xmat[:, 8] > 1.0 - TOLERANCE**2
-        floors = np.flatnonzero(is_plane & is_level).tolist()
+        floor = np.flatnonzero(is_plane & is_level)[:1]
         is_solid = (self.roots[model.geom_bodyid] == _WORLD) & ((kinds | others) != 0)
+        is_solid[floor] = False
         for geom in np.flatnonzero(is_solid).tolist():
-            if geom not in floors[:1]:
-                self._note("shapes of the world, left out", "geom", geom)
-        if not floors:
+            self._note("shapes of the world, left out", "geom", geom)
+        if not floor.size:
             return None, np.zeros(model.ngeom, dtype=bool)
-        floor = floors[0]
+        level = self._places(model.geom_bodyid[floor], model.geom_pos[floor])[0, 2]
         pairs = np.stack([model.pair_geom1, model.pair_geom2], axis=1)
         paired = np.isin(np.arange(model.ngeom), pairs[(pairs == floor).any(axis=1)])
         masks = (kinds & others[floor]) | (kinds[floor] & others)
-        return floor, paired | (masks != 0)
+        return float(level), paired | (masks != 0)
 
     def _rods_and_feet(
         self, used: list[int], is_touching: np.ndarray, sunk: float
     ) -> tuple[list[_MjcfPart], dict[str, float]]:
         """Capsules and cylinders between two nodes, and the radius (m) of each node that touches
         the floor: spheres, and ends of capsules. `sunk` is added to the radii."""
-        model, data, kinds = self.model, self.data, self.mujoco.mjtGeom
+        model, kinds = self.model, self.mujoco.mjtGeom
         rods: dict[frozenset[str], _MjcfPart] = {}
         feet: dict[str, float] = {}
-        sphere, capsule = int(kinds.mjGEOM_SPHERE), int(kinds.mjGEOM_CAPSULE)
-        is_used = np.isin(self.roots[model.geom_bodyid], used)
-        for geom in sorted(np.flatnonzero(is_used).tolist(), key=model.geom_type.__getitem__):
-            kind, (radius, half, _) = model.geom_type[geom], model.geom_size[geom]
-            root, name = int(self.roots[model.geom_bodyid[geom]]), self._name("geom", geom)
-            axis = data.geom_xmat[geom].reshape(3, 3)[:, 2] * half  # 0 for a sphere
-            middle = self._place(model.geom_bodyid[geom], model.geom_pos[geom])
-            places = middle + np.outer([-1.0, 1.0], axis)
-            if is_touching[geom] and kind in (sphere, capsule):
+        is_round = np.isin(model.geom_type, [kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE])
+        is_rod = np.isin(model.geom_type, [kinds.mjGEOM_CYLINDER, kinds.mjGEOM_CAPSULE])
+        roots = self.roots[model.geom_bodyid].tolist()
+        middles = self._places(model.geom_bodyid, model.geom_pos)
+        axes = self.data.geom_xmat[:, 2::3] * model.geom_size[:, 1:2]  # 0 for a sphere
+        of_used = np.flatnonzero(np.isin(roots, used)).tolist()
+        for geom in sorted(of_used, key=model.geom_type.__getitem__):
+            radius = model.geom_size[geom, 0]
+            root, name = roots[geom], self._name("geom", geom)
+            places = [middles[geom] - axes[geom], middles[geom] + axes[geom]]
+            if is_touching[geom] and is_round[geom]:
                 for node in [self._node(root, place, name) for place in places]:
                     feet[node] = max(feet.get(node, 0.0), radius + sunk)
             elif is_touching[geom]:
                 self._note("shapes that touch the floor in MuJoCo, but not here", "geom", geom)
             ends = [end for place in places if (end := self._found(root, place))]
-            if kind in (capsule, int(kinds.mjGEOM_CYLINDER)) and len({*ends}) == len(places):
+            if is_rod[geom] and len({*ends}) == len(places):
+                given = model.geom(geom).name or "strut"
                 settings = {"diameter": _text(2.0 * radius, "m"), "node_diameter": "0 m"}
                 settings["density"] = "0 kg/m^3"
-                given = self.model.geom(geom).name or "strut"
                 rods.setdefault(frozenset(ends), _MjcfPart(given, ends, settings))
-        for rod in rods.values():
-            rod.settings.update({"contact_radius": "0 m"} if feet else {})
+        if feet:
+            for rod in rods.values():
+                rod.settings["contact_radius"] = "0 m"
         return [*rods.values()], feet
 
     def _bodies(self, used: list[int], struts: dict[str, _MjcfPart], ground: float) -> Tree:
@@ -302,9 +299,7 @@ class _MjcfTranslation:
         for root in used:
             parts = np.flatnonzero(self.roots == root)
             mass = model.body_mass[parts]
-            centres = np.array(
-                [self._place(part, model.body_ipos[part]) for part in parts.tolist()]
-            )
+            centres = self._places(parts, model.body_ipos[parts])
             centre = mass @ centres / mass.sum()
             inertia = np.zeros((3, 3))
             for part, arm in zip(parts, centres - centre, strict=True):
@@ -343,10 +338,9 @@ class _MjcfTranslation:
         """Moves the second node of each joint with a small gap to the first."""
         for name, joint in joints.items():
             first, second = joint["nodes"]
-            place, node = self.nodes[first].place, self.nodes[second]
-            gap = float(np.linalg.norm(place - node.place))
+            gap = float(np.linalg.norm(self.nodes[first] - self.nodes[second]))
             if self.near < gap <= _LARGEST_GAP * self.near:
-                self.nodes[second] = node._replace(place=place)
+                self.nodes[second] = self.nodes[first]
                 self.notes.setdefault("joints with a gap, which is closed", []).append(name)
 
     def _actuated(self, cables: dict[int, str]) -> Tree:
@@ -374,45 +368,27 @@ class _MjcfTranslation:
             self.notes["fluid around the robot, left out"] = ["density, viscosity, wind"]
         return max(0.0, -z)
 
-
-def _are_linear(mujoco: Any, model: Any) -> np.ndarray:
-    """True for the actuators (actuators,) that are forces or linear springs; False for muscles."""
-    biases = [mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE]
-    has_fixed_gain = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
-    return np.asarray(has_fixed_gain & np.isin(model.actuator_biastype, biases))
-
-
-def _changes(mujoco: Any, model: Any) -> Iterator[tuple[str, str, Any]]:
-    """What is told of elements that are changed or left out, their kind, and a mask of them."""
-    is_joint = model.jnt_type != mujoco.mjtJoint.mjJNT_FREE
-    yield "joints that are not free, read as rigid", "joint", is_joint
-    kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
-    is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
-    yield "other equality constraints, left out", "equality", ~is_known
-    is_pushing = (model.tendon_lengthspring[:, 0] > 0.0) & (model.tendon_stiffness > 0.0)
-    yield "springs that push below their length, read as cables that go slack", "tendon", is_pushing
-    names = "limited actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
-    for name in names.split():  # earlier versions of MuJoCo have not all of them
-        values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
-        yield (
-            f"the setting '{name}' of tendons, left out",
-            "tendon",
-            [np.any(value) for value in values],
-        )
-    springs = _are_linear(mujoco, model) & model.actuator_biasprm.any(axis=1)
-    yield "actuators with springs, read at control 0", "actuator", springs
-    yield "gravity compensation, left out", "body", model.body_gravcomp
-    yield "key frames, left out", "key", np.ones(model.nkey)
-    yield "flexible parts, left out", "flex", np.ones(model.nflex)
-
-
-def _spheres(feet: dict[str, float]) -> Tree:
-    """Groups of spheres without mass, from the radius of each foot. A foot of radius 0 has none."""
-    found = []
-    for node, radius in feet.items():
-        settings = {"diameter": _text(2.0 * radius, "m"), "density": "0 kg/m^3"}
-        found += [_MjcfPart("foot", [node], settings)] if radius > 0.0 else []
-    return _grouped(found, "nodes")[0]
+    def _changes(self) -> Iterator[tuple[str, str, Any]]:
+        """What is told of elements that are changed or left out, their kind, and a mask of them."""
+        mujoco, model = self.mujoco, self.model
+        is_joint = model.jnt_type != mujoco.mjtJoint.mjJNT_FREE
+        yield "joints that are not free, read as rigid", "joint", is_joint
+        kinds = [mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD]
+        is_known = np.isin(model.eq_type, kinds) & model.eq_active0.astype(bool)
+        yield "other equality constraints, left out", "equality", ~is_known
+        is_pushing = (model.tendon_lengthspring[:, 0] > 0.0) & (model.tendon_stiffness > 0.0)
+        what = "springs that push below their length, read as cables that go slack"
+        yield what, "tendon", is_pushing
+        names = "limited actfrclimited frictionloss armature stiffnesspoly dampingpoly springyield"
+        for name in names.split():  # earlier versions of MuJoCo have not all of them
+            values = getattr(model, f"tendon_{name}", np.zeros(model.ntendon))
+            is_set = [np.any(value) for value in values]
+            yield f"the setting '{name}' of tendons, left out", "tendon", is_set
+        springs = self.is_linear & model.actuator_biasprm.any(axis=1)
+        yield "actuators with springs, read at control 0", "actuator", springs
+        yield "gravity compensation, left out", "body", model.body_gravcomp
+        yield "key frames, left out", "key", np.ones(model.nkey)
+        yield "flexible parts, left out", "flex", np.ones(model.nflex)
 
 
 def _grouped(parts: Iterable[_MjcfPart], key: str) -> tuple[Tree, list[str]]:
@@ -435,9 +411,7 @@ def _grouped(parts: Iterable[_MjcfPart], key: str) -> tuple[Tree, list[str]]:
 
 def _plain(name: str, taken: Collection[str]) -> str:
     """Name without the characters that structure files refuse, numbered if it is taken."""
-    plain = re.sub(r"[\s.,\[\]]+", "_", name)
-    numbered = (f"{plain}-{number}" for number in itertools.count(2))
-    return next(one for one in itertools.chain([plain], numbered) if one not in taken)
+    return unused_name(re.sub(r"[\s.,\[\]]+", "_", name), taken)
 
 
 def _text(number: float, unit: str) -> str:

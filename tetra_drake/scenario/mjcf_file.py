@@ -6,6 +6,7 @@ numerical methods that have been removed are left out, and global coordinates be
 
 from __future__ import annotations
 
+import itertools
 import os
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from tetra_drake.files import read_text
 LARGEST_MJCF = 2**22
 """Largest size of a file in bytes."""
 
-_REMOVED = {"flag": ["sensornoise"], "option": ["collision", "apirate"]}
+_REMOVED = {"option": ["collision", "apirate"], "flag": ["sensornoise"]}
 """Attributes by elements that earlier versions of MuJoCo had."""
 _PLACES = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 """Attributes that place a body."""
@@ -80,16 +81,15 @@ def _modernise(root: ElementTree.Element) -> list[str]:
     With global coordinates, the places of all parts are given in the frame of the world. This is
     the same as bodies that have this frame.
     """
-    left_out: dict[str, None] = {}
-    for element in root.iter():
-        for name in _REMOVED.get(element.tag, []):
+    left_out: list[str] = []
+    removed = dict(_REMOVED)
+    if any(compiler.get("coordinate") == "global" for compiler in root.iter("compiler")):
+        removed["compiler"] = ["coordinate"]
+        for body in root.iter("body"):
+            for name in _PLACES:
+                body.attrib.pop(name, None)
+    for tag, names in removed.items():
+        for element, name in itertools.product(root.iter(tag), names):
             if element.attrib.pop(name, None) is not None:
-                left_out[f"{element.tag} {name}"] = None
-    compilers = [one for one in root.iter("compiler") if one.get("coordinate") == "global"]
-    for compiler in compilers:
-        del compiler.attrib["coordinate"]
-        left_out["compiler coordinate"] = None
-    for body in root.iter("body") if compilers else ():
-        for name in _PLACES:
-            body.attrib.pop(name, None)
-    return [*left_out]
+                left_out.append(f"{tag} {name}")
+    return [*dict.fromkeys(left_out)]

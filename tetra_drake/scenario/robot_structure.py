@@ -44,7 +44,7 @@ from tetra_drake.settings.quantities import (
     Time,
 )
 from tetra_drake.settings.refusals import described, hint, refuse
-from tetra_drake.settings.section import Kinds, Section, Tree, Varied, mapped
+from tetra_drake.settings.section import Kinds, Section, Tree, Varied, mapped, tree_value
 from tetra_drake.settings.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
@@ -201,7 +201,7 @@ class JoinedBody(Section):
         return self
 
     @property
-    def given_inertia(self) -> GivenInertia:
+    def given(self) -> GivenInertia:
         """Mass, centre and inertia as the blueprint of a robot has them."""
         centre = None if self.centre is None else np.array(self.centre)
         inertia = None if self.inertia is None else np.array([*self.inertia, 0.0, 0.0, 0.0][:6])
@@ -284,32 +284,26 @@ class StructureFile(Section):
         struts, and other nodes with a mass or a sphere. Cables are in the order of the pairs of
         bodies, those from fixed nodes first. Cables that run over rings come after all others.
         """
-        bodies = self._nodes_of_bodies()
+        bodies, joined = self._nodes_of_bodies(), self._nodes_of_joined()
+        first_node = np.append(0, np.cumsum([len(nodes) for nodes in bodies]))
         body_of = {node: body for body, nodes in enumerate(bodies) for node in nodes}
-        moving = [*body_of]
         fixed = [node for node in self.nodes if self.anchors.get(node) == "xyz"]
         body_of |= {node: WORLD for node in fixed if node not in body_of}
         nodes = tuple(body_of)
         number = {node: index for index, node in enumerate(nodes)}
         held = np.array([[axis in self.anchors.get(node, "") for axis in "xyz"] for node in nodes])
-        held[len(moving) :] = False
-        touching = moving if self.contacts == "all" else self.contacts
-        radius, density, contact_radius = self._spheres(number, held)
-
+        held[first_node[-1] :] = False
+        touching = nodes[: first_node[-1]] if self.contacts == "all" else self.contacts
         struts = sorted(members("struts", self.struts), key=lambda strut: body_of[strut.nodes[0]])
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
-        cables, joined = self._cables_of(number, body_of), self._nodes_of_joined()
-        numbers = _cable_numbers(cables["cable_names"])
-        groups = [  # unknown cables are refused by _check_actuated()
-            tuple(numbers[name] for name in names if name in numbers)
-            for names in self.actuated.values()
-        ]
+        cables = self._cables_of(number, body_of)
+        cable_numbers = _cable_numbers(cables["cable_names"])
 
         return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
             node_names=nodes,
-            first_node=np.append(0, np.cumsum([len(nodes) for nodes in bodies])),
+            first_node=first_node,
             p_WF=np.zeros((len(bodies), 3)),
             p_FN=np.array([self.nodes[node] for node in nodes]),
             struts=np.array(ends, dtype=int).reshape(-1, 2),
@@ -317,9 +311,7 @@ class StructureFile(Section):
             strut_radius=np.array([make.diameter / 2 for make in makes]),
             strut_density=np.array([make.density for make in makes]),
             strut_stiffness=np.array([make.axial_stiffness or math.inf for make in makes]),
-            node_radius=radius,
-            contact_radius=contact_radius,
-            node_density=density,
+            **self._spheres(number, held),
             node_mass=np.array([self.masses.get(node, 0.0) for node in nodes]),
             node_load=np.array([self.loads.get(node, [0.0, 0.0, 0.0]) for node in nodes]),
             anchor_stiffness=self.anchor_stiffness * held,
@@ -329,12 +321,15 @@ class StructureFile(Section):
             **cables,
             **self._joints_of(number, body_of),
             given_inertia={
-                body_of[joined[name][0]]: given.given_inertia for name, given in self.bodies.items()
+                body_of[joined[key][0]]: body.given for key, body in self.bodies.items()
             },
             slack=True,
             contacts=np.array(sorted({number[node] for node in touching}), dtype=int),
             oscillators=tuple(self.actuated),
-            groups=tuple(groups),
+            groups=tuple(  # unknown cables are refused by _check_actuated()
+                tuple(cable_numbers[name] for name in names if name in cable_numbers)
+                for names in self.actuated.values()
+            ),
         )
 
     def _cables_of(self, number: Mapping[str, int], body_of: Mapping[str, int]) -> dict[str, Any]:
@@ -342,25 +337,20 @@ class StructureFile(Section):
         within a body of `bodies` are left out. `number` and `body_of` have the index of each node
         and of its body."""
         rigid = [{body_of[nodes[0]]} for nodes in self._nodes_of_joined().values()]
-        cables = [
-            cable
-            for cable in members("cables", self.cables)
-            if {body_of[node] for node in cable.nodes} not in rigid
-        ]
-        cables.sort(
-            key=lambda cable: (
-                len(cable.nodes) > 2,
-                sorted(body_of[node] for node in (cable.nodes[0], cable.nodes[-1])),
-            )
-        )
-        paths, laws = [], []
+        found: list[tuple[bool, list[int], Member]] = []
+        for cable in members("cables", self.cables):
+            bodies = [body_of[node] for node in cable.nodes]
+            if {*bodies} not in rigid:
+                found.append((len(bodies) > 2, sorted([bodies[0], bodies[-1]]), cable))
+        cables = [cable for *_, cable in sorted(found, key=lambda one: one[:2])]
+        laws, paths = [], []
         for cable in cables:
             is_backward = body_of[cable.nodes[0]] > body_of[cable.nodes[-1]]
             path = cable.nodes[::-1] if is_backward else cable.nodes
-            paths.append([number[node] for node in path])
             places = [np.array(self.nodes[node]) for node in path]
             pieces = [np.linalg.norm(end - start) for start, end in itertools.pairwise(places)]
             laws.append(self.cables[cable.group].law(float(sum(pieces))))
+            paths.append([number[node] for node in path])
         ends = [[path[0], path[-1]] for path in paths]
         return {
             "cable_names": tuple(cable.names[0] for cable in cables),
@@ -375,22 +365,20 @@ class StructureFile(Section):
         """Fields of the blueprint for the joints, each from the body with the lower index. `number`
         and `body_of` have the index of each node and of its body."""
         joints = self.joints.values()
-        nodes = [sorted(joint.nodes, key=body_of.__getitem__) for joint in joints]
-        stiffness = np.array([joint.stiffness for joint in joints])
-        time_constants = np.array([joint.time_constant for joint in joints])
-        pairs = [[number[first], number[second]] for first, second in nodes]
+        ends = [sorted(joint.nodes, key=body_of.__getitem__) for joint in joints]
+        pairs = [[number[first], number[second]] for first, second in ends]
         return {
             "joints": np.array(pairs, dtype=int).reshape(-1, 2),
             "joint_keys": tuple(f"joints.{name}" for name in self.joints),
-            "joint_stiffness": stiffness,
-            "joint_damping": stiffness * time_constants,
+            "joint_stiffness": np.array([joint.stiffness for joint in joints]),
+            "joint_damping": np.array([joint.stiffness * joint.time_constant for joint in joints]),
         }
 
-    def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> np.ndarray:
-        """Radii (m), densities (kg/m^3) and contact radii (m) of the spheres at the nodes: three
-        rows (3, nodes). A node has the sphere of its first strut in the file, unless it has one of
-        its own. `number` has the index of each node by name; `held` (nodes, 3) is True along the
-        axes of its anchor. Nodes that joints hold together are held together."""
+    def _spheres(self, number: Mapping[str, int], held: np.ndarray) -> dict[str, Any]:
+        """Fields of the blueprint for the spheres at the nodes. A node has the sphere of its first
+        strut in the file, unless it has one of its own. `number` has the index of each node by
+        name; `held` (nodes, 3) is True along the axes of its anchor. Nodes that joints hold
+        together are held together."""
         spheres: list[tuple[list[str], StrutGroup | SphereGroup, float, float]] = []
         for bar in reversed(self.struts.values()):
             ends = [node for pair in bar.pairs for node in pair]
@@ -408,7 +396,7 @@ class StructureFile(Section):
                 if radius is None:
                     radius = 0.0 if is_held[name] else foot / 2
                 made[:, number[name]] = diameter / 2, make.density, radius
-        return made
+        return dict(zip(["node_radius", "node_density", "contact_radius"], made, strict=True))
 
     def _nodes_of_bodies(self) -> list[list[str]]:
         """Names of the nodes of each rigid body. Struts that share a node are one body, and so are
@@ -425,13 +413,10 @@ class StructureFile(Section):
 
     def _nodes_of_joined(self) -> dict[str, list[str]]:
         """Names of the nodes that each entry of `bodies` joins."""
-        if not self.bodies:
-            return {}
-        struts = [*members("struts", self.struts)]
-        named = struts_by_name(struts)
-        ends = {name: [node for i in named[name] for node in struts[i].nodes] for name in named}
+        named = struts_by_name(members("struts", self.struts))
         return {
-            name: [*(node for strut in body.struts for node in ends[strut]), *body.nodes]
+            name: [node for strut in body.struts for part in named[strut] for node in part.nodes]
+            + body.nodes
             for name, body in self.bodies.items()
         }
 
@@ -482,16 +467,13 @@ class StructureFile(Section):
         def with_unit(x: Any) -> Any:
             return f"{x!r} {unit}" if type(x) in (int, float) else x
 
-        tree = tree | {"unit": "mm" if unit == "mm" else None}
-        if "nodes" in tree:
-            tree["nodes"] = mapped(tree["nodes"], with_unit)
-        if isinstance(tree.get("bodies"), dict):
-            tree["bodies"] = {
-                name: body | {"centre": mapped(body["centre"], with_unit)}
-                if isinstance(body, dict) and "centre" in body
-                else body
-                for name, body in tree["bodies"].items()
-            }
+        tree = tree_value(tree) | {"unit": "mm" if unit == "mm" else None}
+        bodies = tree.get("bodies")
+        placed = [(tree, "nodes")]
+        placed += [(body, "centre") for body in bodies.values()] if isinstance(bodies, dict) else []
+        for section, key in placed:
+            if isinstance(section, dict) and key in section:
+                section[key] = mapped(section[key], with_unit)
         return tree
 
     @pydantic.model_validator(mode="after")
@@ -582,13 +564,11 @@ class StructureFile(Section):
 
     def _check_joined(self, blueprint: Blueprint) -> None:
         """Refuses two entries of `bodies` for one body, and two bodies of one name."""
-        entries: dict[int, str] = {}
-        body_of = dict(zip(blueprint.node_names, blueprint.carriers.tolist(), strict=True))
+        body_of = dict(zip(blueprint.node_names, blueprint.body_of_node, strict=True))
         for name, (node, *_) in self._nodes_of_joined().items():
-            earlier = entries.setdefault(body_of[node], name)
-            if earlier != name:
-                problem = f"shares a node with bodies.{earlier}, so that they are one body"
-                refuse(f"bodies.{name}", f"{problem}, expected one entry for it")
+            if body_of[node] != name:
+                problem = f"shares a node with bodies.{name}, so that they are one body"
+                refuse(f"bodies.{body_of[node]}", f"{problem}, expected one entry for it")
         (name, count), *_ = Counter(blueprint.bodies).most_common(1)
         if count > 1:
             key = f"bodies.{name}" if name in self.bodies else f"nodes.{name}"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
@@ -46,13 +47,13 @@ def members(key: str, groups: Mapping[str, HasPairs]) -> Iterator[Member]:
             yield Member(f"{key}.{name}.pairs[{place}]", name, tuple(nodes))
 
 
-def struts_by_name(struts: Iterable[Member]) -> dict[str, list[int]]:
-    """Indices of struts by the names that `bodies` may use: a group, such as "bar", or one strut,
-    such as "bar a b", whose nodes may have either order."""
-    found: dict[str, list[int]] = {}
-    for index, strut in enumerate(struts):
+def struts_by_name(struts: Iterable[Member]) -> dict[str, list[Member]]:
+    """Struts by the names that `bodies` may use: a group, such as "bar", or one strut, such as "bar
+    a b", whose nodes may have either order."""
+    found: dict[str, list[Member]] = {}
+    for strut in struts:
         for name in (strut.group, *strut.names):
-            found.setdefault(name, []).append(index)
+            found.setdefault(name, []).append(strut)
     return found
 
 
@@ -71,11 +72,17 @@ def components(groups: Iterable[Sequence[NodeT]]) -> list[list[NodeT]]:
     return [*found.values()]
 
 
-class _Group(BaseModel):
+def unused_name(name: str, taken: Collection[str]) -> str:
+    """The name itself; if it is taken, the first of "n-2", "n-3" and so on that is not."""
+    names = (f"{name}-{number}" for number in itertools.count(2))
+    return next(one for one in itertools.chain([name], names) if one not in taken)
+
+
+class _Group(BaseModel, extra="allow"):
     pairs: list[Pair]
 
 
-class _Body(BaseModel):
+class _Body(BaseModel, extra="allow"):
     struts: list[str] = []
     nodes: list[str] = []
 
@@ -89,41 +96,39 @@ class _Pinned(BaseModel):
     bodies: Keyed[str, _Body] = {}
     joints: Keyed[str, Any] = {}
 
-    def bodies_at_nodes(self, lists: list[list[str]]) -> list[list[int]]:
-        """Indices of the lists of nodes that are on one body, for each body. Nodes that are not
-        pinned weld lists together, and so do the entries of `bodies`. The last lists are the nodes
-        of these entries."""
-        welded: list[list[str | int]] = []
-        for index, nodes in enumerate(lists):
-            welded.append([index, *(node for node in nodes if node not in self.pinned)])
-        named, first = struts_by_name(members("struts", self.struts)), len(lists) - len(self.bodies)
-        for index, body in enumerate(self.bodies.values(), start=first):
-            welded.append([index, *(i for name in body.struts for i in named.get(name, ()))])
-        found = components(welded)
-        return [[part for part in body if isinstance(part, int)] for body in found]
-
     def expand(self) -> None:
-        """Gives each body but the first at a pinned node a copy of the node and a joint to it."""
+        """Gives each body but the first at a pinned node a copy of the node and a joint to it.
+
+        Nodes that are not pinned weld struts together, and so do the entries of `bodies`.
+        """
         struts = [*members("struts", self.struts)]
-        lists = [pair for group in self.struts.values() for pair in group.pairs]
-        lists += [body.nodes for body in self.bodies.values()]
-        bodies = self.bodies_at_nodes(lists)
+        named, index = struts_by_name(struts), {strut.key: i for i, strut in enumerate(struts)}
+        parts = [pair for group in self.struts.values() for pair in group.pairs]
+        parts += [body.nodes for body in self.bodies.values()]
+        welded: list[list[str | int]] = [
+            [part, *(node for node in nodes if node not in self.pinned)]
+            for part, nodes in enumerate(parts)
+        ]
+        for own, body in zip(welded[len(struts) :], self.bodies.values(), strict=True):
+            own += [index[strut.key] for name in body.struts for strut in named.get(name, ())]
+        body_of = {part: i for i, body in enumerate(components(welded)) for part in body}
+
         for place, node in enumerate(self.pinned):
             if node not in self.nodes:
                 found = f"found unknown node '{node}'; {hint(node, self.nodes)}"
                 refuse(f"pinned[{place}]", found)
-            here = [[i for i in sorted(body) if node in lists[i]] for body in bodies]
-            others = sorted(body for body in here if body)[1:]
-            if not others:
+            here: dict[int, list[list[str]]] = {}
+            for part, nodes in enumerate(parts):
+                if node in nodes:
+                    here.setdefault(body_of[part], []).append(nodes)
+            if len(here) < 2:
                 expected = "expected a node that struts of two bodies share"
                 refuse(f"pinned[{place}]", f"found '{node}', {expected}")
-            number = 2
-            for body in others:
-                while (copy := f"{node}-{number}") in self.nodes or copy in self.joints:
-                    number += 1
+            for of_body in [*here.values()][1:]:
+                copy = unused_name(node, self.nodes | self.joints)
                 self.nodes[copy], self.joints[copy] = self.nodes[node], {"nodes": [node, copy]}
-                for i in body:
-                    lists[i][:] = [copy if one == node else one for one in lists[i]]
+                for nodes in of_body:
+                    nodes[:] = [copy if one == node else one for one in nodes]
 
         renamed = dict[str, str]()
         for old, new in zip(struts, members("struts", self.struts), strict=True):
@@ -147,7 +152,5 @@ def with_joints(tree: Tree) -> Tree:
     except ValidationError:  # the check of the whole structure tells what is wrong
         return tree
     given.expand()
-    for key, parts in (("struts", given.struts), ("bodies", given.bodies)):
-        inner = {name: part.model_dump(exclude_unset=True) for name, part in parts.items()}
-        tree[key] = {name: tree[key][name] | part for name, part in inner.items()}
-    return tree | {"nodes": given.nodes, "joints": given.joints, "pinned": []}
+    changed = given.model_dump(exclude_unset=True)
+    return tree | changed | {"joints": given.joints, "pinned": []}
