@@ -11,7 +11,8 @@ printed:
     batches        speed of the compiled engine with many gaits at a time
     grounds        speed by ground and network
     controlled     speed of robots that are controlled, on all cores
-    sizes          CPU time of rows of tetrahedra by their number, on the compiled engine and Drake
+    sizes          CPU time of rows of tetrahedra, masts and lattices by the number of bodies, on
+                   the compiled engine and Drake
 
 Errors are differences of distances from converged simulations of the compiled engine. For MuJoCo,
 with its different ground, they are from converged simulations of MuJoCo. Times are only meaningful
@@ -20,6 +21,7 @@ on an idle machine.
 
 from __future__ import annotations
 
+import itertools
 import statistics
 import sys
 import time
@@ -41,15 +43,21 @@ from tetra_drake.robot.command import Command, controlled_robot
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.structure_files import read_structure
 
 GAITS = 12  # for each engine
 BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time
 GROUND_BATCH = 30  # gaits at a time on each ground
 CONTROLLED = (1, 8, 64, 512)  # robots at a time
 ROLLOUT_PERIODS = 50  # control periods that MuJoCo simulates
-SIZES = (5, 12, 24, 48, 96, 200)  # bodies
+SIZES = (5, 12, 24, 48, 96, 200)  # tetrahedra of a row, or vertebrae of a mast
+SIDES = (1, 2, 3, 4, 6, 8)  # prisms along a side of a lattice
+SPACING = 0.26  # m between the prisms of a lattice
+LARGEST_DIAGRAM = 50  # bodies
 ROUNDS = 3  # measurements; their medians count
 
 ENGINES = {
@@ -275,17 +283,89 @@ def cpu_time(scenario: Scenario) -> tuple[float, int]:
 
 
 def sizes_table(scenario: Scenario) -> str:
-    """Table of the CPU time of rows of tetrahedra by their number. Oscillators are coupled to their
-    neighbours only; otherwise the network would need most of the time of long rows."""
-    rows = []
-    for bodies in SIZES:
-        row = scenario.with_changes({"robot.tetrahedra": bodies, "cpg.reach": 1})
-        compiled, steps = cpu_time(row.with_changes({"engine": "!Compiled {}"}))
-        diagram, _ = cpu_time(row.with_changes({"engine": "!Drake {}"}))
-        per_second = diagram / scenario.simulation.duration
-        rows.append([str(bodies), f"{1e6 * compiled / steps / bodies:.2f}", f"{per_second:.3g}"])
-    headings = ["bodies", "compiled: µs per step and body", "drake: s per simulated second"]
-    return TextTable(headings, rows).markdown()
+    """Table of the CPU time of large robots by their number of bodies. The oscillators of a row are
+    coupled to their neighbours only; otherwise the network would need most of the time."""
+    rows = [scenario.with_changes({"robot.tetrahedra": size, "cpg.reach": 1}) for size in SIZES]
+    duration = {"simulation.duration": scenario.simulation.duration}
+    masts = [load_scenario("mast").with_sections(robot=mast(size)) for size in SIZES]
+    lattices = [load_scenario("prism").with_sections(robot=lattice(side)) for side in SIDES]
+    kinds = {"row": rows, "mast": masts, "lattice": lattices}
+    table = []
+    for kind, each in [(kind, one) for kind, robots in kinds.items() for one in robots]:
+        one, bodies = each.with_numbers(duration), each.robot.body_count
+        compiled, steps = cpu_time(one.with_changes({"engine": "!Compiled {}"}))
+        cells, on_diagram = [kind, str(bodies), f"{1e6 * compiled / steps / bodies:.2f}"], ""
+        if bodies <= LARGEST_DIAGRAM:
+            diagram, _ = cpu_time(one.with_changes({"engine": "!Drake {}"}))
+            on_diagram = f"{diagram / scenario.simulation.duration:.3g}"
+        table.append([*cells, on_diagram])
+    headings = [
+        "robot",
+        "bodies",
+        "compiled: µs per step and body",
+        "drake: s per simulated second",
+    ]
+    return TextTable(headings, table).markdown()
+
+
+def mast(vertebrae: int) -> StructureFile:
+    """The shipped mast with another number of vertebrae."""
+    tree = read_structure("mast").model_dump()
+    nodes = {name[3:]: place for name, place in tree["nodes"].items() if name.startswith("v1_")}
+    pitch = tree["nodes"]["v2_centre"][0] - tree["nodes"]["v1_centre"][0]
+    numbers, bar = range(1, vertebrae + 1), tree["struts"]["v1"]
+    tree["nodes"] = {
+        f"v{i}_{name}": [x + (i - 1) * pitch, y, z]
+        for i in numbers
+        for name, (x, y, z) in nodes.items()
+    }
+    tree["struts"] = {f"v{i}": bar | {"pairs": moved(bar["pairs"], {1: i})} for i in numbers}
+    for group in tree["cables"].values():
+        pairs = [pair for pair in group["pairs"] if pair[0].startswith("v1_")]
+        group["pairs"] = [pair for i in numbers[:-1] for pair in moved(pairs, {1: i, 2: i + 1})]
+    driven = {name for name in tree["actuated"] if name.endswith("_1")}
+    return StructureFile.model_validate(
+        tree | {"actuated": {name: tree["actuated"][name] for name in driven}}
+    )
+
+
+def moved(pairs: list[list[str]], vertebrae: dict[int, int]) -> list[list[str]]:
+    """Pairs of nodes of a mast, such as v1_top, on other vertebrae."""
+    return [[f"v{vertebrae[int(node[1])]}_{node[3:]}" for node in pair] for pair in pairs]
+
+
+def lattice(side: int) -> StructureFile:
+    """Square lattice of prisms. Cables join each to its neighbours, by the two nearest pairs of
+    nodes below and above."""
+    robot, tree = Robot.of(load_scenario("prism")), read_structure("prism").model_dump()
+    p_WN = node_positions(robot.structure, robot.structure.initial_state)
+    places = dict(zip(robot.structure.node_names, p_WN, strict=True))
+    prisms = [*itertools.product(range(side), repeat=2)]
+    tree["nodes"] = {
+        f"{node}-{i}-{j}": (place + SPACING * np.array([i, j, 0.0])).tolist()
+        for i, j in prisms
+        for node, place in places.items()
+    }
+    links = []
+    for i, j in prisms:
+        for di, dj in ((1, 0), (0, 1)):
+            for level in (("n0", "n1", "n2"), ("n3", "n4", "n5")):
+                way = SPACING * np.array([di, dj, 0.0])
+                pairs = sorted(
+                    itertools.product(level, repeat=2),
+                    key=lambda ab: float(np.linalg.norm(places[ab[1]] + way - places[ab[0]])),
+                )
+                if i + di < side and j + dj < side:
+                    links += [[f"{a}-{i}-{j}", f"{b}-{i + di}-{j + dj}"] for a, b in pairs[:2]]
+    for group in (*tree["struts"].values(), *tree["cables"].values()):
+        group["pairs"] = [
+            [f"{a}-{i}-{j}", f"{b}-{i}-{j}"] for i, j in prisms for a, b in group["pairs"]
+        ]
+    if links:
+        loose = {"free_length": None, "tension": 0.1, "pairs": links}
+        tree["cables"]["link"] = tree["cables"]["side"] | loose
+    tree["actuated"] = {"side_1": ["side n0-0-0 n3-0-0"], "side_2": ["side n1-0-0 n4-0-0"]}
+    return StructureFile.model_validate(tree)
 
 
 TABLES = {"batches": batches_table, "grounds": grounds_table, "controlled": controlled_table}

@@ -21,10 +21,11 @@ def test_every_engine_and_ground_is_measured(scenario, monkeypatch, capsys):
 
 
 def test_cost_is_measured_by_size(scenario, monkeypatch, capsys):
-    monkeypatch.setattr(benchmark, "SIZES", (2, 3))
+    for name, value in {"SIZES": (2,), "SIDES": (2,), "LARGEST_DIAGRAM": 2}.items():
+        monkeypatch.setattr(benchmark, name, value)
     benchmark.main(["sizes"], shortly(scenario, 0.1))
-    rows = [
-        line.strip("| ").split("|") for line in capsys.readouterr().out.splitlines()[2:] if line
-    ]
-    assert [int(row[0]) for row in rows] == [2, 3]
-    assert all(float(cell) > 0.0 for row in rows for cell in row)
+    lines = [line for line in capsys.readouterr().out.splitlines()[2:] if line]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
+    assert [row[:2] for row in rows] == [["row", "2"], ["mast", "2"], ["lattice", "12"]]
+    assert all(float(row[2]) > 0.0 for row in rows)
+    assert [bool(row[3]) for row in rows] == [True, True, False]
