@@ -500,7 +500,8 @@ def _fit(
     Reads a YAML file with `parameters`, scenario keys with bounds, and `measurements`: a
     !MotionCapture has a log of positions over time, a !Rest has positions, tensions and frequencies
     at rest. Finds the values for which the simulation meets the measurements, with 95 percent
-    intervals. Writes the fitted scenario.yaml, tables, the figure of the residuals and README.md.
+    intervals. Writes the fitted scenario.yaml, tables, the figure of the residuals, and the page
+    fit.html, also as README.md.
     After Ctrl-C the same command goes on.
 
     Args:
@@ -525,7 +526,8 @@ def _fit(
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None
-    print(f"{found}\nwrote scenario.yaml, tables, figure and README.md to {out}/")
+    print(f"{found}\nwrote scenario.yaml, tables, figure, README.md and fit.html to {out}/")
+    print(f"to see the fit, open in a browser: {out / 'fit.html'}")
 
 
 def _cpg(
