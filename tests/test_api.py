@@ -99,7 +99,7 @@ def test_a_failure_among_many_says_of_which_gait_and_scenario() -> None:
 def test_a_run_stands_for_its_scenario_and_its_best_gait():
     run = td.load_run("runs/demo")
     result = td.simulate(run.scenario, run.best_gait())
-    assert td.simulate("runs/demo", run).metrics == result.metrics
+    assert td.simulate("runs/demo", "runs/demo").metrics == result.metrics
     assert td.simulate(run, run).metrics == td.simulate(result, run).metrics == result.metrics
 
 
@@ -109,14 +109,14 @@ def test_a_run_stands_for_its_scenario_and_its_best_gait():
         (lambda: td.seeded_gait("quick", -1), ("seeded_gait", "seed")),
         (lambda: td.simulate(td.seeded_gait("quick"), "quick"), ("scenario", "")),
         (lambda: td.simulate("quick", 5), ("gait", "")),
-        (lambda: td.simulate("runs/demo", "runs/demo"), ("runs/demo", "")),
+        (lambda: td.simulate("quick", "runs"), ("runs", "")),
         (lambda: td.load_result(None), ("load_result", "folder")),
         (lambda: td.load_gait(5, td.load_scenario("quick")), ("load_gait", "path")),
         (lambda: td.evolve("quick", 5), ("evolve", "out")),
         (lambda: td.robustness("quick", {}, seed=-1), ("robustness", "seed")),
         (lambda: td.robustness("quick", {}, draws="3"), ("robustness", "draws")),
         (lambda: td.robustness("quick", {}, percent="3"), ("robustness", "percent")),
-        (lambda: td.robustness("quick", "gait.json"), ("robustness", "gaits")),
+        (lambda: td.robustness("quick", 5), ("gait", "")),
         (lambda: td.export("quick", td.seeded_gait("quick"), "a", rate="3"), ("export", "rate")),
         (lambda: td.ParameterSpace.of("quick").repair([1.0]), ("ParameterSpace", "vector")),
         (lambda: td.ParameterSpace.of("quick").gait([-1.0] * 26, name="g"), ("gait g", "")),

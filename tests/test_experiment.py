@@ -17,6 +17,7 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.laws.terrain import Steps
 from tetra_drake.optimizers.steady_state import SteadyStateOptimizer
+from tetra_drake.settings.units import shown_in
 
 
 @pytest.fixture
@@ -191,6 +192,19 @@ def test_a_resumed_run_is_checked_only_if_it_was_begun_so(tiny, tmp_path, monkey
     again.assert_not_called()
     tetra_drake.evolve(None, out, reevaluate=True, **resumed)
     again.assert_called_once()
+
+
+def test_a_resumed_run_keeps_the_units_of_its_beginning(tiny, tmp_path, monkeypatch):
+    written, out = [], tmp_path / "run"
+
+    def write(directory):
+        written.append(tetra_drake.load_run(directory).scenario.units.length_name)
+
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", write)
+    for units, resume in (("SI", False), (None, True), ("mm", True)):
+        with shown_in(units):
+            tetra_drake.evolve(None if resume else tiny, out, resume=resume, reevaluate=False)
+    assert written == ["m", "m", "mm"]
 
 
 def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeypatch):

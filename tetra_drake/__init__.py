@@ -15,7 +15,7 @@ Functions, and the main attributes of their results:
     load_gait           a gait from a file
     seeded_gait         a random gait
     simulate            metrics, trajectory (an xarray.Dataset, with record=True), show(),
-                        save_replay(file)
+                        save_replay(file), save_video(file)
     simulate_many       simulates many gaits on all cores
     ParameterSpace      the vectors of a scenario's gaits, for an optimiser of your own
     sweep               metrics of gaits on a grid of changed scenarios, an xarray.Dataset

@@ -254,10 +254,10 @@ def _evolve(
         dask: evaluate on a Dask cluster, given by its scheduler's address, such as
             tcp://node1:8786; without an address, on a new one of --workers processes on this
             machine
-        resume: continue an interrupted run; needs only --out
+        resume: continue an interrupted run; needs only --out, and keeps to the run's scenario,
+            engine, seed, --no-reevaluate and --units
         reevaluate: skip the simulations after the search, which check the best gaits in Drake if
-            the engine is another one, and the gaits of a map on disturbed robots; --resume keeps to
-            it
+            the engine is another one, and the gaits of a map on disturbed robots
 
     Example: tetra-drake evolve --scenario quick --out runs/demo
     """
@@ -299,7 +299,8 @@ def _evolve(
             raise KeyboardInterrupt("(no gait was evaluated yet)") from None
         again = f"tetra-drake evolve --out {shlex.quote(str(out))} --resume"
         raise KeyboardInterrupt(f"(nothing is lost; continue with: {again})") from None
-    print(run_text(run))
+    with run.manifest.in_its_units():
+        print(run_text(run))
 
 
 def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: File) -> None:
@@ -350,12 +351,11 @@ def _video(
     Example: tetra-drake video runs/champion --out talk.mp4 --view side
     """
     from tetra_drake.report.result_folder import load_or_simulate
-    from tetra_drake.visualization.video import check_video, make_video
+    from tetra_drake.visualization.video import check_video
 
     check_video(out, fps=fps)
     result = load_or_simulate(source, scenario=scenario, warn=_warn)
-    page = result.replay_page()
-    make_video(page, out, size=size, fps=fps, view=view, speed=speed, say=_say)
+    result.save_video(out, size=size, fps=fps, view=view, speed=speed, say=_say)
     print(f"{result.title}\nwrote {out}")
 
 
@@ -500,7 +500,8 @@ def _fit(
     Reads a YAML file with `parameters`, scenario keys with bounds, and `measurements`: a
     !MotionCapture has a log of positions over time, a !Rest has positions, tensions and frequencies
     at rest. Finds the values for which the simulation meets the measurements, with 95 percent
-    intervals. Writes the fitted scenario.yaml, tables, the figure of the residuals and README.md.
+    intervals. Writes the fitted scenario.yaml, tables, the figure of the residuals, and the page
+    fit.html, also as README.md.
     After Ctrl-C the same command goes on.
 
     Args:
@@ -525,7 +526,8 @@ def _fit(
         )
     except KeyboardInterrupt:
         raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None
-    print(f"{found}\nwrote scenario.yaml, tables, figure and README.md to {out}/")
+    print(f"{found}\nwrote scenario.yaml, tables, figure, README.md and fit.html to {out}/")
+    print(f"to see the fit, open in a browser: {out / 'fit.html'}")
 
 
 def _cpg(

@@ -126,7 +126,7 @@ def evolve(
             overwrite=overwrite,
             reevaluate=reevaluate is not False,
         )
-    with record, progress:
+    with record, progress, record.manifest.in_its_units():
         count = getattr(make_executor, "workers", workers or available_cores())
         drawing = f"tetra-drake figures {shlex.quote(str(out))}"
         _introduce(progress, record, count, drawing=drawing if report else "", is_new=not resume)

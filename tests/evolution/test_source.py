@@ -7,7 +7,7 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.run import load_run, load_source
-from tetra_drake.robot.gait import save_gait
+from tetra_drake.robot.gait import given_gait, save_gait
 from tetra_drake.scenario.load import dump_scenario
 
 
@@ -28,6 +28,12 @@ def test_the_gaits_of_a_run_and_files_in_it_come_with_its_scenario(run):
     assert (source.scenario.name, source.best) == ("tiny", recorded.best_gait())
     assert source.gaits == {"best_gait": source.best}
     assert told == []
+    assert given_gait(run, source.scenario) == given_gait(str(run), source.scenario) == source.best
+
+
+def test_a_folder_without_a_run_is_no_gait(tmp_path, refused):
+    with refused(tmp_path, "", "holds no manifest.json"):
+        given_gait(tmp_path, tiny_scenario())
 
 
 def test_another_scenario_than_the_gaits_is_said_once_with_both_names(run, tmp_path):

@@ -117,6 +117,7 @@ def test_cells_have_the_fitness_of_their_gaits(draw):
     axes = figure.axes[0]
     assert axes.get_xlim() == pytest.approx((0.0, 3.0))
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("speed (in/s)", "lifted")
+    assert "lifted: time off the ground" in figure.get_supxlabel()
     # The fittest is next to the corner of low lifted and high speed, too.
     numbers = {text.get_text(): text.get_position() for text in axes.texts}
     assert numbers["1"] == pytest.approx((1.5, 0.25))

@@ -48,7 +48,8 @@ def row(trajectory):
 
 def struts(panel):
     """The lines that draw struts (views, struts, 2, 2), and their colours (views, struts)."""
-    views = [each for each in panel.collections if isinstance(each, LineCollection)]
+    drawn = [each for each in panel.collections if isinstance(each, LineCollection)]
+    views = [each for each in drawn if each.get_linewidths()[0] > 1.0]  # cables are thin
     colours = [[to_hex(colour) for colour in view.get_colors()] for view in views]
     return np.array([view.get_segments() for view in views]), np.array(colours)
 

@@ -40,7 +40,7 @@ def test_a_simulation_gets_the_figures_of_one_gait(folder):
 @pytest.mark.parametrize(
     ("trials", "missing"),
     [
-        ([[[(1.0, 0)]], [], [[(None, 0)]]], set()),
+        ([[[(1.0, 0)]], [], [[(None, 0)]]], {"initial_distances"}),
         ([[[(None, 0)], [(1.0, 0), (None, None)]]], {"initial_fitness", "initial_distances"}),
     ],
     ids=["at work", "no initial gait has a fitness"],

@@ -37,16 +37,20 @@ def run(tmp_path):
 
 def curve(compared, label):
     rows = compared.curves[compared.curves["run"] == label]
-    return rows[["cost", "low", "median", "high"]].to_numpy().tolist()
+    assert (rows["low"] <= rows["mean"]).all() and (rows["mean"] <= rows["high"]).all()
+    return rows[["cost", "mean"]].to_numpy().tolist()
 
 
 def test_the_best_so_far_over_trials_that_fail_and_end_at_different_times(run):
     path = run("a", trial(None, 4.0, 2.0, 8.0), trial(1.0, None), trial(2.0, 6.0, 7.0))
     found = compare([path])
     # Best so far: -, 4, 4, 8; 1, 1 and so on; 2, 6, 7 and so on.
-    infinite = -math.inf
-    expected = [[1, infinite, 1.0, 1.5], [2, 2.5, 4.0, 5.0], [3, 2.5, 4.0, 5.5], [4, 4.0, 7.0, 7.5]]
+    expected = [[1, -math.inf], [2, 11.0 / 3.0], [3, 4.0], [4, 16.0 / 3.0]]
     assert curve(found, "a") == expected
+    # At the end, the figure and the text show the same numbers.
+    assert found.curves.iloc[-1][["mean", "low", "high"]].tolist() == pytest.approx(
+        found.runs.loc["a", ["fitness_mean", "fitness_low", "fitness_high"]].tolist()
+    )
     assert found.trials["fitness"].tolist() == [8.0, 1.0, 7.0]
     assert found.trials["cost"].tolist() == [4, 2, 3]
     row = found.runs.loc["a"]
@@ -104,7 +108,7 @@ def test_runs_are_compared_within_their_scenarios(run, refused):
 def test_the_curve_of_a_run_that_goes_on_ends_with_its_first_trial(run):
     trials = [trial(1.0, 2.0, 5.0), trial(3.0), trial(2.0, 4.0)]
     found = compare([run("a", *trials, unfinished=(0, 2))])
-    assert curve(found, "a") == [[1, 1.5, 2.0, 2.5], [2, 2.5, 3.0, 3.5]]
+    assert curve(found, "a") == [[1, 2.0], [2, 3.0]]
     assert found.runs.loc["a", "going_on"] == 2
     assert any("2 of 3" in note for note in found.notes)
 

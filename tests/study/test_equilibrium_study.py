@@ -1,11 +1,15 @@
 """Robots at rest: statics, balance, frequencies, and what is printed and written of them."""
 
+import json
 import math
+import re
 
+import numpy as np
 import pytest
 from helpers import joined
 from helpers.anchored import scenario_of
 from helpers.hanging import HANGING
+from helpers.meshcat_page import read_page
 
 from tetra_drake.laws.terrain import Flat
 from tetra_drake.robot.robot import Robot
@@ -76,6 +80,24 @@ def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):
     assert len(study.cables) == 0
     save_structure_page(study, tmp_path / "bar.html")
     assert "bar" in structure_text(study) and "bar" in (tmp_path / "bar.html").read_text()
+
+
+def test_the_page_shows_the_numbers_and_swings_in_the_lowest_modes(tmp_path):
+    study = study_equilibrium("prism")
+    save_structure_page(study, tmp_path / "prism.html")
+    page = read_page(tmp_path / "prism.html")
+    assert structure_text(study).splitlines()[0] in page
+    (film,) = re.findall(r"const recording = (.*);", page)
+    film = json.loads(film)
+    assert film["progress"]["values"][::75] == [*study.frequencies[:5], study.frequencies[4]]
+    poses = film["resolution"] * np.cumsum(film["poses"], axis=1).reshape(3, 7, -1)
+    for mode in range(5):
+        away = poses[:, :3, 75 * mode + 9] - poses[:, :3, 0]  # nearly the farthest
+        middles = [
+            study.modes[mode, study.nodes["body"] == name].mean(0) for name in film["bodies"]
+        ]
+        ratio = np.vdot(away, middles) / np.linalg.norm(away) / np.linalg.norm(middles)
+        assert ratio == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_text_is_of_the_structure():

@@ -280,7 +280,7 @@ def test_the_command_writes_a_folder_with_the_fitted_scenario_and_a_page(tmp_pat
     assert f"{fitted.stiffness:.1f} ± " in printed
     assert pandas.read_csv(out / "parameters.csv")["value"][0] == pytest.approx(fitted.stiffness)
     assert json.loads((out / "summary.json").read_text())["evaluations"] > 3
-    assert STIFFNESS in (out / "README.md").read_text()
+    assert all(STIFFNESS in (out / page).read_text() for page in ("README.md", "fit.html"))
     assert (out / "residuals.figure.svg").stat().st_size > 1000
 
 

@@ -47,6 +47,7 @@ from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.section import Section
+from tetra_drake.settings.units import chosen_units, shown_in
 
 SCHEMA = 4
 MANIFEST, LOCK = "manifest.json", ".lock"
@@ -115,6 +116,12 @@ class Manifest:
     """True if most genomes were removed to save space, as in the folder runs/."""
     reevaluate: bool = True
     """False if the run was begun without simulations after the evolution; see evolve()."""
+    units: str = ""
+    """Name of the units that were chosen when the run was begun; "" for the scenario's own."""
+
+    def in_its_units(self) -> contextlib.AbstractContextManager[None]:
+        """Context manager that shows numbers in the run's units, unless others are chosen now."""
+        return shown_in(chosen_units() or self.units)
 
     @property
     def other_versions(self) -> list[str]:
@@ -162,6 +169,7 @@ class _File(Section):
     """The manifest's digest."""
     thinned: bool = False
     reevaluate: bool = True
+    units: str = ""
 
 
 def read_manifest(directory: Path) -> Manifest:
@@ -176,7 +184,14 @@ def read_manifest(directory: Path) -> Manifest:
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
     method = Method(file.objective, file.optimizer)
     manifest = Manifest(
-        scenario, file.seed, file.versions, method, file.run, file.thinned, file.reevaluate
+        scenario,
+        file.seed,
+        file.versions,
+        method,
+        file.run,
+        file.thinned,
+        file.reevaluate,
+        file.units,
     )
     if file.sha256 != manifest.digest:
         raise InputError(path, "sha256", "does not fit the other keys: they were changed")
@@ -194,6 +209,7 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
         **vars(manifest.method),
         sha256=manifest.digest,
         reevaluate=manifest.reevaluate,
+        units=manifest.units,
     )
     content = file.model_dump(by_alias=True, exclude_defaults=True)
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
@@ -227,7 +243,9 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         method, installed = method or Method.of(scenario), versions(scenario.engine.packages)
         definition = json.dumps((dump_scenario(scenario), seed, installed, vars(method)))
         name = _sha256(definition)[:_NAME]
-        manifest = Manifest(scenario, seed, installed, method, name, reevaluate=reevaluate)
+        manifest = Manifest(
+            scenario, seed, installed, method, name, reevaluate=reevaluate, units=chosen_units()
+        )
         check_folder(directory)
         problem = _why_not_new(directory)
         if not problem:

@@ -40,8 +40,9 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
 
 @figure_function
 def initial_distances(run: Run) -> Drawn:
-    """Distances of the fittest and the least fit gait of each trial's initial population. Failed
-    gaits are left out."""
+    """Distances of the fittest and the least fit gait of each trial's initial population.
+
+    Failed gaits are left out."""
     unit, width = run.scenario.units, 0.4
     extremes = initial_extremes(run) / unit.length
     page = page_of(height_in=3.6)
@@ -65,8 +66,9 @@ def initial_distances(run: Run) -> Drawn:
 
 @figure_function
 def initial_fitness(run: Run, trial: int) -> Drawn:
-    """Histogram of the fitness of a trial's initial population. Gaits that walk backward are
-    hatched."""
+    """Histogram of the fitness of a trial's initial population.
+
+    Gaits that walk backward are hatched."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
     fitness, backward = walked["fitness"], walked["distance"] < 0.0
@@ -95,12 +97,11 @@ def initial_fitness(run: Run, trial: int) -> Drawn:
 
 @figure_function
 def fitness_of_trials(run: Run) -> Drawn:
-    """Fitness over evaluations: the mean of each trial's population, or the best if the optimiser
-    reports no mean.
+    """Fitness over evaluations.
 
-    With four trials or more, the trials that end fittest and least fit are dark, the others grey.
-    Blue: median and quartiles over trials. A finished trial keeps its last value in the
-    quartiles."""
+    It is the mean of each trial's population, or the best if the optimiser reports no mean. With
+    four trials or more, the trials that end fittest and least fit are dark, the others grey. Blue:
+    median and quartiles over trials. A finished trial keeps its last value in the quartiles."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
     # The mean of a last iteration that the budget has cut would be over few gaits.
     rows = run.iterations
@@ -129,7 +130,8 @@ def fitness_of_trials(run: Run) -> Drawn:
         low, median, high = (filled.quantile(share, axis=1) for share in (0.25, 0.5, 0.75))
         panel.plot(filled.index, median, label="median", **_MEDIAN)
         panel.fill_between(filled.index, low, high, **_BAND)
-        legend[f"median: {fixed(median.iloc[-1], 1)}"] = _MEDIAN
+        legend["other trials"] = _TRIAL
+        legend[f"median and quartiles: {fixed(median.iloc[-1], 1)}"] = _MEDIAN
     panel.set(xlabel="evaluations", ylabel=f"{kind} fitness", xmargin=0.02)
     panel.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
     legend_below(page, legend)

@@ -49,13 +49,12 @@ _MIRRORED = 0.01  # two nodes share a panel if mean difference / mean force is a
 
 @figure_function
 def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) -> Drawn:
-    """Actuation signals and tensions of the cables that they drive, in the given time span or, by
-    default, in the last 4 s of the simulation.
+    """Actuation signals and tensions of the cables that they drive. A panel shows one signal and
+    the tension of one cable, whose name is its title. Both are forces; a positive signal shortens
+    the cable.
 
-    A panel shows one signal and the tension of one cable, whose name is its title. If a signal
-    drives several cables, the first is shown. Both are forces; a positive signal shortens the
-    cable. The start-up, while signals are 0, is shaded if the time span contains a part of
-    it."""
+    The figure shows the given time span, by default the last 4 s of the simulation. If a signal
+    drives several cables, the first is shown. The start-up, while signals are 0, is shaded."""
     unit, trajectory = result.scenario.units, _shown(result, time)
     forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
@@ -77,13 +76,13 @@ def signals_and_tensions(result: SimulationResult, *, time: Span | None = None) 
 
 @figure_function
 def ground_forces(result: SimulationResult, *, time: Span | None = None) -> Drawn:
-    """Normal force and friction of the ground on the feet, in the given time span or, by default,
-    in the last 4 s of the simulation.
+    """Normal force and friction of the ground on the feet. Friction is along x, the forward
+    direction. Grey: stance. Peaks of impacts are cut off, because they are shorter than the time
+    between samples.
 
-    Friction is along x, the forward direction; on uneven ground, along x projected on the slope.
-    Each foot that touches the ground has a panel; feet of one body with equal forces share a panel.
-    Grey: stance. Peaks of impacts are cut off, because they are shorter than the time between
-    samples."""
+    The figure shows the given time span, by default the last 4 s of the simulation. On uneven
+    ground, friction is along x projected on the slope. Each foot that touches the ground has a
+    panel; feet of one body with equal forces share a panel."""
     unit, end = result.scenario.units, _shown(result, time)
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)

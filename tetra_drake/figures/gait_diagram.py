@@ -47,12 +47,13 @@ _STANCE = {"left": OKABE_ITO["blue"], "right": OKABE_ITO["sky_blue"]}
 
 @figure_function
 def gait_diagram(result: SimulationResult, *, time: Span | None = None) -> Drawn:
-    """Gait diagram of the last three cycles, or of a given time span: actuation signals, stance of
-    each foot, and forward speed of the centre of mass.
+    """Gait diagram: actuation signals, stance of each foot, and forward speed of the centre of
+    mass. A bar shows when a foot bears load. The front body is on top. The duty factor is the share
+    of time during which a foot bears load.
 
-    A bar shows when a foot bears load. The front body is on top. The duty factor is the share of
-    time during which a foot bears load. Dotted lines mark cycles, periods of the signals. If no
-    signal has two periods in the second half of the simulation, the last quarter is shown."""
+    The diagram shows the last three cycles, or the given time span. Cycles are periods of the
+    signals; dotted lines mark them. If no signal has two periods in the second half of the
+    simulation, the last quarter is shown."""
     structure, cycle = result.robot.structure, measures.last_step(result.trajectory)
     first, end = (float(result.trajectory.time[i]) for i in (0, -1))
     length, title = 0.25 * (end - first), "Gait diagram"

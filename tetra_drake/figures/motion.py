@@ -46,6 +46,7 @@ _PATHS = 6  # largest number of panels of paths side by side
 _X_LABEL = "x, forward ({}) →"
 _CLEARANCE = 0.02  # a body is off the ground above this share of the robot's height
 
+_CABLES: Any = {"colors": "0.75", "linewidths": 0.5, "zorder": 1.0}
 _ON_GROUND, _LIFTED = "0.2", OKABE_ITO["vermillion"]
 _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
 _WAY: Any = _PATH | {"color": "0.6"}  # beside bodies in the colours of lines
@@ -135,8 +136,10 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
 def path_of_the_centre(
     result: SimulationResult, *, time: Span | None = None, instants: int = 9
 ) -> Drawn:
-    """Path of the robot's centre of mass from above, to scale. Arrows show the heading at equally
-    spaced instants. If the path is straight, its height along x is shown instead."""
+    """Path of the robot's centre of mass.
+
+    It is drawn from above, to scale, with arrows for the heading at equally spaced instants. If the
+    path is straight, its height along x is shown instead."""
     structure, unit = result.robot.structure, result.scenario.units
     trajectory = shown_part(result.trajectory, time)
     path = measures.path_of_centre(trajectory, structure)
@@ -172,12 +175,12 @@ def path_of_the_centre(
 
 @figure_function
 def one_step(result: SimulationResult, *, time: Span | None = None, instants: int = 6) -> Drawn:
-    """The last step of the robot to scale, from above and from the side, at equally spaced
-    instants. Bodies off the ground are red.
+    """Robot to scale from above and from the side, at equally spaced instants of the time in the
+    title. Bodies off the ground are red. The lower panels show paths, enlarged.
 
-    A body is off the ground if all its feet are higher than 2 % of the robot's height. The lower
-    panels show the path of one bottom node per body, or of the centre. If no signal has two periods
-    in the second half of the simulation, the last quarter is shown."""
+    The time is the last step. If no signal has two periods in the second half of the simulation, it
+    is the last quarter. A body is off the ground if all its feet are higher than 2 % of the robot's
+    height. The paths are of one bottom node per body, or of the centre."""
     structure, unit = result.robot.structure, result.scenario.units
     end = float(result.trajectory.time[-1])
     cycle = time or measures.last_step(result.trajectory)
@@ -329,7 +332,9 @@ def _draw_struts(
     panel: Axes, points: np.ndarray, structure: Structure, colours: Sequence[str]
 ) -> None:
     """Draws the struts of a robot whose nodes are at `points` (nodes, 2), in units of the panel's
-    axes. `colours` has a colour per body."""
+    axes, and its cables as thin lines. `colours` has a colour per body."""
+    cables = LineCollection(list(points[structure.segments.ends]), **_CABLES)
+    panel.add_collection(cables, autolim=False)
     of_struts = [colours[body] for body in structure.carriers[structure.struts[:, 0]]]
-    lines = LineCollection(list(points[structure.struts]), colors=of_struts, linewidths=1.2)
+    lines = LineCollection(list(points[structure.struts]), colors=of_struts, linewidths=1.5)
     panel.add_collection(lines, autolim=False)

@@ -1,6 +1,7 @@
 """Report of a run: an HTML page with numbers and figures, and the files it links to.
 
-A figure has the name of the function that draws it. The function's docstring is the caption.
+A figure has the name of the function that draws it. The first paragraph of the function's docstring
+is the caption: what is true of each such figure. Legend and title tell the rest.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import pandas
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
-from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.manifest import MANIFEST, read_manifest
 from tetra_drake.evolution.run import Run, gait_label, load_run
 from tetra_drake.figures.fitness import (
     fitness_of_trials,
@@ -123,13 +124,14 @@ def write_figures(source: Path, out: Path | None = None, printed: Print = AS_USU
         problem = f"holds neither {MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
     check_folder(folder)
-    if is_run and out is None:
-        return write_report(source, printed)
-    if is_run:
+    if not is_run:
+        draw_pictures(pictures_of_gait(load_result(source)), folder, printed)
+        return [folder]
+    with read_manifest(source).in_its_units():
+        if out is None:
+            return write_report(source, printed)
         pictures = pictures_of_run(simulate_shown_gaits(load_run(source)))
-    else:
-        pictures = pictures_of_gait(load_result(source))
-    draw_pictures(pictures, folder, printed)
+        draw_pictures(pictures, folder, printed)
     return [folder]
 
 
@@ -194,7 +196,7 @@ def pictures_of_run(shown: ShownGaits) -> Pictures:
     run, trial = shown.run, shown.best.recorded["trial"]
     best, initial, trials = shown.best.result, shown.initial.result, initial_extremes(run).index
     evolution = [partial(fitness_of_trials, run)] if len(run.iterations) else []
-    if len(trials):
+    if len(trials) > 1:
         evolution.append(partial(initial_distances, run))
     if trial in trials:
         evolution.append(partial(initial_fitness, run, trial))
@@ -228,7 +230,8 @@ def _notable(shown: ShownGaits) -> list[GaitColumn]:
 def _embedded(picture: partial[Any], folder: Path) -> dict[str, str]:
     """Name, caption and image of a figure, by these keys. The image is the figure's SVG file in
     `folder` as a data URI."""
-    name, caption = picture.func.__name__, inspect.getdoc(picture.func) or ""
+    name = picture.func.__name__
+    caption = (inspect.getdoc(picture.func) or "").partition("\n\n")[0]
     content = base64.b64encode((folder / f"{name}.svg").read_bytes()).decode()
     # As an image: the ids of two SVGs in one page would clash.
     image = f"data:image/svg+xml;base64,{content}"

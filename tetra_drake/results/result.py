@@ -15,7 +15,7 @@ import numpy as np
 
 from tetra_drake import __version__
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import fixed, heading_html
+from tetra_drake.formatting import Say, fixed, heading_html, silent
 from tetra_drake.laws.tally import Tally
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -134,6 +134,23 @@ class SimulationResult:
         save_replay(
             path, robot=self.robot, trajectory=self.trajectory, title=self.title, viewer=viewer
         )
+
+    def save_video(
+        self,
+        path: str | Path,
+        *,
+        size: tuple[int, int] = (1920, 1080),
+        fps: float = 30.0,
+        view: str = "free",
+        speed: float = 1.0,
+        say: Say = silent,
+    ) -> None:
+        """Writes a video of the motion to the file `path`, an MP4 or a GIF. For the arguments and
+        errors, see visualization.video.make_video()."""
+        from tetra_drake.visualization.video import make_video
+
+        page = self.replay_page()
+        make_video(page, Path(path), size=size, fps=fps, view=view, speed=speed, say=say)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+import tetra_drake
 from tetra_drake.errors import InputError, check_whole
 from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import TextTable, heading_html
@@ -342,17 +343,17 @@ class HasBestGait(Protocol):
 
 
 GivenGait = Gait | HasBestGait | str | Path
-"""A gait, its file, or a run; a run means its best gait."""
+"""A gait, its file, or a run or its folder; a run means its best gait."""
 
 
 def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
     """The gait that an argument means: a gait itself, one read from a file for `scenario`, or the
-    best gait of a run. Raises InputError for anything else."""
+    best gait of a run or of its folder. Raises InputError for anything else."""
     if isinstance(gait, Gait):
         return gait
     if isinstance(gait, (str, Path)):
         if os.path.isdir(gait):
-            raise InputError(gait, "", f"is a directory; give a gait file, or load_run('{gait}')")
+            return tetra_drake.load_run(gait).best_gait()
         return load_gait(gait, scenario)
     if hasattr(gait, "best_gait"):
         return gait.best_gait()

@@ -89,6 +89,11 @@ def shown_in(name: str | None) -> Iterator[None]:
         _chosen.reset(token)
 
 
+def chosen_units() -> str:
+    """The name of the units that shown_in() has chosen; "" without a choice."""
+    return next((name for name, units in SYSTEMS.items() if units is _chosen.get()), "")
+
+
 def current(own: Units) -> Units:
     """The units that shown_in() has chosen; without a choice, `own`."""
     return _chosen.get() or own

@@ -28,14 +28,17 @@ from tetra_drake.figures.style import (
     Look,
     Print,
     figure_function,
+    folded,
     legend_below,
     line_style,
+    name_panel,
     page_of,
     page_width,
     save_findings,
     titled,
 )
 from tetra_drake.formatting import TextTable, fixed, ranged, rounded
+from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.statistics import (
     interquartile_mean,
@@ -56,6 +59,8 @@ class Compared:
 
     scenario: Scenario
     """Scenario of the first run."""
+    objective: str
+    """What fitness is: weights by metric, or the name of an objective from Python."""
     common: int
     """Cost, in simulations, at which the shortest curve ends. All runs have a fitness at this
     cost."""
@@ -71,7 +76,8 @@ class Compared:
     - reached: cost at which the fittest gait so far walks `reach`; infinite if none does
     """
     curves: pandas.DataFrame
-    """Best fitness over cost: run, cost, low, median, high (quartiles over trials).
+    """Best fitness over cost: run, cost, mean (interquartile mean over trials), low, high (its 95 %
+    confidence interval, by bootstrap); -inf as long as a trial has no fitness.
 
     A row is a cost at which a trial improves. A finished trial keeps its last value. The curve ends
     with the first unfinished trial, or with the longest trial if all are finished.
@@ -148,8 +154,10 @@ def compare(
 
     columns = ["run", "trial", "ended", "cost", "at_common", "fitness", "distance", "reached"]
     table = pandas.concat(trials, ignore_index=True)[columns]
+    first = loaded[0]
     return Compared(
-        scenario=next(iter(runs.values())).scenario,
+        scenario=first.scenario,
+        objective=_objective_text(first),
         common=common,
         reach=reach,
         trials=table,
@@ -274,14 +282,19 @@ def _trials(progress: pandas.DataFrame, common: int, reach: float | None) -> pan
 
 
 def _curve(progress: pandas.DataFrame, end: int) -> pandas.DataFrame:
-    """Quartiles over the trials of the best fitness so far: a row (cost, low, median, high) for
-    each cost at which a trial improves, and for the cost `end`. Input: the table of _progress()."""
+    """Interquartile mean over the trials of the best fitness so far, with its interval: a row
+    (cost, mean, low, high) for each cost at which a trial improves, and for the cost `end`. Input:
+    the table of _progress()."""
     best = progress.pivot(index="cost", columns="trial", values="fitness").ffill().loc[:end]
     rises = (best != best.shift()).any(axis=1)
     rises.iloc[-1] = True
     best = best[rises]
-    low, median, high = _quartiles(best.to_numpy().T)
-    return best.index.to_frame(index=False).assign(low=low, median=median, high=high)
+    values, unknown = best.to_numpy(), (-math.inf, -math.inf)
+    low, high = np.transpose(
+        [interval(x, interquartile_mean) if np.isfinite(x).all() else unknown for x in values]
+    )
+    mean = interquartile_mean(values, axis=1)
+    return best.index.to_frame(index=False).assign(mean=mean, low=low, high=high)
 
 
 def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
@@ -312,6 +325,14 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     row["reached_low"], row["reached"], row["reached_high"] = _quartiles(reached)
     row["share"] = float(np.isfinite(reached).mean())
     return row
+
+
+def _objective_text(run: Run) -> str:
+    """What the fitness of a run is, such as "distance: 1 /in"; weights are in the run's units."""
+    if run.manifest.method.objective != FITNESS:
+        return run.manifest.method.objective
+    units, objective = run.scenario.units, run.scenario.objective.items()
+    return ", ".join(f"{name}: {units.shown(x, inverse(UNITS[name]))}" for name, x in objective)
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:
@@ -412,8 +433,8 @@ def save_comparison(compared: Compared, folder: Path, printed: Print = AS_USUAL)
 
 @figure_function
 def comparison(compared: Compared) -> Drawn:
-    """Comparison of runs: the best fitness so far, as median and interquartile band over the trials
-    of each run.
+    """Comparison of runs: the best fitness so far, as interquartile mean over the trials of each
+    run with its 95 % confidence interval.
 
     If a distance to reach was given, a second panel shows the share of trials that have reached it.
     Finished trials keep their last values. A dot marks the end of a run's curve."""
@@ -432,7 +453,7 @@ def comparison(compared: Compared) -> Drawn:
         curve = compared.curves.query("run == @label").replace(-math.inf, math.nan)
         curve["cost"] = curve["cost"].clip(lower=first)
         curve = curve.drop_duplicates("cost", keep="last")
-        panels[0].plot(curve["cost"], curve["median"], **style)
+        panels[0].plot(curve["cost"], curve["mean"], **style)
         band: Any = {"step": "post", "color": style["color"], "alpha": 0.15, "linewidth": 0.0}
         panels[0].fill_between(curve["cost"], curve["low"], curve["high"], **band)
         if compared.reach is not None:
@@ -451,8 +472,10 @@ def comparison(compared: Compared) -> Drawn:
         panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         panel.xaxis.set_minor_formatter(NullFormatter())
     panels[0].set_ylabel("best fitness so far")
+    width = 0.85 * page_width() / columns
+    name_panel(panels[0], folded(f"fitness: {compared.objective}", width))
     if compared.reach is not None:
         distance = f"{compared.reach / unit.length:.4g} {unit.length_name}"
-        panels[1].set(ylabel=f"{distance} reached (% of trials)", ylim=(-3.0, 103.0))
+        panels[1].set(ylabel=folded(f"trials that walk {distance} (%)", 1.4), ylim=(-3.0, 103.0))
     legend_below(page, {label: line_style(series) for series, label in enumerate(labels)})
-    return titled(page, "How well runs search: median and quartiles over trials")
+    return titled(page, "Best fitness so far: interquartile mean over trials, 95 % interval")

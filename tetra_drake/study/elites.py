@@ -23,7 +23,7 @@ from tetra_drake.figures.style import Drawn, figure_function, name_panel, page_o
 from tetra_drake.files import json_number
 from tetra_drake.formatting import listed
 from tetra_drake.optimizers.quality_diversity import FLOOR
-from tetra_drake.scenario.metrics import UNITS
+from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.study.robustness import by_gait, robustness
 
@@ -131,11 +131,12 @@ def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], 
 @figure_function
 def map_of_gaits(run: Run) -> Drawn:
     """Map of gaits over two measures: the fitness of the fittest gait in each cell. White cells
-    have no gait.
+    have no gait. Numbers mark the fittest gait and the gaits nearest to the corners.
 
     If gaits were simulated on disturbed robots, the second panel shows the share of these draws
-    where a gait loses at most 10 % of its undisturbed distance. A cross marks gaits for which this
-    share is below one half. Numbers mark the fittest gait and the gaits nearest to the corners."""
+    where a gait is robust: it loses at most 10 % of its undisturbed distance and meets the
+    requirements. The first panel leaves out gaits for which this share is below one half; crosses
+    are in their cells."""
     kind, units = cast(QualityDiversity, run.scenario.optimizer), run.scenario.units
     edges, labels = [], []
     for (measure, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True):
@@ -150,9 +151,9 @@ def map_of_gaits(run: Run) -> Drawn:
     contents: dict[str, Any] = {title: (kept.set_index(CELLS)["fitness"], {"cmap": "viridis"})}
     if gaits["kept"].notna().any():
         shares = 100.0 * gaits.set_index(CELLS)["kept"]
-        contents["draws kept (%)"] = shares, {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
+        contents["robust draws (%)"] = shares, {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
 
-    page = page_of(height_in=3.9 + 0.17 * len(named))
+    page = page_of(height_in=4.4 + 0.17 * len(named))
     row = page.subplots(1, len(contents), squeeze=False, sharey=True)[0]
     for panel, (title, (values, look)) in zip(row, contents.items(), strict=True):
         across, up = map(range, kind.cells)
@@ -172,5 +173,8 @@ def map_of_gaits(run: Run) -> Drawn:
 
     notes = [f"{listed(names)}: {gait_label(gait)}" for names, gait in named]
     notes = [f"{number}  {note}" for number, note in enumerate(notes, start=1)]
+    if len(row) > 1 and len(lucky):
+        notes.append("×  left out: 90 % of the distance is kept in less than half of the draws")
+    notes += [f"{name.replace('_', ' ')}: {METRICS[name].note}" for name in kind.measures]
     page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize="small", wrap=True)
     return titled(page, "Map of gaits")

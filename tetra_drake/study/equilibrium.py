@@ -16,6 +16,7 @@ import pandas
 from scipy import linalg
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import eigsh
+from scipy.spatial.transform import Rotation
 
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import TextTable, fixed, listed, rounded, sentence
@@ -38,7 +39,7 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenar
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.settings.refusals import no_such
-from tetra_drake.visualization.replay import save_replay
+from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
 LEAST_FREQUENCY = 0.05
 """Least natural frequency in Hz. A slower mode is a motion that no force resists, such as the spin
@@ -47,6 +48,11 @@ _LEAST_SQUARE = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
 
 _LARGE = 50
 """Number of bodies from which the lowest frequencies are computed without the others."""
+_FREQUENCIES = 5
+"""Number of natural frequencies that are printed."""
+_SWING, _STILL, _AMPLITUDE = 75, 2, 0.12
+"""Number of frames of a mode on the page, and of a robot at rest; greatest displacement of a node, as a share of the size
+of the robot."""
 _NOISE = 1e-9
 """Forces of anchors up to this share of the greatest are rounding errors."""
 
@@ -75,7 +81,7 @@ class EquilibriumStudy:
         squares = linalg.eigvalsh(*_vibration(self.robot, Unactuated(self.robot.model)))
         return np.sqrt(squares[squares > _LEAST_SQUARE]) / (2.0 * math.pi)
 
-    def lowest_frequencies(self, count: int = 5) -> np.ndarray:
+    def lowest_frequencies(self, count: int = _FREQUENCIES) -> np.ndarray:
         """The lowest of `frequencies`, at most `count` (frequencies,), in Hz. For a large robot
         they are found by Lanczos iterations, to six digits."""
         if len(self.robot.structure.bodies) < _LARGE:
@@ -92,6 +98,12 @@ class EquilibriumStudy:
     def modes(self) -> np.ndarray:
         """Mode shapes (frequencies, nodes, 3): displacements of the nodes in the world frame,
         scaled so that the node that moves farthest moves by 1. Order as in `frequencies`."""
+        return self._modes[0]
+
+    @functools.cached_property
+    def _modes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mode shapes, and the motions of the bodies (frequencies, bodies, 6) that make them: a
+        rotation vector, then a translation, in the world frame."""
         structure, unactuated = self.robot.structure, Unactuated(self.robot.model)
         squares, motions = linalg.eigh(*_vibration(self.robot, unactuated))
         motions = motions[:, squares > _LEAST_SQUARE]
@@ -103,7 +115,8 @@ class EquilibriumStudy:
         for body, motion in enumerate(by_body):
             own = slice(structure.first_node[body], structure.first_node[body + 1])
             modes[:, own] = (rigid_motions(p_WN[own] - p_WB[body]) @ motion).transpose(2, 0, 1)
-        return modes / np.linalg.norm(modes, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
+        farthest = np.linalg.norm(modes, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
+        return modes / farthest, by_body.transpose(2, 0, 1) / farthest
 
 
 def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
@@ -282,18 +295,55 @@ def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> st
 
 
 def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
-    """Writes an HTML page that shows the robot in equilibrium in 3D. Raises InputError if the page
-    cannot be written."""
+    """Writes an HTML page that shows the robot in equilibrium in 3D, the text of structure_text(),
+    and the lowest modes, one after the other, slowed down and enlarged. Raises InputError if the
+    page cannot be written."""
     robot = study.robot
+    states = _swinging(study)
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
-    modes = np.zeros((2, len(loads), MODE_COLUMNS))
+    modes = np.zeros((len(states), len(loads), MODE_COLUMNS))
     modes[:, :, CONTACT] = loads > 0.0
     motion = Motion(
-        times=np.array([0.0, 1.0]),
-        states=np.tile(robot.equilibrium.state, (2, 1)),
-        signals=np.zeros((2, robot.structure.signals)),
+        times=np.arange(len(states)) / FRAMES_PER_SECOND,
+        states=states,
+        signals=np.zeros((len(states), robot.structure.signals)),
         modes=modes,
-        drives=np.tile(robot.starting_drives(), (2, 1)),
+        drives=np.tile(robot.starting_drives(), (len(states), 1)),
     )
-    title = f"{robot.scenario.name} at rest"
-    save_replay(path, robot=robot, trajectory=make_dataset(robot, motion), title=title)
+    trajectory = make_dataset(robot, motion)
+    for name in ("tension", "normal_force", "friction_force"):  # not of the enlarged motion
+        trajectory[name][:] = trajectory[name].values[0]
+    frames = study.lowest_frequencies().repeat(_SWING) if len(states) > _STILL else np.zeros(0)
+    shown = {"what": "mode at", "unit": " Hz", "digits": 2, "values": [*frames, *frames[-1:]]}
+    save_replay(
+        path,
+        robot=robot,
+        trajectory=trajectory,
+        title=f"{robot.scenario.name} at rest",
+        progress=shown if frames.size else None,
+        text=structure_text(study),
+    )
+
+
+def _swinging(study: EquilibriumStudy) -> np.ndarray:
+    """States (frames, 13 * bodies) of a robot that swings in its lowest modes, twice in each, in
+    _SWING frames each. The node that moves farthest moves by the share _AMPLITUDE of the robot's
+    size. A robot without modes, or with so many bodies that they take long, rests for _STILL
+    frames."""
+    bodies, rest = len(study.robot.structure.bodies), study.robot.equilibrium.state
+    if bodies >= _LARGE:
+        return np.tile(rest, (_STILL, 1))
+    _, motions = study._modes
+    if not len(motions):
+        return np.tile(rest, (_STILL, 1))
+    states = np.tile(rest, (len(motions[:_FREQUENCIES]) * _SWING + 1, 1))
+    size = float(np.ptp(study.nodes[["x", "y", "z"]].to_numpy(), axis=0).max())
+    swing = _AMPLITUDE * size * np.sin(4.0 * math.pi * np.arange(_SWING) / _SWING)
+    moved = motions[:_FREQUENCIES, np.newaxis] * swing[:, np.newaxis, np.newaxis]
+    poses = states[:-1, : 7 * bodies].reshape(-1, 7)
+    turns, ways = np.split(moved.reshape(-1, 6), 2, axis=1)
+    turned = Rotation.from_rotvec(turns) * Rotation.from_quat(poses[:, [1, 2, 3, 0]])
+    poses[:, [1, 2, 3, 0]] = turned.as_quat()
+    poses[:, 4:] += ways
+    states[:-1, : 7 * bodies] = poses.reshape(len(states) - 1, -1)
+    return states

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas
-from matplotlib.ticker import MaxNLocator, StrMethodFormatter
+from matplotlib.ticker import StrMethodFormatter
 
 from tetra_drake import __version__
 from tetra_drake.errors import InputError
@@ -26,7 +26,7 @@ from tetra_drake.figures.style import (
     titled,
 )
 from tetra_drake.files import read_bytes, write_whole
-from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent
+from tetra_drake.formatting import Say, TextTable, fixed, listed, render, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.load import SCENARIO, save_scenario
 from tetra_drake.scenario.scenario import Scenario
@@ -56,13 +56,16 @@ LIKELY = 3.0
 STRONG = 0.95
 """Correlation above which a warning names two parameters."""
 
-PAGE = "README.md"
+README, PAGE = "README.md", "fit.html"
 
 MANY = 100
 """Number of points in a panel of the figure from which on they are drawn small."""
 POINTS = 2000
 """Largest number of points in a panel of the figure. If there are more, a random selection is
 shown."""
+
+NAMES = 24
+"""Largest number of names on an axis of the figure. If there are more, only some are written."""
 
 UNKNOWN = """`± ?` is an unknown interval: the data do not determine the value, or predictions are
 not smooth. Then their derivatives by steps of 0.1 % and 1 % of the start differ by more than 20 %.
@@ -302,9 +305,9 @@ def _warnings(
 
 
 def save_fit(fit: Fit, folder: Path) -> list[str]:
-    """Writes the scenario with the fitted values, tables, the figure of the residuals and a
-    Markdown page to a folder. Returns the names of the files. Raises InputError if one cannot be
-    written."""
+    """Writes the scenario with the fitted values, tables, the figure of the residuals, and a page
+    in Markdown and HTML to a folder. Returns the names of the files. Raises InputError if one
+    cannot be written."""
     save_scenario(folder, fit.scenario)
     tables = {
         "parameters": fit.parameters.reset_index(),
@@ -324,29 +327,35 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
 
     rows = [[str(key), *map(fixed, row)] for key, *row in fit.correlations.itertuples()]
     correlations = TextTable(["correlation", *map(str, fit.correlations)], rows)
-    paragraphs = [
-        f"# Fit of {fit.scenario.name}",
+    about = (
         f"{len(fit.residuals)} measured numbers, {fit.evaluations} evaluations, "
         f"{fit.wall_time:.0f} s. Sum of squared residuals per degree of freedom, in units of "
         f"the stated uncertainty: {fit.start_misfit:.3g} with the start values, "
         f"{fit.misfit:.3g} fitted; 1 is a model that is right. Intervals are of 95 %, "
         "from the derivatives at the fitted values. Where the misfit exceeds 1, they are wider "
-        "by its root.",
+        "by its root."
+    )
+    unknown = UNKNOWN.replace("\n", " ") if fit.parameters["low"].isna().any() else ""
+    paragraphs = [
+        f"# Fit of {fit.scenario.name}",
+        about,
         fit.table.markdown(),
         "\n".join(f"- {note}" for note in fit.notes),
-        UNKNOWN.replace("\n", " ") if fit.parameters["low"].isna().any() else "",
+        unknown,
         "![residuals](residuals.figure.svg)",
         correlations.markdown(),
         f"[{SCENARIO}]({SCENARIO}) has the fitted values.\n",
     ]
-    write_whole(folder / PAGE, "\n\n".join(filter(None, paragraphs)))
-    return [PAGE, SCENARIO, *written]
+    write_whole(folder / README, "\n\n".join(filter(None, paragraphs)))
+    shown = {"fit": fit, "about": about, "unknown": unknown, "correlations": correlations}
+    write_whole(folder / PAGE, render("study/fit.html.jinja", **shown, scenario=SCENARIO))
+    return [PAGE, README, SCENARIO, *written]
 
 
 @figure_function
 def residuals(fit: Fit) -> Drawn:
-    """Residuals of a fit over time, or by the number of the measured value, in standard deviations
-    of the measurements.
+    """Residuals of a fit over time, or by the name of the measured value, in standard deviations of
+    the measurements.
 
     A panel shows a measurement: predictions minus measured numbers, with the start values and with
     the fitted ones. The grey band holds 95 % of the residuals of a right model.
@@ -369,8 +378,11 @@ def residuals(fit: Fit) -> Drawn:
         panel.set(ylabel="residual / std. dev.", yscale="symlog")
         panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         is_motion = (rows["along"] % 1.0).any()
-        panel.set_xlabel("time of the log (s)" if is_motion else "number")
-        if not is_motion:
-            panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        panel.margins(x=0.03)  # dots at the ends are whole
+        if is_motion:
+            panel.set_xlabel("time of the log (s)")
+        else:
+            named = rows.iloc[:: math.ceil(len(rows) / NAMES)]
+            panel.set_xticks(named["along"], named["label"], rotation=30, ha="right")
     legend_below(page, styles)
     return titled(page, "Predictions minus measurements")

@@ -121,7 +121,7 @@ def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Distur
 
 def robustness(
     scenario: GivenScenario,
-    gaits: Mapping[Any, GivenGait],
+    gaits: GivenGait | Mapping[Any, GivenGait],
     *,
     percent: float | None = None,
     draws: int = DRAWS,
@@ -132,7 +132,7 @@ def robustness(
     """Simulates gaits on disturbed robots, with the compiled engine.
 
         >>> run = td.load_run("runs/demo")
-        >>> judgement = td.robustness(run, {"best": run}, draws=3)
+        >>> judgement = td.robustness(run, run, draws=3)
         >>> distances = judgement.draws.distance
         >>> kept = judgement.compared(judgement.draws).kept.mean()
 
@@ -143,7 +143,8 @@ def robustness(
     Args:
         scenario: a scenario, its name or file, or a run. Its disturbances are used, if it has any
             and `percent` is None.
-        gaits: gaits, files or runs (their best gait), by any key; the tables name gaits by it.
+        gaits: a gait, its file or a run (its best gait); or several of these by any key. The tables
+            name gaits by the key.
         percent: size of the default disturbances in percent, used in place of the scenario's.
         draws: number of draws.
         seed: seed of the draws.
@@ -153,12 +154,14 @@ def robustness(
     Raises:
         InputError: if a gait is for another robot, or `percent` is too large for the scenario.
     """
-    check_type("robustness", "gaits", gaits, Mapping)
     check_whole("robustness", "draws", draws, least=0)
     check_whole("robustness", "seed", seed, least=0)
     check_type("robustness", "alone", alone, bool)
     check_type("robustness", "percent", percent, numbers.Real, NoneType)
     scenario = given_scenario(scenario)
+    if not isinstance(gaits, Mapping):
+        gait = given_gait(gaits, scenario)
+        gaits = {gait.name: gait}
     walkers = {key: given_gait(gait, scenario) for key, gait in gaits.items()}
     disturbances = scenario.disturbances
     if percent is not None:

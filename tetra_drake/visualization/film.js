@@ -309,7 +309,7 @@ window.addEventListener("load", () => {
     if (moves) show(time + ARROWS[code] * (shiftKey ? 10 : 1));
     if (plays || moves) event.preventDefault();  // the report around this page would scroll
   });
-  element("legend").addEventListener("toggle", arrange);
+  for (const id of ["legend", "text"]) element(id)?.addEventListener("toggle", arrange);
   window.addEventListener("resize", arrange);
 
   let before = performance.now();

@@ -9,6 +9,7 @@ import logging
 import math
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -75,6 +76,8 @@ def save_replay(
     trajectory: xarray.Dataset,
     title: str,
     viewer: str | Path | None = None,
+    progress: Mapping[str, Any] | None = None,
+    text: str = "",
 ) -> None:
     """Writes a page that replays a trajectory.
 
@@ -87,6 +90,9 @@ def save_replay(
         title: name of the gait, a colon, and a short result, such as "walks 14 in".
         viewer: file for Meshcat's script. Pages can share it, which makes them much smaller. It is
             written if it does not exist. By default the script is in the page.
+        progress: what the page writes at each frame in place of the distance, see _progress(). Then
+            no path is drawn.
+        text: text with numbers, which the page shows on demand.
 
     Raises:
         InputError: if a file cannot be written, or `viewer` has another content.
@@ -94,7 +100,14 @@ def save_replay(
     address = ""
     if viewer is not None:
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
-    page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
+    page, script = replay_page(
+        robot=robot,
+        trajectory=trajectory,
+        title=title,
+        address=address,
+        progress=progress,
+        text=text,
+    )
     if viewer is not None:
         file = Path(viewer)
         if not file.exists():
@@ -106,12 +119,18 @@ def save_replay(
 
 
 def replay_page(
-    *, robot: Robot, trajectory: xarray.Dataset, title: str, address: str = ""
+    *,
+    robot: Robot,
+    trajectory: xarray.Dataset,
+    title: str,
+    address: str = "",
+    progress: Mapping[str, Any] | None = None,
+    text: str = "",
 ) -> tuple[str, str]:
     """Makes a page that replays a trajectory.
 
     Args:
-        robot, trajectory, title: see save_replay().
+        robot, trajectory, title, progress, text: see save_replay().
         address: URL from which the page reads Meshcat's script (JavaScript), relative to the page.
             By default the script is in the page itself.
 
@@ -130,11 +149,15 @@ def replay_page(
         # Before the body, so that nothing of the body is shown if the file is missing.
         page = (before + after).replace("</head>", f"{reader}</head>", 1)
     name, _, deed = title.rpartition(": ")
+    film = film_of(robot, frames)
+    if progress is not None:
+        film |= {"progress": progress, "traces": []}
     overlay = render(
         "visualization/overlay.html.jinja",
         name=name,
         deed=deed,
-        film=film_of(robot, frames),
+        text=text,
+        film=film,
         script=render("visualization/film.js"),
     )
     page = _COMMAND.sub(r"handle(\1);", page)
