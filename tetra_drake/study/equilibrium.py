@@ -51,8 +51,8 @@ _LARGE = 50
 _FREQUENCIES = 5
 """Number of natural frequencies that are printed."""
 _SWING, _STILL, _AMPLITUDE = 75, 2, 0.12
-"""Number of frames of a mode on the page, and of a robot at rest; greatest displacement of a node, as a share of the size
-of the robot."""
+"""Number of frames of a mode on the page, and of a robot at rest; greatest displacement of a node,
+as a share of the size of the robot."""
 _NOISE = 1e-9
 """Forces of anchors up to this share of the greatest are rounding errors."""
 
