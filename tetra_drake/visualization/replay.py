@@ -74,6 +74,7 @@ def save_replay(
     robot: Robot,
     trajectory: xarray.Dataset,
     title: str,
+    rolls: bool = False,
     viewer: str | Path | None = None,
 ) -> None:
     """Writes a page that replays a trajectory.
@@ -85,6 +86,7 @@ def save_replay(
         robot: the robot that moved.
         trajectory: its motion and forces over time; see results.trajectory.
         title: name of the gait, a colon, and a short result, such as "walks 14 in".
+        rolls: shows the distance as "rolled", not "walked".
         viewer: file for Meshcat's script. Pages can share it, which makes them much smaller. It is
             written if it does not exist. By default the script is in the page.
 
@@ -94,7 +96,9 @@ def save_replay(
     address = ""
     if viewer is not None:
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
-    page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
+    page, script = replay_page(
+        robot=robot, trajectory=trajectory, title=title, rolls=rolls, address=address
+    )
     if viewer is not None:
         file = Path(viewer)
         if not file.exists():
@@ -106,12 +110,17 @@ def save_replay(
 
 
 def replay_page(
-    *, robot: Robot, trajectory: xarray.Dataset, title: str, address: str = ""
+    *,
+    robot: Robot,
+    trajectory: xarray.Dataset,
+    title: str,
+    rolls: bool = False,
+    address: str = "",
 ) -> tuple[str, str]:
     """Makes a page that replays a trajectory.
 
     Args:
-        robot, trajectory, title: see save_replay().
+        robot, trajectory, title, rolls: see save_replay().
         address: URL from which the page reads Meshcat's script (JavaScript), relative to the page.
             By default the script is in the page itself.
 
@@ -134,7 +143,7 @@ def replay_page(
         "visualization/overlay.html.jinja",
         name=name,
         deed=deed,
-        film=film_of(robot, frames),
+        film=film_of(robot, frames, rolls=rolls),
         script=render("visualization/film.js"),
     )
     page = _COMMAND.sub(r"handle(\1);", page)
@@ -147,7 +156,7 @@ def replay_page(
     return pack_page(page, title=title), script
 
 
-def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
+def film_of(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str, Any]:
     """Data for the page's script film.js: the objects of the scene and their motion.
 
     `frames` are the samples of a trajectory to show. Each number that moves, such as an x
@@ -199,7 +208,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "touches": _steps(frames["in_contact"].values * RESOLUTION),
         "arrows": _steps(force * units.square / force_of_square),
         "traces": _steps(followed_nodes(frames["p_WN"].values, structure)[:, :2]),
-        "progress": _progress(robot, frames),
+        "progress": _progress(robot, frames, rolls=rolls),
         "legend": {
             "tension": f"{rounded(greatest / units.force, 2)} {units.force_name}",
             "force": f"{rounded(force_of_square / units.force, 2)} {units.force_name}",
@@ -223,7 +232,7 @@ def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
     return turned
 
 
-def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
+def _progress(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str, Any]:
     """What the page writes at each frame: the distance walked in the scenario's unit of length, or
     the change of heading in degrees if the objective is about turning. Keys: `what` (a verb),
     `unit`, `digits` (decimals) and `values` (frames,)."""
@@ -234,7 +243,8 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     else:
         units = robot.scenario.units
         values = distance_walked(frames, structure) / units.length
-        what, unit, digits = "walked", f" {units.length_name}", units.decimals
+        what = "rolled" if rolls else "walked"
+        unit, digits = f" {units.length_name}", units.decimals
     return {"what": what, "unit": unit, "digits": digits, "values": values.round(digits).tolist()}
 
 
