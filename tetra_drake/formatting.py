@@ -76,10 +76,10 @@ def ranged(value: float, low: float, high: float) -> str:
 
 def uncertain(shown: str, value: float, low: float, high: float) -> str:
     """A number with as many decimals as its range from `low` to `high` allows, and the range in
-    brackets, such as "5.2 (3.1 to 6.0)". A range that is narrower than the last decimal of `shown`,
-    the number as text, or unknown (NaN), changes nothing."""
+    brackets, such as "5.2 (3.1 to 6.0)". A range that is narrower than two units of the last
+    decimal of `shown`, the number as text, or unknown (NaN), changes nothing."""
     decimals, width = len(shown.partition(".")[2]), high - low
-    if not width >= 10.0**-decimals:
+    if not width >= 2.0 * 10.0**-decimals:
         return shown
     decimals = max(0, min(decimals, 1 - math.floor(math.log10(width))))
     value_text, low_text, high_text = (fixed(x, decimals) for x in (value, low, high))

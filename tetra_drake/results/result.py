@@ -279,22 +279,23 @@ def headline(
     as many digits as their `spread` allows; large ones also have their range."""
     units, seconds = scenario.units, f"in {scenario.simulation.duration:g} s"
 
-    def size(name: str, unit: float, decimals: int) -> str:
+    def size(name: str, unit: float, decimals: int, word: str) -> str:
         value = metrics[name] / unit
         sign = math.copysign(1.0, value)
         low, high = sorted(sign * x / unit for x in spread.get(name, (math.nan, math.nan)))
-        return uncertain(fixed(abs(value), decimals), abs(value), low, high)
+        number, *both = uncertain(fixed(abs(value), decimals), abs(value), low, high).split(" ", 1)
+        return " ".join([number, word, *both])
 
     name, rolls = headline_metric(scenario.objective, metrics), has_rolled(metrics)
-    way = [size("distance", units.length, units.decimals), units.length_word]
+    way = [size("distance", units.length, units.decimals, units.length_word)]
     way += ["backward" if metrics["distance"] < 0.0 else "", scenario.terrain.where, seconds]
     walk = " ".join(filter(None, way))
     moves = f"{'rolls' if rolls else 'walks'} {walk}"
     if name == "rolled":
-        turns = f"rolls {size(name, math.tau, 1)} turns{' backward' * (metrics[name] < 0.0)}"
+        turns = f"rolls {size(name, math.tau, 1, 'turns')}{' backward' * (metrics[name] < 0.0)}"
         text = f"{turns}, {walk if rolls else moves}"
     elif name == "heading_change":
-        text = f"turns {size(name, math.radians(1.0), 0)} degrees {seconds}"
+        text = f"turns {size(name, math.radians(1.0), 0, 'degrees')} {seconds}"
     elif name == "distance":
         text = moves
     else:
