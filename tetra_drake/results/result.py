@@ -130,13 +130,7 @@ class SimulationResult:
         """The HTML page that save_replay() writes."""
         from tetra_drake.visualization.replay import replay_page
 
-        page, _ = replay_page(
-            robot=self.robot,
-            trajectory=self.trajectory,
-            title=self.title,
-            rolls=has_rolled(vars(self.metrics)),
-        )
-        return page
+        return replay_page(robot=self.robot, trajectory=self.trajectory, title=self.title)[0]
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
         """Writes an HTML page that plays the motion to the file `path`. For `viewer`, see
@@ -144,12 +138,7 @@ class SimulationResult:
         from tetra_drake.visualization.replay import save_replay
 
         save_replay(
-            path,
-            robot=self.robot,
-            trajectory=self.trajectory,
-            title=self.title,
-            rolls=has_rolled(vars(self.metrics)),
-            viewer=viewer,
+            path, robot=self.robot, trajectory=self.trajectory, title=self.title, viewer=viewer
         )
 
 

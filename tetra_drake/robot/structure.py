@@ -115,11 +115,10 @@ class Structure(Blueprint):
 
     @property
     def least_radius(self) -> float:
-        """Radius (m) of the thinnest strut. Without struts it is a hundredth of the robot's length.
-        Shapes that are drawn have at least this radius."""
-        if not self.strut_radius.size:
-            return self.length / SLENDERNESS
-        return float(self.strut_radius.min())
+        """Radius (m) of the thinnest strut. Without struts it is a hundredth of the robot's largest
+        extent along an axis. Shapes that are drawn have at least this radius."""
+        size = float(np.ptp(self.p_WN, axis=0).max())
+        return float(self.strut_radius.min()) if self.strut_radius.size else size / SLENDERNESS
 
     @property
     def radius(self) -> np.ndarray:

@@ -38,7 +38,7 @@ def spread(
 ) -> dict[str, list[float]]:
     """Ranges of the metrics of a gait for 31 starts that differ by at most 1e-7 m.
 
-        >>> low, high = td.spread("prism", "gait.json")["distance"]
+        >>> low, high = td.spread("quick", "gait.json")["distance"]
 
     A range is wide if the motion is chaotic: then a distance of four digits tells nothing about a
     real robot, nor about another simulator. The starts are the scenario's own, and 30 where each

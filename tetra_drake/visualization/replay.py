@@ -74,7 +74,6 @@ def save_replay(
     robot: Robot,
     trajectory: xarray.Dataset,
     title: str,
-    rolls: bool = False,
     viewer: str | Path | None = None,
 ) -> None:
     """Writes a page that replays a trajectory.
@@ -85,8 +84,8 @@ def save_replay(
         path: the HTML file to write.
         robot: the robot that moved.
         trajectory: its motion and forces over time; see results.trajectory.
-        title: name of the gait, a colon, and a short result, such as "walks 14 in".
-        rolls: shows the distance as "rolled", not "walked".
+        title: name of the gait, a colon, and a short result, such as "walks 14 in". If the
+            result begins with "rolls", the page says "rolled", otherwise "walked".
         viewer: file for Meshcat's script. Pages can share it, which makes them much smaller. It is
             written if it does not exist. By default the script is in the page.
 
@@ -96,9 +95,7 @@ def save_replay(
     address = ""
     if viewer is not None:
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
-    page, script = replay_page(
-        robot=robot, trajectory=trajectory, title=title, rolls=rolls, address=address
-    )
+    page, script = replay_page(robot=robot, trajectory=trajectory, title=title, address=address)
     if viewer is not None:
         file = Path(viewer)
         if not file.exists():
@@ -110,17 +107,12 @@ def save_replay(
 
 
 def replay_page(
-    *,
-    robot: Robot,
-    trajectory: xarray.Dataset,
-    title: str,
-    rolls: bool = False,
-    address: str = "",
+    *, robot: Robot, trajectory: xarray.Dataset, title: str, address: str = ""
 ) -> tuple[str, str]:
     """Makes a page that replays a trajectory.
 
     Args:
-        robot, trajectory, title, rolls: see save_replay().
+        robot, trajectory, title: see save_replay().
         address: URL from which the page reads Meshcat's script (JavaScript), relative to the page.
             By default the script is in the page itself.
 
@@ -143,7 +135,7 @@ def replay_page(
         "visualization/overlay.html.jinja",
         name=name,
         deed=deed,
-        film=film_of(robot, frames, rolls=rolls),
+        film=film_of(robot, frames, rolls=deed.startswith("rolls")),
         script=render("visualization/film.js"),
     )
     page = _COMMAND.sub(r"handle(\1);", page)
