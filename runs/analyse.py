@@ -74,6 +74,9 @@ TURNED = "heading_change"
 SHOWN = ("cost_of_transport", "tension", "clearance")
 """Metrics of the best gaits that are shown on pages."""
 
+SPEED = "relative_speed"
+"""Metric of the best gaits that is shown in the gallery: body lengths per second."""
+
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
     "best_gaits": (
@@ -82,6 +85,7 @@ _COLUMNS = {
         "evaluations",
         "fitness",
         *SHOWN,
+        SPEED,
         "sensitivity_in",
         TURNED,
     ),
@@ -89,7 +93,7 @@ _COLUMNS = {
     "unseen": ("trial", "seed", "distance_in", "met"),
     "disturbed": ("gait", "undisturbed", *_MEAN, *_KEPT, "failed", "missed"),
 }
-_NUMBERS = [*SHOWN, "sensitivity_in", "distance_in", TURNED]
+_NUMBERS = [*SHOWN, SPEED, "sensitivity_in", "distance_in", TURNED]
 """Columns with numbers that may all be null."""
 
 
@@ -99,8 +103,8 @@ class Analysis:
 
     best_gaits: pandas.DataFrame
     """The fittest gait of each trial. Index: trial. Columns: evaluation, evaluations (of the whole
-    trial), fitness, the metrics SHOWN in SI units, sensitivity_in (see sensitivity()), and TURNED
-    (rad; NaN if the objective is not about turning)."""
+    trial), fitness, the metrics SHOWN and SPEED in SI units, sensitivity_in (see sensitivity()),
+    and TURNED (rad; NaN if the objective is not about turning)."""
     resimulations: pandas.DataFrame
     """Fittest gaits with other engines and laws of friction. Columns: trial, setting, distance_in
     (NaN if the simulation failed), and TURNED as in best_gaits."""
@@ -185,7 +189,7 @@ def best_gaits(run: Run) -> list[dict[str, Any]]:
     for _, gait in run.best().iterrows():
         trial = int(gait["trial"])
         row = {"trial": trial, "evaluation": int(gait["index"]), "evaluations": made[trial]}
-        names = ("fitness", *SHOWN, *_turned(run.scenario))
+        names = ("fitness", *SHOWN, SPEED, *_turned(run.scenario))
         numbers = {name: json_number(float(gait[name])) for name in names}
         rows.append(row | numbers)
     return rows

@@ -23,15 +23,15 @@ from pathlib import Path
 
 import jinja2
 import numpy as np
-from analyse import MUJOCO, SHOWN, TIGHT, TURNED, Analysis, load_analysis
+from analyse import MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from PIL import Image
 from record import DIAGRAM, EXPERIMENTS, FILM, PICTURE, load_times
-from rolling import LAPSE, ROLLING, best_of, load_policies
+from rolling import LAPSE, ROLLING, best_of, load_policies, undisturbed
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import TextTable, fixed, listed, rounded
+from tetra_drake.formatting import TextTable, fixed, listed, rounded, uncertain
 from tetra_drake.laws.friction import Coulomb
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import SCENARIO, load_scenario
@@ -133,6 +133,15 @@ class Best:
     """Share of disturbed robots on which it does as well; NaN if it turns."""
     units: Units
     turns: bool = False
+    relative_speed: float = math.nan
+    """Body lengths per second; NaN if unknown or if it turns."""
+    sensitivity: float = math.nan
+    """Largest change of the compiled distance (m) in starts moved by 1 nm; NaN if unknown."""
+
+    @property
+    def speed(self) -> str:
+        """Speed in body lengths per second as text; "-" if it is NaN."""
+        return rounded(self.relative_speed, 2)
 
     def text(self, engine: str, digits: int = 2) -> str:
         """The distance, or the angle, on an engine."""
@@ -141,7 +150,10 @@ class Best:
             return "-"
         if self.turns:
             return f"{math.degrees(reached):.0f}°"
-        return f"{fixed(reached / self.units.length, digits)} {self.units.length_name}"
+        length = reached / self.units.length
+        change = self.sensitivity / self.units.length if engine == ENGINES[0] else math.nan
+        shown = uncertain(fixed(length, digits), length, length - change, length + change)
+        return f"{shown} {self.units.length_name}"
 
 
 def best_of_all(runs: Runs) -> dict[str, Best]:
@@ -160,7 +172,9 @@ def best_policy() -> Best:
     ways = {engine: policy["engines"][engine]["way_m"] for engine in ENGINES}
     kept = policy["rolls"] / policy["draws"]
     title = "a rover of six struts rolls by a feedback policy, in 20 s"
-    return Best(title, f"{LAPSE}.svg", ways, kept, SYSTEMS["SI"])
+    rover = undisturbed({})
+    pace = ways[ENGINES[0]] / rover.simulation.duration / rover.robot.blueprint().length
+    return Best(title, f"{LAPSE}.svg", ways, kept, SYSTEMS["SI"], relative_speed=pace)
 
 
 def best_gait(name: str, run: Analysis) -> Best:
@@ -172,7 +186,17 @@ def best_gait(name: str, run: Analysis) -> Best:
         again = [run.again(trial, setting, TURNED) for setting in (TIGHT, MUJOCO)]
         reached, kept = np.array([run.best_gaits.loc[trial, TURNED], *again]), math.nan
     by_engine = dict(zip(ENGINES, reached, strict=True))
-    return Best(title, f"{DIAGRAM}.svg", by_engine, kept, scenario.units, turns)
+    gait = run.best_gaits.loc[trial]
+    return Best(
+        title,
+        f"{DIAGRAM}.svg",
+        by_engine,
+        kept,
+        scenario.units,
+        turns,
+        relative_speed=math.nan if turns else gait[SPEED],
+        sensitivity=INCH * gait["sensitivity_in"],
+    )
 
 
 def distances_of(run: Analysis, trial: int) -> np.ndarray:
@@ -196,9 +220,11 @@ def gallery_table(runs: Runs) -> str:
         title += f"<br>{picture} {diagram} [replay]({name}/{REPLAY})"
         reached = [best.text(engine) for engine in ENGINES]
         keeps = "-" if math.isnan(best.kept) else f"{100.0 * best.kept:.0f} %"
-        rows.append([title, *reached, keeps, fixed(minutes.get(name, math.nan), 0)])
-    rows.append(["all", *["" for _ in ENGINES], "", fixed(sum(minutes.values()), 0)])
-    return TextTable(["experiment", *ENGINES, "keeps", "minutes"], rows).markdown()
+        rows.append([title, *reached, best.speed, keeps, fixed(minutes.get(name, math.nan), 0)])
+    rows.append(["all", *["" for _ in ENGINES], "", "", fixed(sum(minutes.values()), 0)])
+    return TextTable(
+        ["experiment", *ENGINES, "body lengths/s", "keeps", "minutes"], rows
+    ).markdown()
 
 
 def trust_table(runs: Runs) -> str:

@@ -25,7 +25,9 @@ Functions, and the main attributes of their results:
     fit                 values of scenario keys that meet measurements: parameters, scenario
     MotionCapture, Rest measurements for fit(): motion over time; shape, tensions, frequencies
     robustness          how far gaits walk on disturbed robots
+    spread              ranges of a gait's metrics for starts moved by 1 nm to 1e-7 m
     compare             how well runs search, with intervals
+    form_find           free lengths for a wanted shape and prestress (force densities)
     study_equilibrium   shape, tensions, self-stress, frequencies and modes at rest
     export              writes a gait as commands for the actuators of a prototype
     prepare             compiles everything once, so that nothing later waits

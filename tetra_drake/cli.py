@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
 import os
 import shlex
@@ -143,6 +144,7 @@ def _simulate(
     command: CommandFile | None = None,
     engine: EngineName | None = None,
     out: Folder = Path("out"),
+    spread: bool = False,
     meshcat: bool = False,
 ) -> None:
     """Simulate one gait.
@@ -154,6 +156,7 @@ def _simulate(
     Args:
         scenario: (default: the scenario of the gait's run or beside the command; else thesis)
         out: the folder to write to (default: %(default)s)
+        spread: simulate 30 more starts, moved by 1 nm to 1e-7 m, and show the ranges of the numbers
         meshcat: show the robot in a browser while Drake simulates it, in real time at most
 
     Example: tetra-drake simulate --scenario coulomb --seed 3 --out out
@@ -164,6 +167,7 @@ def _simulate(
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
     from tetra_drake.scenario.load import load_scenario
+    from tetra_drake.study.spread import spread as spread_of
 
     played = None
     if command is None:
@@ -184,6 +188,9 @@ def _simulate(
 
         view = open_view(chosen, say=_say)
     result = simulate(chosen, chosen_gait, command=played, record=True, viewer=view)
+    driver = played or chosen_gait
+    if spread and driver is not None:
+        result = dataclasses.replace(result, spread=spread_of(chosen, driver))
     print(result_text(result))
     save_result_folder(out, result)
     print(

@@ -79,8 +79,9 @@ def evolve(
         progress: True shows bars on a terminal, and lines in notebooks and files. A Progress (see
             evolution.progress) is a display of your own.
         reevaluate: After the evolution, evaluates the best gaits on the Drake diagram if the engine
-            is another, and simulates the gaits of a quality-diversity map on disturbed robots. By
-            default a new run does so, and a resumed run does what it was begun with.
+            is another, simulates the gaits of a quality-diversity map on disturbed robots, and the
+            best gait from moved starts (see td.spread). By default a new run does so, and a resumed
+            run does what it was begun with.
         report: After the evolution, writes report.html, replay.html, figures/ and, for a
             quality-diversity map, elites/.
 
@@ -220,9 +221,10 @@ def _simulate_again(
     progress: Progress,
 ) -> None:
     """Evaluates the best gaits of a run on the Drake diagram, unless it was the run's engine.
-    Simulates the gaits of a quality-diversity map, if any, on disturbed robots. Records both in the
-    run's folder; an error becomes a warning."""
+    Simulates the gaits of a quality-diversity map, if any, on disturbed robots, and the best gait
+    from moved starts. Records all in the run's folder; an error becomes a warning."""
     from tetra_drake.study.elites import judge_elites
+    from tetra_drake.study.spread import record_spread
 
     directory = record.directory
     if record.manifest.scenario.engine_name != "drake":
@@ -232,6 +234,8 @@ def _simulate_again(
             )
     with _completing(progress, "gaits of the map were not simulated on disturbed robots"):
         judge_elites(directory, workers=None if executor else workers)
+    with _completing(progress, "the spread of the best gait was not simulated"):
+        record_spread(directory, workers=None if executor else workers)
 
 
 @contextlib.contextmanager
@@ -256,7 +260,7 @@ def _introduce(
     text += str(manifest.scenario)
     if drawing:
         text += (
-            f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "
+            f"\nat the end: {directory / 'replay.html'}, the best gait moving, and "
             f"{directory / 'report.html'}; at any time before: {drawing}"
         )
     progress.say(text)

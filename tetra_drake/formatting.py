@@ -74,6 +74,18 @@ def ranged(value: float, low: float, high: float) -> str:
     return f"{rounded(value)} ({rounded(low)} to {rounded(high)})"
 
 
+def uncertain(shown: str, value: float, low: float, high: float) -> str:
+    """A number with as many decimals as its range from `low` to `high` allows, and the range in
+    brackets, such as "5.2 (3.1 to 6.0)". A range that is narrower than two units of the last
+    decimal of `shown`, the number as text, or unknown (NaN), changes nothing."""
+    decimals, width = len(shown.partition(".")[2]), high - low
+    if not width >= 2.0 * 10.0**-decimals:
+        return shown
+    decimals = max(0, min(decimals, 1 - math.floor(math.log10(width))))
+    value_text, low_text, high_text = (fixed(x, decimals) for x in (value, low, high))
+    return f"{value_text} ({low_text} to {high_text})"
+
+
 def percents(share: float, low: float, high: float) -> str:
     """A share in percent and its range in brackets, such as "50 % (40 to 60)". Arguments are shares
     from 0 to 1. A range without width is left out."""

@@ -128,7 +128,7 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
     [
         ({"objective": {"speed": 1.0, "heading_change": 9.0}}, "walks 2.0 inches in 15 s"),
         ({"objective": {"heading_change": 1.0}}, "turns 180 degrees in 15 s"),
-        ({"objective": {"rolled": 1.0}}, "rolled 5.73 deg, walks 2.0 inches in 15 s"),
+        ({"objective": {"rolled": 1.0}}, "rolls 0.0 turns, walks 2.0 inches in 15 s"),
         ({"terrain": Incline(slope=0.25)}, "walks 2.0 inches up 14.3 degrees in 15 s"),
         ({"terrain": ROUGH}, "walks 2.0 inches on rough ground in 15 s"),
     ],

@@ -1,5 +1,7 @@
 """Remarks on settings with which a robot hardly moves or asks too much."""
 
+import re
+
 import pytest
 
 from tetra_drake.robot.remarks import gain_remark, stillness_remark
@@ -28,11 +30,26 @@ def test_a_robot_without_oscillators_gets_no_remark_on_its_gain():
     assert gain_remark(robot_of("prism", robot_actuated={})) == ""
 
 
+def moved(distance, limited=float("nan")):
+    return {"distance": distance, "actuator_limited": limited}
+
+
 def test_a_robot_that_walks_less_than_a_tenth_of_its_length_is_named():
     robot = robot_of("thesis", cpg_gain="1 lbf")
     # From T1's base to T5's tip: four spacings of 2.94 in, and 4.9 in of a tetrahedron.
     tenth = 0.1 * (4 * 2.94 + 4.899) * INCH
-    assert not stillness_remark(robot, -1.01 * tenth)
+    assert not stillness_remark(robot, moved(-1.01 * tenth))
     # Signals of 0.25 lbf (half of u0 = 0.5) stretch cables of 0.2 lbf/in by 1.25 in.
-    assert "1.25 in" in stillness_remark(robot, 0.99 * tenth)
-    assert not stillness_remark(robot_of("thesis", objective={"heading_change": "1 /rad"}), 0.0)
+    assert "1.25 in" in stillness_remark(robot, moved(0.99 * tenth))
+    turning = robot_of("thesis", objective={"heading_change": "1 /rad"})
+    assert not stillness_remark(turning, moved(0.0))
+
+
+def test_a_robot_that_stands_still_is_told_why():
+    weak = robot_of("prism", objective={"rolled": "1 /rad"}, cpg_gain="0.1 N")
+    remark = stillness_remark(weak, moved(0.0, limited=0.97))
+    needed = float(re.search(r"; ([\d.]+) N would move one by 1 %", remark)[1])
+    assert "97 %" in remark and "move no cable" in remark
+    assert gain_remark(robot_of("prism", cpg_gain=f"{0.98 * needed} N"))
+    assert not gain_remark(robot_of("prism", cpg_gain=f"{1.02 * needed} N"))
+    assert "%" not in stillness_remark(robot_of("winch"), moved(0.0, limited=0.01))

@@ -14,7 +14,7 @@ from tetra_drake.scenario.load import load_scenario
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
 """Trial 1 has no gait with a fitness."""
 
-METRICS = {"cost_of_transport": 4.0, "tension": 1.0, "clearance": 0.02}
+METRICS = {"relative_speed": 0.1, "cost_of_transport": 4.0, "tension": 1.0, "clearance": 0.02}
 """Of the best gaits."""
 
 

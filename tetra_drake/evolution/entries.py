@@ -7,6 +7,7 @@ trial_00/
   best_gait.json          gait file of the fittest gait so far
   reevaluations.jsonl     gaits evaluated once more on the Drake diagram
 elites.jsonl              the map's gaits on disturbed robots (only with !QualityDiversity)
+spreads.jsonl             ranges of the metrics of the run's best gait for moved starts
 
 Each line begins with the name of its run, and in a trial's folder with the number of the trial. It
 ends with a checksum, so that damaged lines are found. Lines are only appended, so that a file
@@ -40,6 +41,7 @@ from tetra_drake.scenario.metrics import wrong_metric
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
+SPREADS = "spreads.jsonl"
 
 MOST = 2**30
 """Largest size of a file, and of its earlier lines when they are not compressed, in bytes."""
@@ -166,12 +168,24 @@ class EliteLine(Line):
     mean_distance: float | None
 
 
+class SpreadLine(Line):
+    """Line of a record with the least and greatest values of a gait's metrics for moved starts; see
+    study.spread."""
+
+    identity = ("trial", "index")
+
+    trial: WholeNumber
+    index: WholeNumber
+    spread: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]]
+
+
 LINES: dict[str, type[Line]] = {
     EVALUATIONS: EvaluationLine,
     ITERATIONS: IterationLine,
     IN_PROGRESS: EvaluationLine,
     REEVALUATIONS: EvaluationLine,
     ELITES: EliteLine,
+    SPREADS: SpreadLine,
 }
 """Class of the lines by file name."""
 

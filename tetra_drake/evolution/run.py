@@ -18,6 +18,7 @@ from tetra_drake.evolution.entries import (
     LINES,
     REEVALUATIONS,
     REMEDY,
+    SPREADS,
     EvaluationLine,
     RecordFile,
     WholeNumber,
@@ -29,7 +30,7 @@ from tetra_drake.formatting import Say, TextTable, heading_html, rounded, silent
 from tetra_drake.results.result import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector, load_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import METRICS, MetricRanges
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import INCH
 
@@ -79,7 +80,8 @@ class Run:
         ]
         if not self.best().empty:
             best = self.fittest()
-            lines.append(f"best gait: {gait_label(best)}, {headline(self.scenario, best)}")
+            words = headline(self.scenario, best, self.spread_of(best))
+            lines.append(f"best gait: {gait_label(best)}, {words}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -145,6 +147,14 @@ class Run:
         if best.empty:
             raise InputError(self.directory, "", "no gait of this run has a fitness yet")
         return best.loc[best["fitness"].idxmax()]
+
+    def spread_of(self, gait: pandas.Series) -> MetricRanges:
+        """Recorded ranges of the metrics of a gait, a row of `evaluations`, for moved starts; see
+        study.spread. Empty if there are none."""
+        for line in self.file(SPREADS).read():
+            if (line.trial, line.index) == (gait["trial"], gait["index"]):
+                return dict(line.spread)
+        return {}
 
     def initial_best(self, trial: int) -> pandas.Series:
         """Row of the fittest gait in the first iteration of a trial. If all gaits of an iteration
@@ -227,8 +237,7 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
     import pandas
 
     kind, parameters = LINES[name], _parameters(manifest.scenario)
-    bodies = manifest.scenario.robot.blueprint().bodies
-    rows = []
+    blueprint, rows = manifest.scenario.robot.blueprint(), []
     for trial in range(manifest.scenario.evolution.trials):
         file = RecordFile.of(directory, manifest.run, name, trial=trial)
         for number, line in enumerate(file.read()):
@@ -241,7 +250,7 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
                 found = f"a genome of {len(genome)} numbers"
                 file.refuse(number, f"is damaged: found {found}, expected {len(parameters)}")
             row |= dict.fromkeys(METRICS, math.nan) | row.pop("metrics")
-            for body, share in zip(bodies, row.pop("lifted_shares", []), strict=False):
+            for body, share in zip(blueprint.bodies, row.pop("lifted_shares", []), strict=False):
                 row[f"lifted_{body}"] = share
             row["distance_in"] = row["distance"] / INCH
             if draws := row.pop("draws", None):
@@ -257,7 +266,11 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
         if field.annotation in (float | None, WholeNumber | None):
             types[key] = "float" if field.annotation == float | None else "Int64"
     types = {column: type_ for column, type_ in types.items() if column in table}
-    return table.astype(types).copy()  # copy() joins the blocks that astype() makes per column
+    table = table.astype(types).copy()  # copy() joins the blocks that astype() makes per column
+    if kind is EvaluationLine:  # earlier versions did not record it
+        relative_speed = table["speed"] / blueprint.length
+        table["relative_speed"] = table["relative_speed"].fillna(relative_speed)
+    return table
 
 
 def _parameters(scenario: Scenario) -> list[str]:
@@ -297,6 +310,8 @@ class GaitSource:
     """The gait of the file, or the best gait of the run."""
     gaits: dict[str, Gait]
     """The gait of the file by its name, or the best gait of each trial by "trial 0" ..."""
+    spread: MetricRanges
+    """Recorded ranges of the metrics of a run's best gait; see Run.spread_of()."""
 
 
 def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent) -> GaitSource:
@@ -319,12 +334,12 @@ def load_source(source: Path, *, scenario: str | None = None, warn: Say = silent
         chosen = read_manifest(folder).scenario
     if os.path.isdir(source):
         run = load_run(source)
-        best, trials = run.best_gait(), run.best()["trial"]
+        best, trials, spread = run.best_gait(), run.best()["trial"], run.spread_of(run.fittest())
         gaits = {f"trial {trial}": gait for trial, gait in zip(trials, run.gaits(), strict=True)}
     else:
-        best = load_gait(source, chosen)
+        best, spread = load_gait(source, chosen), {}
         gaits = {source.stem: best}
     if best.scenario not in ("", chosen.name):
         made = f"made for scenario {best.scenario}"
         warn(f"{source}: {made}, simulated on scenario {chosen.name}")
-    return GaitSource(chosen, best, gaits)
+    return GaitSource(chosen, best, gaits, spread)

@@ -80,7 +80,7 @@ def initial_fitness(run: Run, trial: int) -> Drawn:
         [fitness[~backward], fitness[backward]],
         bins=list(locator.tick_values(fitness.min(), fitness.max())),
         stacked=True,
-        label=[f"{(~backward).sum()} walk forward", f"{backward.sum()} walk backward"],
+        label=[f"{(~backward).sum()} forward", f"{backward.sum()} backward"],
         color=[OKABE_ITO["blue"], OKABE_ITO["orange"]],
         hatch=["", "//"],
         edgecolor="white",

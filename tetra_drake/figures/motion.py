@@ -96,7 +96,7 @@ def before_and_after(
         legend[f"{when}: {way}, {result.name}"] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
     legend_below(page, legend)
-    return titled(page, "Distance walked, before and after evolution")
+    return titled(page, "Distance, before and after evolution")
 
 
 @figure_function
@@ -129,7 +129,7 @@ def time_lapse(result: SimulationResult, *, time: Span | None = None, instants: 
     if len(looks) <= len(LINE_COLOURS):
         legend = dict(zip(structure.bodies, looks, strict=True)) | legend
     legend_below(page, legend)
-    return titled(page, "Time lapse from above: time and distance walked")
+    return titled(page, "Time lapse from above: time and distance")
 
 
 @figure_function

@@ -16,13 +16,14 @@ import xarray
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure, check_type
 from tetra_drake.files import check_folder, given_path, write_whole
-from tetra_drake.formatting import fixed
+from tetra_drake.formatting import fixed, sentence
 from tetra_drake.laws import actuator
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.prototype.command_file import command_text, load_command, table_text
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import GivenGait, given_gait
+from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import length_rates
 from tetra_drake.scenario.load import GivenScenario, given_scenario, save_scenario
@@ -109,6 +110,8 @@ def export(
             outcome = str(failure)
         verdict = f"{load_verdict(loads, result)}\nPlayed from {COMMAND}, the {outcome}; "
         verdict += f"the gait itself goes {_distance(result)}."
+        if still := stillness_remark(robot, vars(result.metrics)):
+            verdict += f"\n{sentence(still)}"
         template = resources.files("tetra_drake") / "prototype/README.template.md"
         about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
         write_whole(folder / README, template.read_text("utf-8").format(**about))

@@ -8,11 +8,12 @@ result.json       metrics, gait, and path of the centre
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 import pydantic
@@ -84,6 +85,8 @@ class ResultFile(Section):
     integrator: IntegratorWork
     gait: Any
     """Gait in the form of GaitFile; None if the robot followed a command."""
+    spread: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(default={})
+    """Ranges of the metrics for moved starts; see SimulationResult.spread."""
     path: PathColumns
 
 
@@ -133,6 +136,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
         "integrator": result.integrator.model_dump(),
         "versions": versions(scenario.engine.packages),
         "gait": gait and gait.to_json(scenario),
+        **({"spread": dict(result.spread)} if result.spread else {}),
         "path": {
             name: [json_number(number) for number in column.tolist()]
             for name, column in path_columns.items()
@@ -185,6 +189,7 @@ def load_result(folder: str | Path) -> SimulationResult:
         integrator=file.integrator,
         engine=file.engine,
         path=CentrePath(times, np.column_stack(centre), heading),
+        spread=file.spread,
         recorded=_load_trajectory(folder / TRAJECTORY, robot.structure),
     )
 
@@ -234,7 +239,8 @@ def load_or_simulate(
     if not os.path.isfile(source) and not is_run:
         raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
     loaded = load_source(source, scenario=scenario, warn=warn)
-    return simulate(loaded.scenario, loaded.best, record=True)
+    result = simulate(loaded.scenario, loaded.best, record=True)
+    return dataclasses.replace(result, spread=loaded.spread)
 
 
 def write_replay(

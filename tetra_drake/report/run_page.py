@@ -7,6 +7,7 @@ is the caption: what is true of each such figure. Legend and title tell the rest
 from __future__ import annotations
 
 import base64
+import dataclasses
 import inspect
 import os
 from collections.abc import Mapping, Sequence
@@ -45,6 +46,7 @@ from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.results.result import SimulationResult, headline
 from tetra_drake.robot.gait import save_gait
+from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.study.elites import distinct_gaits, elites, map_of_gaits, notable_gaits
@@ -154,7 +156,8 @@ def write_report(directory: Path, printed: Print = AS_USUAL) -> list[Path]:
         save_gait(run.gait(row["trial"], row["index"]), directory / str(file), run.scenario)
         if page != REPLAY:
             _simulate_again(run, row).result.save_replay(directory / str(page))
-    shown.best.result.save_replay(replay)
+    best = shown.best
+    dataclasses.replace(best.result, spread=run.spread_of(best.recorded)).save_replay(replay)
     write_whole(report, render_report(shown, pictures, folder=figures))
     return [figures, replay, report]
 
@@ -257,10 +260,13 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         for key, value in scenario.differences(load_scenario("thesis"))
         if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
     ]
+    spread = run.spread_of(best.recorded)
     return render(
         "report/report.html.jinja",
         shown=shown,
-        title=f"{scenario.name}: {headline(scenario, best.recorded)}",
+        title=f"{scenario.name}: {headline(scenario, best.recorded, spread)}",
+        spread=spread,
+        still=stillness_remark(best.result.robot, best.recorded),
         pictures={
             part: [_embedded(picture, folder) for picture in drawn]
             for part, drawn in pictures.items()

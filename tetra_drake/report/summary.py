@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import ALL_DONE
-from tetra_drake.formatting import TextTable, fixed, rounded, sentence
+from tetra_drake.formatting import TextTable, fixed, rounded, sentence, uncertain
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.remarks import sinking_remark, start_up_remark, stillness_remark
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.metrics import METRICS, UNITS, headline_metric, unmet_requirements
+from tetra_drake.scenario.metrics import (
+    METRICS,
+    UNITS,
+    MetricRanges,
+    headline_metric,
+    unmet_requirements,
+)
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.settings.units import Units
 
@@ -30,6 +37,12 @@ _NOTES = {name: metric.note for name, metric in METRICS.items()} | {
 }
 """Notes beside the numbers of a table, by name."""
 
+RANGES = (
+    "30 more starts were moved by 1 nm to 1e-7 m; a number that then differs has its range in "
+    "brackets"
+)
+"""Remark on the ranges that metrics_table() shows."""
+
 _NOTHING = 5e-4
 """Threshold for a row of a table: it may be left out if all its numbers, as shown, are smaller."""
 _NOISE = 1e-5
@@ -37,13 +50,17 @@ _NOISE = 1e-5
 
 
 def metrics_table(
-    names: Sequence[str], gaits: Sequence[Mapping[str, Any] | pandas.Series], scenario: Scenario
+    names: Sequence[str],
+    gaits: Sequence[Mapping[str, Any] | pandas.Series],
+    scenario: Scenario,
+    spread: MetricRanges = MappingProxyType({}),
 ) -> TextTable:
     """Table of fitness and metrics, with a column per gait under its heading in `names`.
 
     A gait is a row of `Run.evaluations`, or a mapping with the same keys. The first row is the main
     metric of the objective (see headline_metric()). Numbers that are zero for all gaits are left
-    out, unless the scenario's objective or requirements name them.
+    out, unless the scenario's objective or requirements name them. Numbers of the last gait have
+    as many digits as its `spread` allows; large ones also have their range.
     """
     first = headline_metric(scenario.objective, gaits[-1])
     always = {"fitness", "distance", *scenario.objective, *scenario.require}
@@ -55,6 +72,8 @@ def metrics_table(
         if has_some or name in always:
             whole = name in _SHARES
             digits = [fixed(x, 0) if whole or abs(x) < _NOISE else rounded(x) for x in values]
+            low, high = (x / size for x in spread.get(name, (math.nan, math.nan)))
+            digits[-1] = uncertain(digits[-1], values[-1], low, high)
             rows.append([title, *digits, _NOTES.get(name, "")])
     return TextTable(["", *names, ""], rows, text_columns=(0, len(gaits) + 1))
 
@@ -74,11 +93,13 @@ def result_text(result: SimulationResult) -> str:
     scenario, metrics = result.scenario, result.metrics
     lines = [result.title, f"scenario {scenario.name}, {ground_text(scenario)}"]
     gait = {"fitness": result.fitness} | vars(metrics)
-    lines.append(metrics_table([""], [gait], scenario).text())
+    lines.append(metrics_table([""], [gait], scenario, result.spread).text())
+    if result.spread:
+        lines.append(sentence(RANGES))
     if metrics.tension < 0.0:
         lines.append("A cable had to push: this gait cannot be built.")
     robot = result.robot
-    still = stillness_remark(robot, metrics.distance) if result.gait else ""
+    still = stillness_remark(robot, vars(metrics)) if result.gait else ""
     remarks = start_up_remark(robot) or still, sinking_remark(robot)
     lines += [sentence(remark) for remark in remarks if remark]
     unmet = unmet_requirements(metrics, scenario.require)
@@ -105,10 +126,11 @@ def run_text(run: Run) -> str:
         if len(run.statuses) > 1:
             texts.append(trials_table(run).text())
         best = run.fittest()
+        spread = run.spread_of(best)
         gaits = [run.initial_best(best["trial"]), best]
-        texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
-        if still := stillness_remark(Robot.of(run.scenario), best["distance"]):
-            texts.append(sentence(still))
+        texts.append(metrics_table(["initially", "best"], gaits, run.scenario, spread).text())
+        remarks = RANGES if spread else "", stillness_remark(Robot.of(run.scenario), best)
+        texts += [sentence(remark) for remark in remarks if remark]
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
         texts.append(f"to watch the best gait:  {replay}\nfigures and numbers:     {report}")
@@ -137,8 +159,10 @@ def results(run: Run) -> list[tuple[str, str]]:
     def three(value: float) -> str:
         return f"{rounded(value / size)} {unit}".rstrip()
 
+    least, most = (x / size for x in run.spread_of(fittest).get(name, (math.nan, math.nan)))
+    shown = uncertain(rounded(fittest[name] / size), fittest[name] / size, least, most)
     rows = [
-        (name.replace("_", " "), f"{three(fittest[name])}, {gait_label(fittest)}"),
+        (name.replace("_", " "), f"{shown} {unit}".rstrip() + f", {gait_label(fittest)}"),
         ("best initial gait", f"{three(initial[name])}, {gait_label(initial)}"),
     ]
     if len(best) > 1:

@@ -9,13 +9,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tetra_drake import __version__
 from tetra_drake.errors import InputError
-from tetra_drake.formatting import Say, fixed, heading_html, silent
+from tetra_drake.formatting import Say, fixed, heading_html, silent, uncertain
 from tetra_drake.laws.tally import Tally
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -26,11 +27,14 @@ from tetra_drake.robot.structure import Structure, followed_nodes, node_position
 from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.metrics import (
+    MOVED,
     UNITS,
+    MetricRanges,
     Metrics,
     Poses,
     Walk,
     compute_fitness,
+    has_rolled,
     headline_metric,
 )
 from tetra_drake.scenario.scenario import Scenario
@@ -78,6 +82,8 @@ class SimulationResult:
     """Path of the robot's centre from start to end, in steps of robot.measures.PERIOD."""
     recorded: xarray.Dataset | None = field(default=None, repr=False)
     """Data of the trajectory (see results.trajectory.make_dataset); None if it was not recorded."""
+    spread: MetricRanges = field(default_factory=dict, repr=False, compare=False)
+    """Ranges of the metrics for moved starts, as spread() gives them; empty if not simulated."""
 
     def __str__(self) -> str:
         kept = "not recorded" if self.recorded is None else "recorded"
@@ -113,7 +119,7 @@ class SimulationResult:
     def title(self) -> str:
         """Name of the gait or command, and its result in words, such as "gait: walks 14.3 inches in
         15 s"."""
-        return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
+        return f"{self.name}: {headline(self.scenario, vars(self.metrics), self.spread)}"
 
     def show(self, *, height: int = 480) -> ReplayFrame:
         """Page that plays the motion, for a notebook, which shows it in a frame `height` pixels
@@ -266,21 +272,38 @@ def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) 
         tip=nodes[:, structure.p_WN[:, 0].argmax()],
         centre=structure.node_shares @ nodes,
         since_steady_from=since_steady_from,
+        length=structure.length,
     )
 
 
-def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
+def headline(
+    scenario: Scenario, metrics: Mapping[str, float], spread: MetricRanges = MappingProxyType({})
+) -> str:
     """Result of a gait in a few words, such as "walks 14.3 inches in 15 s". It tells the metric
-    that the scenario's objective is about and, unless this is turning, the distance. `metrics` has
-    metrics by name, in SI units."""
-    seconds = f"in {scenario.simulation.duration:g} s"
-    units, distance = scenario.units, metrics["distance"]
-    length = fixed(abs(distance) / units.length, units.decimals)
-    way = [f"walks {length} {units.length_word}", "backward" if distance < 0.0 else ""]
-    walk = " ".join(filter(None, [*way, scenario.terrain.where, seconds]))
-    name = headline_metric(scenario.objective, metrics)
-    if name == "distance":
-        return walk
-    if name == "heading_change":
-        return f"turns {fixed(abs(math.degrees(metrics[name])), 0)} degrees {seconds}"
-    return f"{name.replace('_', ' ')} {units.shown(metrics[name], UNITS[name])}, {walk}"
+    that the scenario's objective is about and, unless this is turning, the distance. A robot that
+    rolled by half a turn or more "rolls". `metrics` has metrics by name, in SI units. Numbers have
+    as many digits as their `spread` allows; large ones also have their range."""
+    units, seconds = scenario.units, f"in {scenario.simulation.duration:g} s"
+
+    def size(name: str, unit: float, decimals: int, word: str) -> str:
+        value = metrics[name] / unit
+        sign = math.copysign(1.0, value)
+        low, high = sorted(sign * x / unit for x in spread.get(name, (math.nan, math.nan)))
+        number, *both = uncertain(fixed(abs(value), decimals), abs(value), low, high).split(" ", 1)
+        return " ".join([number, word, *both])
+
+    name, rolls = headline_metric(scenario.objective, metrics), has_rolled(metrics)
+    way = [size("distance", units.length, units.decimals, units.length_word)]
+    way += ["backward" if metrics["distance"] < 0.0 else "", scenario.terrain.where, seconds]
+    walk = " ".join(filter(None, way))
+    moves = f"{'rolls' if rolls else 'walks'} {walk}"
+    if name == "rolled":
+        turns = f"rolls {size(name, math.tau, 1, 'turns')}{' backward' * (metrics[name] < 0.0)}"
+        text = f"{turns}, {walk if rolls else moves}"
+    elif name == "heading_change":
+        text = f"turns {size(name, math.radians(1.0), 0, 'degrees')} {seconds}"
+    elif name == "distance":
+        text = moves
+    else:
+        text = f"{name.replace('_', ' ')} {units.shown(metrics[name], UNITS[name])}, {moves}"
+    return text.replace(")", f" {MOVED})", 1)  # the first range tells what it is

@@ -5,6 +5,8 @@ Each remark is a text without a full stop; it is empty if there is nothing to re
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from tetra_drake.errors import InputError
@@ -17,7 +19,9 @@ from tetra_drake.scenario.metrics import looks_for_distance
 LEAST_MOTION = 0.01
 """Least change of a cable's length that signals should cause, as a share of the length."""
 STILL = 0.1
-"""Distance that a robot should walk, as a share of its length."""
+"""Distance that a robot should move, as a share of its length."""
+BINDS = 0.5
+"""Share of the time from which on a limit of the actuators is a reason for hardly moving."""
 SINKS, BEARS = 0.03, 0.01
 """Depths of a robot at rest in its ground, as shares of its height: from SINKS on it is too deep;
 BEARS is usual in a ground that is stiff enough."""
@@ -33,24 +37,33 @@ def gain_remark(robot: Robot) -> str:
     share = np.max(stretch / robot.structure.initial_lengths[robot.driven])
     if share < LEAST_MOTION:
         problem = f"move no cable by more than {share:.2g} of its length"
+        if share > 0.0:
+            enough = cpg.gain * LEAST_MOTION / share
+            problem += f"; {enough:.3g} N would move one by {100.0 * LEAST_MOTION:g} %"
     else:
         least = np.min(driven["free_length"] - stretch)
         problem = robot.scenario.actuation.excess(signal, free_length=least)
     return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
 
 
-def stillness_remark(robot: Robot, distance: float) -> str:
-    """Remark on a robot whose objective rewards distance, but which walked a `distance` (m) of less
-    than a tenth of its own length. It is "" otherwise."""
+def stillness_remark(robot: Robot, metrics: Mapping[str, float]) -> str:
+    """Remark on a robot whose objective rewards a distance or rolling, but which moved by less than
+    a tenth of its own length, with the likely reason. `metrics` are by name, in SI units. It is ""
+    otherwise."""
     scenario, units = robot.scenario, robot.scenario.units
-    length = np.ptp(robot.structure.p_WN, axis=0).max()
-    if not looks_for_distance(scenario.objective) or not abs(distance) < STILL * length:
+    distance, objective = metrics["distance"], scenario.objective
+    is_to_move = looks_for_distance(objective) or objective.get("rolled", 0.0) > 0.0
+    if not is_to_move or not abs(distance) < STILL * robot.structure.length:
         return ""
+    remarks = [f"the robot moves {units.shown(distance, 'm')}, less than a tenth of its length"]
     _, stretch = _usual_signal(robot)
     signals = f"signals with cpg.gain {units.shown(scenario.cpg.gain, 'N')}"
-    way = f"walks {units.shown(distance, 'm')}, less than a tenth of its length"
     most = units.shown(stretch.max(initial=0.0), "m")
-    return f"the robot {way}; {signals} stretch cables by {most} at most"
+    remarks.append(gain_remark(robot) or f"{signals} stretch cables by {most} at most")
+    if metrics["actuator_limited"] > BINDS:
+        share = 100.0 * metrics["actuator_limited"]
+        remarks.append(f"a limit of the actuators binds {share:.0f} % of the time")
+    return "; ".join(remarks)
 
 
 def start_up_remark(robot: Robot) -> str:

@@ -208,11 +208,15 @@ class Blueprint:
         return np.vstack([self.p_WF, np.zeros(3)])[self.carriers] + self.p_FN
 
     @property
+    def length(self) -> float:
+        """Length (m) of the robot: its largest extent along an axis."""
+        return float(np.ptp(self.p_WN, axis=0).max())
+
+    @property
     def scale(self) -> float:
         """Factor by which lengths such as margins of figures grow or shrink with the robot: 1 for
-        robots of 0.1 m to 1 m, 3 for 3 m, 0.5 for 0.05 m. The size is the largest extent along an
-        axis."""
-        size = float(np.ptp(self.p_WN, axis=0).max())
+        robots of a `length` of 0.1 m to 1 m, 3 for 3 m, 0.5 for 0.05 m."""
+        size = self.length
         return size / min(max(size, USUAL_SIZES[0]), USUAL_SIZES[1]) or 1.0  # a point has no size
 
     @property

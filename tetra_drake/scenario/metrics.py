@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -45,6 +45,8 @@ class Poses:
     """Positions (3, 3) of the foremost node."""
     since_steady_from: float
     """Time from `simulation.steady_from` to the end."""
+    length: float
+    """Length of the robot; see Blueprint.length."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +86,10 @@ class Walk(Poses):
         return tuple((self.per_steady_time * self.tally.lifted).tolist())
 
 
+def _mean_speed(walk: Poses) -> float:
+    return float(walk.centre[2, 0] - walk.centre[1, 0]) / walk.since_steady_from
+
+
 def _cost_of_transport(walk: Walk) -> float:
     x, y, _ = (walk.centre[2] - walk.centre[1]).tolist()
     carried = walk.weight * max(math.hypot(x, y), LEAST_WAY * walk.scale)
@@ -106,12 +112,15 @@ class WalkMetrics:
         "m", "without the start", lambda walk: walk.markers[2, 0, 0] - walk.markers[1, 0, 0]
     )
     """Distance along x from `simulation.steady_from` to the end: Δx₁ of Eq. 10."""
-    speed: float = _of_poses(
-        "m/s",
-        "of the centre",
-        lambda walk: (walk.centre[2, 0] - walk.centre[1, 0]) / walk.since_steady_from,
-    )
+    speed: float = _of_poses("m/s", "of the centre", _mean_speed)
     """Mean speed of the centre of mass along x from `simulation.steady_from` on."""
+    relative_speed: float = _of_poses(
+        "1/s",
+        "body lengths per second",
+        lambda walk: _mean_speed(walk) / walk.length if walk.length else math.nan,
+    )
+    """Speed divided by the length of the robot, its largest extent along an axis at the start.
+    Robots of different sizes can be compared by it. NaN for a robot that is a point."""
     twist: float = _of_poses(
         "m",
         "one rear foot ahead of the other",
@@ -258,7 +267,14 @@ def inverse(unit: str) -> str:
     return f"{below or 1}/{above}"
 
 
-_WALKED = ("distance", "steady_distance", "speed")
+MetricRanges = Mapping[str, Sequence[float]]
+"""Least and greatest value of each metric, by name, in SI units, if the start moves by 1 nm to 100
+nm; see study.spread. Empty if it is unknown."""
+
+MOVED = "under starts moved by 1e-7 m"
+"""Words for the range of a number in a MetricRanges."""
+
+_WALKED = ("distance", "steady_distance", "speed", "relative_speed")
 """Metrics that reward long distances."""
 
 
@@ -271,6 +287,12 @@ def looks_for_distance(objective: Mapping[str, float]) -> bool:
 def looks_for_turns(objective: Mapping[str, float]) -> bool:
     """True if an objective, weights by metric, is about turning and does not reward distances."""
     return "heading_change" in objective and not looks_for_distance(objective)
+
+
+def has_rolled(metrics: Mapping[str, float]) -> bool:
+    """True if a robot with these metrics (by name, in SI units) has rolled by half a turn or
+    more."""
+    return abs(metrics.get("rolled", 0.0)) >= math.pi
 
 
 def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:

@@ -367,7 +367,7 @@ def comparison_text(compared: Compared) -> str:
     distance_headings = ["run", "distance", "s per evaluation"]
     if reach is not None:
         shown = units.shown(reach, "m")
-        distance += f"\nSimulations until a trial's best gait walks {shown}: "
+        distance += f"\nSimulations until a trial's best gait goes {shown}: "
         distance += "median (quartiles) over trials."
         distance_headings += [f"simulations to {shown}", "trials that reach it"]
     fitnesses, distances = [], []

@@ -72,7 +72,8 @@ class EquilibriumStudy:
     """A row per node, by its name: body, x, y, z, load (normal force of the ground), and the force
     of its anchor on the structure, anchor_x, anchor_y, anchor_z."""
     cables: pandas.DataFrame
-    """A row per cable, by its name: group, length, free_length, tension."""
+    """A row per cable, by its name: group, length, free_length, tension, force_density (tension per
+    length)."""
 
     @functools.cached_property
     def frequencies(self) -> np.ndarray:
@@ -150,6 +151,7 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         "length": equilibrium.lengths,
         "free_length": structure.cables["free_length"],
         "tension": unactuated.forces.cable_forces[:, TENSION],
+        "force_density": unactuated.forces.cable_forces[:, TENSION] / equilibrium.lengths,
     }
     nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(structure.node_load)
     lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)

@@ -369,7 +369,7 @@ window.addEventListener("load", () => {
     dress(false);
     labels.splice(0).forEach(({span}) => span.remove());
     element("labels").hidden = false;
-    const walked = progress.what == "walked";  // else the instants lie one above the other
+    const walked = progress.what != "turned";  // else the instants lie one above the other
     const moments = walked ? moments_apart(instants) : instants;
     camera({times: moments, from: [0.35, -1, 0.4]});
     moments.forEach((moment, i) => {

@@ -87,7 +87,8 @@ def save_replay(
         path: the HTML file to write.
         robot: the robot that moved.
         trajectory: its motion and forces over time; see results.trajectory.
-        title: name of the gait, a colon, and a short result, such as "walks 14 in".
+        title: name of the gait, a colon, and a short result, such as "walks 14 in". If the
+            result begins with "rolls", the page says "rolled", otherwise "walked".
         viewer: file for Meshcat's script. Pages can share it, which makes them much smaller. It is
             written if it does not exist. By default the script is in the page.
         progress: what the page writes at each frame in place of the distance, see _progress(). Then
@@ -149,7 +150,7 @@ def replay_page(
         # Before the body, so that nothing of the body is shown if the file is missing.
         page = (before + after).replace("</head>", f"{reader}</head>", 1)
     name, _, deed = title.rpartition(": ")
-    film = film_of(robot, frames)
+    film = film_of(robot, frames, rolls=deed.startswith("rolls"))
     if progress is not None:
         film |= {"progress": progress, "traces": []}
     overlay = render(
@@ -170,7 +171,7 @@ def replay_page(
     return pack_page(page, title=title), script
 
 
-def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
+def film_of(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str, Any]:
     """Data for the page's script film.js: the objects of the scene and their motion.
 
     `frames` are the samples of a trajectory to show. Each number that moves, such as an x
@@ -222,7 +223,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "touches": _steps(frames["in_contact"].values * RESOLUTION),
         "arrows": _steps(force * units.square / force_of_square),
         "traces": _steps(followed_nodes(frames["p_WN"].values, structure)[:, :2]),
-        "progress": _progress(robot, frames),
+        "progress": _progress(robot, frames, rolls=rolls),
         "legend": {
             "tension": f"{rounded(greatest / units.force, 2)} {units.force_name}",
             "force": f"{rounded(force_of_square / units.force, 2)} {units.force_name}",
@@ -246,7 +247,7 @@ def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
     return turned
 
 
-def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
+def _progress(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str, Any]:
     """What the page writes at each frame: the distance walked in the scenario's unit of length, or
     the change of heading in degrees if the objective is about turning. Keys: `what` (a verb),
     `unit`, `digits` (decimals) and `values` (frames,)."""
@@ -257,7 +258,8 @@ def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     else:
         units = robot.scenario.units
         values = distance_walked(frames, structure) / units.length
-        what, unit, digits = "walked", f" {units.length_name}", units.decimals
+        what = "rolled" if rolls else "walked"
+        unit, digits = f" {units.length_name}", units.decimals
     return {"what": what, "unit": unit, "digits": digits, "values": values.round(digits).tolist()}
 
 

@@ -1,0 +1,48 @@
+"""Form-finding, against closed forms and the equilibrium that another way computes."""
+
+import math
+
+import pytest
+
+import tetra_drake as td
+from tetra_drake.errors import InputError
+
+TWISTED = td.load_scenario("prism").with_changes({"robot.nodes.n3": ["9 cm", "4 cm", "16 cm"]})
+
+
+def at_rest_without_weight(scenario):
+    return td.study_equilibrium(scenario.with_changes({"robot.gravity": "0 m/s^2"}))
+
+
+def test_a_prism_of_three_bars_has_the_force_densities_of_theory():
+    """Twisted by 30 degrees, vertical over horizontal ones are 2 sin(60 degrees)."""
+    found = td.form_find("prism", {"side": "9 N"})
+    density = at_rest_without_weight(found).cables.groupby("group")["force_density"].mean()
+    assert density["side"] / density["top"] == pytest.approx(math.sqrt(3.0))
+    assert density["bottom"] == pytest.approx(density["top"])
+    assert found.robot.cables["side"].tension == 9.0
+
+
+def test_without_weight_the_found_structure_rests_where_its_file_has_it():
+    found = td.form_find("six_bar", {"shell": "9 N"})
+    study = at_rest_without_weight(found)
+    for node, place in found.robot.nodes.items():
+        assert study.nodes.loc[node, ["x", "y", "z"]].tolist() == pytest.approx(place, abs=1e-6)
+    assert study.cables["tension"].to_numpy() == pytest.approx(9.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "prestress", "problem"),
+    [
+        ("thesis", {"outer": "1 N"}, "found a row of tetrahedra"),
+        ("prism", {"sides": "9 N"}, "did you mean 'side'"),
+        ("prism", {"side": "9 m"}, "'9 m', expected a quantity that converts to N"),
+        ("prism", {}, "found 0 independent tensions, expected 1"),
+        ("prism", {"side": "9 N", "top": "1 N"}, "not in balance"),
+        ("prism", {"side": "-1 N"}, "side would push with 1 N"),
+        (TWISTED, {"side": "9 N"}, "no state of self-stress"),
+    ],
+)
+def test_a_wrong_prestress_is_told_in_one_line(scenario, prestress, problem):
+    with pytest.raises(InputError, match=problem):
+        td.form_find(scenario, prestress)
