@@ -105,7 +105,7 @@ EXPERIMENTS = {
     "thesis-drake": Experiment(
         "the same evolved on the Drake diagram itself",
         "thesis",
-        {"evolution.trials": 1, "evolution.evaluations": 250},
+        {"evolution.trials": 1, "evolution.evaluations": 250, "engine.scheme": "radau3"},
         engine="drake",
     ),
     "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
