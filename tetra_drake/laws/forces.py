@@ -113,9 +113,9 @@ def pull_of_cable(
     returned row is `drive` + 1 if the cable has such an actuator, otherwise `drive`.
     """
     driver, signal = robot.cables.signal[i], 0.0
-    if driver != cable.PASSIVE:
-        signal = signals[driver]
     law = cable.law_of(robot.cables, i)
+    if driver != cable.PASSIVE:
+        signal = law.intact * signals[driver]
     if driver == cable.PASSIVE or not actuator.has_drive(robot.actuator):
         if not robot.slack:
             return cable.cable_tension(length, rate, signal, law), law.damping, drive

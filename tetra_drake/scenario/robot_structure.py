@@ -300,7 +300,7 @@ class StructureFile(Section):
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
         cables, joined = self._cables_of(number, body_of), self._nodes_of_joined()
-        numbers = _cable_numbers(cables["cable_names"])
+        numbers = cable_numbers(cables["cable_names"])
         groups = [  # unknown cables are refused by _check_actuated()
             tuple(numbers[name] for name in names if name in numbers)
             for names in self.actuated.values()
@@ -597,7 +597,7 @@ class StructureFile(Section):
     def _check_actuated(self, cable_names: Sequence[str]) -> None:
         """Raises InputError if `actuated` names a cable that is not among `cable_names`, the names
         of all cables, or gives a cable to a second oscillator."""
-        numbers, drivers = _cable_numbers(cable_names), dict[int, str]()
+        numbers, drivers = cable_numbers(cable_names), dict[int, str]()
         for oscillator, names in self.actuated.items():
             for i, name in enumerate(names):
                 key = f"actuated.{oscillator}[{i}]"
@@ -618,7 +618,7 @@ scenario.metrics), `unit`, `blueprint()` and `implied_changes()`.
 """
 
 
-def _cable_numbers(names: Iterable[str]) -> dict[str, int]:
+def cable_numbers(names: Iterable[str]) -> dict[str, int]:
     """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
     in either order."""
     numbers: dict[str, int] = {}

@@ -6,6 +6,7 @@ import functools
 import itertools
 import json
 import math
+import operator
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -31,9 +32,10 @@ from tetra_drake.scenario.common_sections import (
     separate,
 )
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
+from tetra_drake.scenario.events import Event, check_before_end, check_events
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.robot_structure import RobotKind
+from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import by_name
@@ -89,6 +91,8 @@ class Scenario(Section):
     require: Annotated[dict[str, float], *by_name(UNITS)] = Field(default={})
     """Limits of metrics: a gait that does not meet one counts as failed. A file replaces all limits
     of its base."""
+    events: list[Event] = Field(default=[], exclude_if=operator.not_)
+    """Changes of robot or ground during the simulation, such as a cable that breaks."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()
@@ -188,6 +192,14 @@ class Scenario(Section):
         """Properties that some metrics need and this scenario's robot or actuators do not have,
         such as "row of tetrahedra". Such metrics are NaN."""
         return *self.robot.lacking, *self.actuation.lacking
+
+    @property
+    def whole_cables(self) -> list[str]:
+        """Names of the cables that no event cuts."""
+        names = self.robot.blueprint().cable_names
+        numbers = cable_numbers(names)
+        cut = {numbers[name] for event in self.events for name in event.cut}
+        return [name for number, name in enumerate(names) if number not in cut]
 
     @property
     def draw_count(self) -> int:
@@ -293,11 +305,18 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
-    def _check_disturbances(self) -> Self:
-        """Raises InputError if `disturbances` name no number of the scenario, or if their largest
-        changes would make a number invalid."""
+    def _check_changes(self) -> Self:
+        """Raises InputError for wrong `events`, if `disturbances` name no number of the scenario,
+        or if their largest changes would make a number invalid."""
+        if self.events:
+            check_events(self)
         if self.disturbances is None:
             return self
+        if cuts := self.disturbances.cuts:
+            check_before_end("disturbances.cuts.at", cuts.at, self)
+            whole = len(self.whole_cables)
+            if cuts.count > whole:
+                refuse("disturbances.cuts.count", f"found {cuts.count}, expected at most {whole}")
         undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
         for joined, spread in self.disturbances.spreads.items():
             place, keys = f"disturbances.spreads.{joined}", separate(joined)
