@@ -34,7 +34,7 @@ from tetra_drake.robot.struts import (
     elongated,
     strut_contact_law,
 )
-from tetra_drake.scenario.events import Event, blueprint_after, changed_laws, up_to_each
+from tetra_drake.scenario.events import Event, blueprint_after, up_to_each
 from tetra_drake.scenario.scenario import Scenario
 
 MOST_CORRECTIONS = 100
@@ -57,7 +57,7 @@ class Robot:
     has_network: bool = True
     """False if the signals are given, by a command or a controller."""
     before: Robot | None = None
-    """The robot at t = 0, of which this one is left after events; None for a robot at t = 0."""
+    """The robot at t = 0, if this one is what events have left of it; otherwise None."""
 
     @classmethod
     def of(cls, scenario: Scenario, *, at_rest: bool = False) -> Self:
@@ -192,7 +192,7 @@ class Robot:
             unit_inertia=unit_inertia,
             p_WB=state[: 7 * len(mass)].reshape(-1, 7)[:, 4:],
         )
-        changed = changed_laws(self.scenario, events)
+        changed = self.scenario.after(events)
         normal = NormalForce(changed.ground.stiffness, changed.ground.damping)
         ground = self.ground._replace(normal=np.array(normal), friction=changed.friction.law())
         model = make_model(changed.with_sections(terrain=Flat()), structure)

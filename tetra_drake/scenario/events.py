@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from pydantic import Field
 
@@ -16,13 +16,7 @@ from tetra_drake.settings.quantities import Keyed, Time
 from tetra_drake.settings.refusals import hint, refuse
 from tetra_drake.settings.section import Section
 
-if TYPE_CHECKING:
-    from tetra_drake.scenario.scenario import Scenario
-
 BlueprintT = TypeVar("BlueprintT", bound=Blueprint)
-
-CHANGED = "friction.", "ground."
-"""First parts of the keys whose numbers an event may change."""
 
 
 class Event(Section):
@@ -63,30 +57,14 @@ def blueprint_after(blueprint: BlueprintT, events: Sequence[Event]) -> Blueprint
     )
 
 
-def changed_laws(scenario: Scenario, events: Sequence[Event]) -> Scenario:
-    """Checked copy of a scenario with the numbers that `events` change, and without events. Raises
-    InputError for a number that its key does not allow."""
-    alone = scenario.with_sections(events=[], disturbances=None)
-    changes: dict[str, float | str] = {}
-    for event in events:
-        changes |= event.change
-    return alone.with_changes(changes) if changes else alone
-
-
-def check_events(scenario: Scenario) -> None:
-    """Refuses events after the end, unknown or repeated names, and changes that are no numbers of
-    ground or friction, or that leave a body without mass."""
-    blueprint = scenario.robot.blueprint()
+def check_taken(events: Sequence[Event], blueprint: Blueprint) -> None:
+    """Refuses names of cables and point masses that the robot does not have or that two events take
+    away, and the loss of all of a body's mass. Keys begin with "events"."""
     cables = cable_numbers(blueprint.cable_names)
     masses = {name: number for number, name in enumerate(_point_masses(blueprint))}
-    changeable = [key for key in scenario.numbers() if key.startswith(CHANGED)]
     taken: dict[object, str] = {}
-    order = sorted(range(len(scenario.events)), key=lambda i: scenario.events[i].at)
-    for i, events in zip(order, up_to_each(scenario.events), strict=True):
-        place, event = f"events[{i}]", events[-1]
-        check_before_end(f"{place}.at", event.at, scenario)
-        if not (event.cut or event.lose or event.change):
-            refuse(place, "changes nothing, expected cut, lose or change")
+    for i, event in enumerate(events):
+        place = f"events[{i}]"
         named = [(f"{place}.cut[{k}]", name, cables) for k, name in enumerate(event.cut)]
         named += [(f"{place}.lose[{k}]", name, masses) for k, name in enumerate(event.lose)]
         for key, name, known in named:
@@ -96,25 +74,10 @@ def check_events(scenario: Scenario) -> None:
             earlier = taken.setdefault((known is cables, known[name]), key)
             if earlier != key:
                 refuse(key, f"found '{name}', which {earlier} takes away; expected it once")
-        for key in event.change:
-            if key not in changeable:
-                found = f"'{key}' is no number of ground or friction; {hint(key, changeable)}"
-                refuse(f"{place}.change", found)
         try:
-            changed_laws(scenario, events)
-        except InputError as error:
-            refuse(f"{place}.change.{error.key}", error.problem)
-        try:
-            blueprint_after(blueprint, events).check_masses()
+            blueprint_after(blueprint, events[: i + 1]).check_masses()
         except InputError as error:
             refuse(f"{place}.lose", f"{error.key} {error.problem}")
-
-
-def check_before_end(key: str, time: float, scenario: Scenario) -> None:
-    """Refuses a time (s), at `key`, that is not before the end of the scenario's simulation."""
-    end = scenario.simulation.duration
-    if time >= end:
-        refuse(key, f"found {time:g} s, expected less than the duration, {end:g} s")
 
 
 def _point_masses(blueprint: Blueprint) -> list[str]:

@@ -32,7 +32,7 @@ from tetra_drake.scenario.common_sections import (
     separate,
 )
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
-from tetra_drake.scenario.events import Event, check_before_end, check_events
+from tetra_drake.scenario.events import Event, check_taken, up_to_each
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
@@ -61,6 +61,9 @@ _WIDTH, _ROWS = 100, 20
 
 _OF_WEIGHTS = {name: inverse(unit) for name, unit in UNITS.items()}
 """Units of the weights in an objective, by metric."""
+
+CHANGEABLE = "friction.", "ground."
+"""First parts of the keys whose numbers an event may change."""
 
 MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
@@ -237,6 +240,13 @@ class Scenario(Section):
         implied = isinstance(robot, dict) and changed.robot.implied_changes(self.robot, robot)
         return self.from_tree(merged(tree, {"robot": implied}), source) if implied else changed
 
+    def after(self, events: Sequence[Event]) -> Self:
+        """Checked copy with the numbers that `events` change, and without events. Raises InputError
+        for a number that its key does not allow."""
+        alone = self.with_sections(events=[], disturbances=None)
+        changes = {key: number for event in events for key, number in event.change.items()}
+        return alone.with_changes(changes) if changes else alone
+
     def on_engine(self, name: str | None) -> Self:
         """This scenario with the engine called `name`, such as "compiled", in its default settings.
         If the scenario has this engine already, or `name` is None, nothing changes."""
@@ -305,15 +315,42 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
-    def _check_changes(self) -> Self:
-        """Raises InputError for wrong `events`, if `disturbances` name no number of the scenario,
-        or if their largest changes would make a number invalid."""
-        if self.events:
-            check_events(self)
+    def _check_events(self) -> Self:
+        """Refuses events after the end, unknown or repeated names, and changes that are no numbers
+        of ground or friction."""
+        if not self.events:
+            return self
+        check_taken(self.events, self.robot.blueprint())
+        changeable = [key for key in self.numbers() if key.startswith(CHANGEABLE)]
+        order = sorted(range(len(self.events)), key=lambda i: self.events[i].at)
+        for i, events in zip(order, up_to_each(self.events), strict=True):
+            place, event = f"events[{i}]", self.events[i]
+            self._check_time(f"{place}.at", event.at)
+            if not (event.cut or event.lose or event.change):
+                refuse(place, "changes nothing, expected cut, lose or change")
+            for key in event.change:
+                if key not in changeable:
+                    found = f"'{key}' is no number of ground or friction"
+                    refuse(f"{place}.change", f"{found}; {hint(key, changeable)}")
+            try:
+                self.after(events)
+            except InputError as error:
+                refuse(f"{place}.change.{error.key}", error.problem)
+        return self
+
+    def _check_time(self, key: str, time: float) -> None:
+        end = self.simulation.duration
+        if time >= end:
+            refuse(key, f"found {time:g} s, expected less than the duration, {end:g} s")
+
+    @model_validator(mode="after")
+    def _check_disturbances(self) -> Self:
+        """Raises InputError if `disturbances` name no number of the scenario, or if their largest
+        changes would make a number invalid."""
         if self.disturbances is None:
             return self
         if cuts := self.disturbances.cuts:
-            check_before_end("disturbances.cuts.at", cuts.at, self)
+            self._check_time("disturbances.cuts.at", cuts.at)
             whole = len(self.whole_cables)
             if cuts.count > whole:
                 refuse("disturbances.cuts.count", f"found {cuts.count}, expected at most {whole}")
