@@ -179,6 +179,17 @@ def rows() -> Iterable[Any]:
         engines, name = (FINE[0], Limit(5e-5)), f"prism, {kind}, MuJoCo"
         within = {"distance_in": 2e-3, "metrics.actuator_limited": 3e-3}
         yield row(name, "prism", 1.5, changes, engines, within, gait(2), slow=True)
+    # Half a second after events, two of them at once.
+    events = [{"at": "0.1 s", "cut": ["T1-T2 outer bottom_left"], "lose": ["T2"]}]
+    events += [{"at": "0.1 s", "change": {"friction.static": 0.2, "friction.kinetic": 0.1}}]
+    changes = {"robot.tetrahedra": 2, "robot.payload": ["0 g", "9 g"], "events": events}
+    yield row("events", "coulomb", 0.6, changes, CONVERGE, {"p_WN": 1e-5}, gait(2), 1e-3)
+    loss = [{"at": "0.1 s", "cut": ["side n3 n0"]}, {"at": "0.2003 s", "lose": ["n1"]}]
+    changes = {"robot.masses": {"n1": "50 g"}, "events": loss} | NO_BRISTLES
+    prism = floating_prism(duration=0.7)
+    for engine, other in {"": CONVERGE[1], ", MuJoCo": Limit(1e-4)}.items():
+        cells = prism, 0.7, changes, (CONVERGE[0], other), {"p_WN": 1e-5, "p_WB": 1e-5}
+        yield row(f"cut and loss{engine}", *cells, gait(2), 1e-3)
     # All metrics, on Coulomb friction, where small errors stay small.
     changes = {"robot.tetrahedra": 3, "cpg.start_up": "0.2 s", "cpg.gain": "3 lbf"} | NO_BRISTLES
     changes |= {"simulation.steady_from": "0.5 s", "simulation.sample_period": "1e-3 s"}

@@ -5,6 +5,7 @@ from operator import attrgetter
 from pathlib import Path
 
 import pytest
+from helpers.anchored import HUNG, scenario_of
 from record import EXPERIMENTS
 
 from tetra_drake.errors import InputError
@@ -208,6 +209,43 @@ def test_a_spread_that_leads_astray_is_refused(key, spread, found, refused):
         load_scenario("coulomb").with_changes(
             {"disturbances": {"draws": 2, "spreads": {key: spread}}}
         )
+
+
+CUT = {"at": "1 s", "cut": ["T1-T2 outer top"]}
+BAD_EVENTS: list[tuple[object, str, str]] = [
+    ([{"at": "1 s"}], "[0]", "changes nothing"),
+    ([CUT | {"at": "20 s"}], "[0].at", "found 20 s, expected less than the duration, 15 s"),
+    ([CUT | {"cut": ["T1-T2 outer topp"]}], "[0].cut[0]", "did you mean 'T1-T2 outer top'?"),
+    ([CUT, CUT], "[1].cut[0]", "which events[0].cut[0] takes away; expected it once"),
+    ([{"at": "1 s", "lose": ["T3", "T1"]}], "[0].lose[1]", "unknown point mass 'T1'"),
+    ([{"at": "1 s", "change": {"friction": 0.2}}], "[0].change", "'friction' is no number of"),
+    ([{"at": "1 s", "change": {"robot.density": 2}}], "[0].change", "no number of ground or"),
+    ([{"at": "1 s", "change": {"ground.stiffness": 2}}], "[0].change.ground.stiffness", "unit"),
+    ([{"at": "1 s", "change": {"friction.kinetic": 0.9}}], "[0].change.friction.kinetic", "0.9"),
+    ([{"at": "1 s", "change": {"friction.kinetic": [1]}}], "[0].change.friction.kinetic", "list"),
+    ([{"at": "1 s", "change": {"friction.kinetic": "low"}}], "[0].change.friction.kinetic", "low"),
+]
+
+
+@pytest.mark.parametrize(("events", "key", "found"), BAD_EVENTS, ids=itertools.count())
+def test_a_bad_event_is_refused(events, key, found, refused):
+    payload = ["0 kg", "0 kg", "0.1 kg", "0 kg", "0 kg"]
+    with refused("scenario coulomb", f"events{key}", found):
+        load_scenario("coulomb").with_changes({"robot.payload": payload, "events": events})
+
+
+def test_a_loss_leaves_every_body_some_mass(refused):
+    tree, events = HUNG | {"masses": {"top2": 0.2}}, [{"at": "1 s", "lose": ["top2"]}]
+    tree["nodes"] = HUNG["nodes"] | {"top2": [0.1, 0.0, 1.0]}
+    tree["cables"] = {"line": HUNG["cables"]["line"] | {"pairs": [["top", "a"], ["a", "top2"]]}}
+    with refused("scenario anchored", "events[0].lose", "top2", "mass"):
+        scenario_of(tree).with_changes({"events": events})
+
+
+def test_cables_are_drawn_among_those_that_are_whole(refused):
+    cuts = {"draws": 1, "cuts": {"count": 24}}
+    with refused("scenario coulomb", "disturbances.cuts.count", "found 24, expected at most 23"):
+        load_scenario("coulomb").with_changes({"events": [CUT], "disturbances": cuts})
 
 
 def test_a_scenario_based_on_itself_is_refused(tmp_path, refused):

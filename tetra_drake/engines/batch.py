@@ -13,11 +13,16 @@ import numpy.typing as npt
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.robot import Phase, Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import Structure
 
 if TYPE_CHECKING:
     import xarray
+
+
+_SAME_TIME = 1e-9
+"""Largest difference (s) of two times that are the same except for rounding."""
 
 
 class Viewer(Protocol):
@@ -48,6 +53,8 @@ class Batch:
         """Failure of the robot in each place; None if it has not failed."""
         self.signals = structure.signals
         """Number m of actuator signals of each robot."""
+        self._phases: list[tuple[Phase, ...]] = [()] * places
+        """The present phase of the robot in each place, and the phases after coming events."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
         """Puts robots in the first places, in their order. Raises InputError if one differs too
@@ -77,6 +84,7 @@ class Batch:
         briefly: bool = False,
     ) -> None:
         """Simulates each robot until its time in `until`, the end of its simulation, or a failure.
+        Robots change at the times of their scenario's events.
 
         Calls time_limit.check_time() often, which raises TimeBudgetExceeded.
 
@@ -97,7 +105,33 @@ class Batch:
         if signals is not None:
             shape = places, self.signals
             signals = checked_numbers(signals, shape, source="Batch", key="signals")
-        self._advance(np.broadcast_to(times, places), signals, briefly)
+        while True:
+            events = self._pass_events()
+            self._advance(np.minimum(times, events), signals, briefly)
+            goes_on = np.isfinite(events) & (events <= times)
+            goes_on &= [failure is None for failure in self.failures]
+            if briefly or not goes_on.any():
+                return
+            signals = None  # held from now on
+
+    def _pass_events(self) -> np.ndarray:
+        """Changes the robots that are at the time of an event. Returns the time (s) of the next
+        event in each place (N,), infinite if there is none."""
+        following = np.full(len(self.failures), math.inf)
+        for place, phases in enumerate(self._phases):
+            while len(phases) > 1 and self.readings.time[place] >= phases[1].begins - _SAME_TIME:
+                before, after, *_ = phases
+                self._become(place, after.robot, after.p_BC - before.p_BC)
+                self._phases[place] = phases = phases[1:]
+            if len(phases) > 1:
+                following[place] = phases[1].begins
+        return following
+
+    def _become(self, place: int, robot: Robot, p_BC: np.ndarray) -> None:
+        """Replaces the robot in a place by another one of the same structure, whose nodes move on
+        in the same way. The origins of its bodies' frames are at p_BC (bodies, 3) in m in the
+        frames of the old one."""
+        raise NotImplementedError
 
     def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         raise NotImplementedError
@@ -154,6 +188,10 @@ class LoneRobot(Protocol):
     def copied(self) -> Self:
         """Copy of the simulation, which continues independently."""
 
+    def become(self, robot: Robot, p_BC: np.ndarray) -> Self:
+        """The simulation that continues with another robot in place of this one; see
+        Batch._become()."""
+
 
 class SerialBatch(Batch):
     """Batch of robots that are simulated one after another, each by its own LoneRobot."""
@@ -176,6 +214,7 @@ class SerialBatch(Batch):
         if structure.signals != self.signals or not fits:
             return False
         self._robots[place] = self._start(robot)
+        self._phases[place] = robot.robot.phases
         self.failures[place], self.readings.time[place] = None, 0.0
         self._reached[place], self._ends[place] = 0.0, robot.robot.scenario.simulation.duration
         return True
@@ -197,6 +236,11 @@ class SerialBatch(Batch):
                 self.readings.put(place, robot.readings())
                 self._reached[place] = until[place]
 
+    def _become(self, place: int, robot: Robot, p_BC: np.ndarray) -> None:
+        before = self._robots[place]
+        assert before is not None
+        self._robots[place] = before.become(robot, p_BC)
+
     def ended(self, place: int) -> bool:
         is_over = self.failures[place] is not None or self._reached[place] >= self._ends[place]
         return bool(is_over) and self._robots[place] is not None
@@ -209,13 +253,14 @@ class SerialBatch(Batch):
     def copy(self, place: int, to: int) -> None:
         robot = self._robots[place]
         self._robots[to] = None if robot is None else robot.copied()
+        self._phases[to] = self._phases[place]
         self.failures[to] = self.failures[place]
         self._reached[to], self._ends[to] = self._reached[place], self._ends[place]
         self.readings.put(to, self.readings.rows(place))
 
     def stop(self, place: int) -> float:
         robot, self._robots[place] = self._robots[place], None
-        self.failures[place] = None
+        self.failures[place], self._phases[place] = None, ()
         return 0.0 if robot is None else robot.wall_time
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import dataclasses
 import weakref
 from time import perf_counter
 
@@ -37,6 +38,7 @@ from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
+from tetra_drake.robot.structure import with_origins
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import HeldSignals
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -81,6 +83,8 @@ class _DiagramRobot(LoneRobot):
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self.driven, self._record, self._viewer = driven, record, viewer
+        self._first = driven
+        """The driven robot at t = 0, before events."""
         robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
         engine = engine.model_copy(update={"scheme": engine.scheme or default_scheme(robot)})
         if driven.gait is not None:
@@ -149,15 +153,27 @@ class _DiagramRobot(LoneRobot):
         )
 
     def copied(self) -> _DiagramRobot:
-        copy = _DiagramRobot(self.driven, record=self._record, viewer=self._viewer)
+        robot = self.driven.robot
+        return self.become(robot, np.zeros((len(robot.structure.bodies), 3)))
+
+    def become(self, robot: Robot, p_BC: np.ndarray) -> _DiagramRobot:
+        driven = dataclasses.replace(self.driven, robot=robot)
+        copy = _DiagramRobot(driven, record=self._record, viewer=self._viewer)
+        copy._first, copy._speed_limit = self._first, self._speed_limit
         copy._marks, copy._change_end = self._marks.copy(), self._change_end
         copy._held, copy.wall_time = self._held, self.wall_time
         copy._work.before = self._work.total()
         copy._aimer.follow(self._aimer)
         copy._sampler.follow(self._sampler)
         write_tables(copy._observer.tally, self._observer.tally)
-        context = copy._simulator.get_mutable_context()
-        context.SetTimeStateAndParametersFrom(self._simulator.get_context())
+        before, context = self._simulator.get_context(), copy._simulator.get_mutable_context()
+        own = context.get_parameters().Clone()  # such as the masses
+        context.SetTimeStateAndParametersFrom(before)
+        context.get_mutable_parameters().SetFrom(own)
+        numbers, bodies = before.get_continuous_state_vector().CopyToVector(), 13 * len(p_BC)
+        numbers[:bodies] = with_origins(numbers[:bodies], p_BC)
+        context.SetContinuousState(numbers)
+        copy._sampler.restart(numbers)
         parameters = InitializeParams()
         parameters.suppress_initialization_events = True
         copy._simulator.Initialize(parameters)
@@ -166,7 +182,7 @@ class _DiagramRobot(LoneRobot):
     def result(self) -> SimulationResult:
         accuracy = self._simulator.get_integrator().get_target_accuracy()
         return make_result(
-            self.driven,
+            self._first,
             self._sampler.motion(),
             totals=self._observer.tally,
             work=self._work.total(str(self._engine.scheme), accuracy),
@@ -198,7 +214,7 @@ class _DiagramRobot(LoneRobot):
             moment = np.array([now]), bodies[np.newaxis], each[np.newaxis], drives[np.newaxis]
             self._observer.add(*moment)
         if viewer is not None and viewer.wants(now):
-            viewer.show(frame_of(robot, self._diagram, context))
+            viewer.show(frame_of(self._first.robot, self._diagram, context))
 
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:

@@ -39,7 +39,7 @@ class Engine:
         if brief < scenario.simulation.duration:
             times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
             changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
-            scenario = scenario.with_changes(changes)
+            scenario = scenario.with_sections(events=[]).with_changes(changes)
         with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
             self.simulate(driven_robot(scenario, seeded_gait(scenario)), record=True)
 

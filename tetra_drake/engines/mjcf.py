@@ -28,6 +28,7 @@ from tetra_drake.robot.structure import (
 )
 from tetra_drake.robot.xml_elements import add_element, xml_text
 from tetra_drake.scenario.engine_kinds import Mujoco
+from tetra_drake.scenario.events import up_to_each
 from tetra_drake.scenario.scenario import Scenario
 
 _IMPRATIO = 1000.0
@@ -58,7 +59,9 @@ def check_mjcf(scenario: Scenario) -> None:
         kind = type(scenario.terrain).__name__
         problem = f"found !{kind}, but mujoco simulates only planes, or no ground"
         raise InputError(scenario.name, "terrain", problem)
-    scenario.friction.cone(scenario.name)  # raises InputError for a law without a cone
+    for events in ([], *up_to_each(scenario.events)):
+        after = scenario.after(events)
+        after.friction.cone(scenario.name)  # raises InputError for a law without a cone
 
 
 def make_mjcf(robot: Robot, *, rest: np.ndarray | None = None, own_laws: bool = False) -> str:

@@ -22,6 +22,7 @@ The ground must be a plane, level or inclined, or there is none.
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 from time import perf_counter
 from typing import Any
@@ -53,6 +54,7 @@ from tetra_drake.robot.readings import Readings, readings_at
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
+from tetra_drake.robot.structure import with_origins
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.scenario import Scenario
 
@@ -121,7 +123,8 @@ class _MujocoRobot(LoneRobot):
         long, and InputError if MuJoCo refuses the robot."""
         import mujoco
 
-        self.driven, self._record, robot = driven, record, driven.robot
+        self.driven, self._record, self._robot = driven, record, driven.robot
+        robot = self._robot
         settings, self._step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
         self._steps = max(1, round(settings.duration / self._step))
         if self._steps > settings.max_evaluations:
@@ -132,6 +135,32 @@ class _MujocoRobot(LoneRobot):
             # The handler is not restored, because other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
+        self._make_model()
+        self._whole_state = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        self._state = np.empty(mujoco.mj_stateSize(self._model, self._whole_state))
+        mujoco.mj_getState(self._model, self._data, self._state, self._whole_state)
+        self._drives = robot.starting_drives()
+        self._speed_limit, self._observer = speed_limit(driven), Observer(driven)
+        self._motions: list[Motion] = []
+        """The motion up to the latest event, in parts."""
+        of_cables = robot.structure.cables["signal"]
+        self._motors = of_cables[of_cables != PASSIVE]  # index of each motor's signal
+
+        self._times = motion_times(settings, record=record)
+        self._due = np.rint(self._times / self._step).astype(int)  # numbers of the sampled steps
+        count = len(self._times)
+        self._states_kept = np.tile(self._state, (count, 1))
+        self._signals_kept = np.tile(robot.first_signals, (count, 1))
+        self._drives_kept = np.tile(self._drives, (count, 1))
+
+        self._done, self.wall_time = 0, 0.0
+        self._before = self._held = robot.first_signals
+        self._is_held = False
+        self._began = self._paused = 0.0
+
+    def _make_model(self) -> None:
+        """Makes MuJoCo's model of the present robot, at its start."""
+        mujoco, robot = self._mujoco, self._robot
         self._pulled, self._touches = is_pulled(robot), robot.model.strut_contact.acts
         self._parts = Packed((robot.model, Forces.of(robot.model)))
         try:
@@ -143,25 +172,31 @@ class _MujocoRobot(LoneRobot):
             problem = "is too long for the robot's springs or dampers"
             raise Diverged(time=0.0, reason=f"engine.step, {self._step:g} s, {problem}")
         self._data = mujoco.MjData(self._model)
-        self._whole_state = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        self._state = np.empty(mujoco.mj_stateSize(self._model, self._whole_state))
-        mujoco.mj_getState(self._model, self._data, self._state, self._whole_state)
-        self._drives = robot.starting_drives()
-        self._speed_limit, self._observer = speed_limit(driven), Observer(driven)
-        of_cables = robot.structure.cables["signal"]
-        self._motors = of_cables[of_cables != PASSIVE]  # index of each motor's signal
 
-        self._times = motion_times(settings, record=record)
-        self._due = np.rint(self._times / self._step).astype(int)  # numbers of the sampled steps
-        count = len(self._times)
-        self._states_kept = np.tile(self._state, (count, 1))
-        self._signals_kept = np.zeros((count, robot.structure.signals))
-        self._drives_kept = np.tile(self._drives, (count, 1))
+    def become(self, robot: Robot, p_BC: Array) -> _MujocoRobot:
+        after = self.copied()
+        known = sum(len(motion.times) for motion in self._motions)
+        passed = int(np.searchsorted(self._times, self._paused, side="right"))
+        after._motions = [*self._motions, self._kept(slice(known, passed))]
+        after._robot = robot
+        after._make_model()
+        after._observer = Observer(dataclasses.replace(self.driven, robot=robot))
+        write_tables(after._observer.tally, self._observer.tally)
+        # The last step may end after the event, with a sample.
+        after._state = self._moved(self._state[np.newaxis], p_BC)[0]
+        after._states_kept[passed:] = self._moved(self._states_kept[passed:], p_BC)
+        return after
 
-        self._done, self.wall_time = 0, 0.0
-        self._before = self._held = robot.first_signals
-        self._is_held = False
-        self._began = self._paused = 0.0
+    def _moved(self, states: Array, p_BC: Array) -> Array:
+        """MuJoCo's states (rows, numbers) of the same motion, after the origins of the bodies'
+        frames were moved to p_BC (bodies, 3) in m."""
+        moved, rows, end = states.copy(), len(states), 1 + self._model.nq
+        q, v = np.split(with_origins(self._body_states(states), p_BC), [end - 1], axis=1)
+        qpos, qvel = moved[:, 1:end].reshape(rows, -1, 7), moved[:, end:].reshape(rows, -1, 6)
+        qpos[:, :, :3] = q.reshape(rows, -1, 7)[:, :, 4:]
+        qvel[:, :, :3] = v.reshape(rows, -1, 6)[:, :, 3:]
+        moved[:, 1:] = np.hstack([qpos.reshape(rows, -1), qvel.reshape(rows, -1)])
+        return moved
 
     def copied(self) -> _MujocoRobot:
         copied = copy.copy(self)
@@ -187,7 +222,7 @@ class _MujocoRobot(LoneRobot):
         started = perf_counter()
         if self._done == 0 and len(signals) > 1:
             self._signals_kept[0] = signals[0]
-            start = self._body_states(self._states_kept[:1])
+            start = self._body_states(self._state[np.newaxis])
             self._observer.add(np.zeros(1), start, signals[:1], self._drives[np.newaxis])
         with Rollout(nthread=0) as rollout:
             for first in range(0, len(signals) - 1, _STRETCH):
@@ -279,7 +314,7 @@ class _MujocoRobot(LoneRobot):
         contact forces. `signals` (rows, m) are in N, `drives` (rows, drives) are the actuators'
         states."""
         mujoco, model, data = self._mujoco, self._model, self._mujoco.MjData(self._model)
-        ground, structure = self.driven.robot.ground, self.driven.robot.structure
+        ground, structure = self._robot.ground, self._robot.structure
         names = [structure.node_names[node] for node in structure.contacts]
         contact_of_geom = {model.geom(name).id: i for i, name in enumerate(names)}
         sites, wrench = [model.site(name).id for name in names], np.zeros(6)
@@ -306,7 +341,7 @@ class _MujocoRobot(LoneRobot):
         moment = self._motion(now, self._state[np.newaxis], signals, self._drives[np.newaxis])
         assert moment.ground_forces is not None
         return readings_at(
-            self.driven.robot,
+            self._robot,
             time=float(now[0]),
             state=moment.states[0],
             modes=moment.modes[0],
@@ -315,16 +350,22 @@ class _MujocoRobot(LoneRobot):
             ground_forces=moment.ground_forces[0],
         )
 
-    def result(self) -> SimulationResult:
-        signals = self._signals_kept
+    def _kept(self, rows: slice) -> Motion:
+        """The motion of the present robot at some of the times of the samples."""
+        times, signals = self._times[rows], self._signals_kept[rows]
         if not self._is_held:  # known at the times themselves
-            signals = self.driven.signals_at(self._times)
+            signals = self.driven.signals_at(times)
+        return self._motion(times, self._states_kept[rows], signals, self._drives_kept[rows])
+
+    def result(self) -> SimulationResult:
+        known = sum(len(motion.times) for motion in self._motions)
+        motions = [*self._motions, self._kept(slice(known, None))]
         return make_result(
             self.driven,
-            self._motion(self._times, self._states_kept, signals, self._drives_kept),
+            Motion.joined(motions),
             totals=self._observer.tally,
             work=IntegratorWork(
-                scheme=integrator_of(self.driven.robot, pulled=self._pulled),
+                scheme=integrator_of(self._robot, pulled=self._pulled),
                 accuracy=self._step,
                 steps=self._steps,
                 derivative_evaluations=self._steps,

@@ -38,6 +38,12 @@ class Sampler:
         """Copies the samples of another sampler, so that this one continues from there."""
         self._samples, self._latest = other._samples.copy(), other._latest
 
+    def restart(self, state: np.ndarray) -> None:
+        """Replaces the continuous state at the end of the latest step, as the frames of the bodies
+        were moved."""
+        if self._latest is not None:
+            self._latest = self._latest[0], state
+
     def after_step(self, context: Context) -> None:
         """Takes the samples within the step that has just ended. `context` is the simulator's."""
         due = self._times[len(self._samples) :]
@@ -62,9 +68,7 @@ class Sampler:
 
     def motion(self) -> Motion:
         """The motion up to now, at the times of the samples."""
-        names = "times", "states", "signals", "modes", "drives"
-        columns = ([getattr(sample, name) for sample in self._samples] for name in names)
-        return Motion(*map(np.concatenate, columns))
+        return Motion.joined(self._samples)
 
 
 def motion_at(diagram: Diagram, context: Context) -> Motion:

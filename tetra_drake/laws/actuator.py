@@ -39,6 +39,9 @@ LIMITS = "limited actuators"
 DIRECT, WINCH, TENSION_MOTOR = range(3)
 """Numbers of the kinds of actuators in kernels."""
 
+SOFTEST = 1e-300
+"""Least stiffness (N/m) in a quotient. A cut cable has none; its winch turns freely."""
+
 DRIVE, RATE, LIMITED, BESIDE, DRIVE_COLUMNS = range(5)
 """Columns of the table `drives`, and their number: state of an actuator (its drive), rate of the
 state per s, 1 if a limit binds or 0, and ActuatorForce.beside. Each actuator with a state has a
@@ -163,7 +166,8 @@ def winch_force(
     integrator cannot handle.
     """
     elastic = elastic_tension(length - drive, law)
-    wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
+    stiffness = maximum(law.stiffness, SOFTEST)
+    wanted = (law.free_length - signal / stiffness - drive) / limits.time_constant
     allowed = maximum(wanted, (limits.least_length - drive) / limits.time_constant)
     allowed = minimum(allowed, limits.max_speed)
     per_force = limits.max_speed / limits.max_force
@@ -202,8 +206,8 @@ def motor_force(
     target = minimum(maximum(command, 0.0), limits.max_force)
     limited = (drive > most) | (command > limits.max_force)
     return ActuatorForce(
-        tension=minimum(drive, most),
-        tension_per_rate=select(on_line, limits.max_force / limits.max_speed, 0.0),
+        tension=law.intact * minimum(drive, most),
+        tension_per_rate=select(on_line, law.intact * limits.max_force / limits.max_speed, 0.0),
         rate=(target - drive) / limits.time_constant,
         limited=select(limited, 1.0, 0.0),
         beside=0.0 * drive,

@@ -48,6 +48,14 @@ class CableLaw(NamedTuple):
     stiffness: Real
     damping: Real
     free_length: Real
+    intact: Real = 1.0
+    """0 for a cut cable, which no actuator pulls; otherwise 1. A cut cable has no stiffness and no
+    damping either."""
+
+    def cut(self) -> Self:
+        """These constants after the cable was cut: it has no tension, whatever its actuator
+        does."""
+        return self._replace(stiffness=0.0, damping=0.0, intact=0.0)
 
     @classmethod
     def of(cls, cables: Table) -> Self:
@@ -118,7 +126,7 @@ class Cables(NamedTuple):
 def law_of(cables: Cables, i: int) -> CableLaw:
     """Constants of cable i, from the tables of the constants of all cables."""
     law = cables.law
-    return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i])
+    return CableLaw(law.stiffness[i], law.damping[i], law.free_length[i], law.intact[i])
 
 
 DIRECTION, LENGTH, TENSION, TENSION_PER_RATE, RATE, CABLE_FORCE_COLUMNS = 0, 3, 4, 5, 6, 7

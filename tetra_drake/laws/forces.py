@@ -112,9 +112,9 @@ def pull_of_cable(
     state's rate and the other columns are written.
     """
     driver, signal = robot.cables.signal[i], 0.0
-    if driver != cable.PASSIVE:
-        signal = signals[driver]
     law = cable.law_of(robot.cables, i)
+    if driver != cable.PASSIVE:
+        signal = law.intact * signals[driver]
     if driver == cable.PASSIVE or not actuator.has_drive(robot.actuator):
         if not robot.slack:
             return cable.cable_tension(length, rate, signal, law), law.damping

@@ -208,11 +208,11 @@ def make_result(
     way = motion.at(instants)
     ends = motion.at(np.array([0.0, simulation.settling_time, simulation.duration]))
     samples = sample_times(simulation.duration, simulation.sample_period)
-    poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
+    poses = way.first_states(robot)[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses, structure)
     metrics = compute_metrics(
         robot,
-        nodes=np.array([node_positions(structure, state) for state in ends.states]),
+        nodes=np.array([node_positions(structure, state) for state in ends.first_states(robot)]),
         path=path,
         totals=totals,
         signals=way.signals[instants >= simulation.settling_time],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,8 +17,8 @@ from tetra_drake.laws.actuator import has_drive, wound
 from tetra_drake.laws.contact import STICK_POINT
 from tetra_drake.laws.forces import forces_of_motion
 from tetra_drake.laws.kinematics import P_WN, V_WN
-from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.robot import Phase, Robot
+from tetra_drake.robot.structure import Structure, with_origins
 
 if TYPE_CHECKING:
     import xarray
@@ -74,9 +75,34 @@ class Motion:
     def at(self, times: np.ndarray) -> Motion:
         """The motion at `times` (s), which must be among its own times: rows are selected, nothing
         is interpolated."""
-        rows = np.searchsorted(self.times, times)
+        return self._rows(np.searchsorted(self.times, times))
+
+    def _rows(self, rows: np.ndarray | slice) -> Motion:
         given = {name: table for name, table in vars(self).items() if table is not None}
         return Motion(**{name: table[rows] for name, table in given.items()})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Motion]) -> Motion:
+        """The motion of several parts, one after the other."""
+        first = {name: table for name, table in vars(parts[0]).items() if table is not None}
+        return cls(**{name: np.concatenate([vars(part)[name] for part in parts]) for name in first})
+
+    def by_phase(self, robot: Robot) -> list[tuple[Phase, Motion]]:
+        """The motion between the events of the robot's scenario, each part with its robot. At the
+        time of an event, the robot is still the one before."""
+        begins = [phase.begins for phase in robot.phases[1:]]
+        ends = np.searchsorted(self.times, [*begins, np.inf], side="right")
+        rows = zip([0, *ends], ends, strict=False)
+        return [
+            (phase, self._rows(slice(*which)))
+            for phase, which in zip(robot.phases, rows, strict=True)
+        ]
+
+    def first_states(self, robot: Robot) -> np.ndarray:
+        """States [q; v] (k, 13 n) of the frames that the bodies have at t = 0, whose origins are
+        their centres of mass then, before any event."""
+        parts = self.by_phase(robot)
+        return np.concatenate([with_origins(part.states, -phase.p_BC) for phase, part in parts])
 
 
 def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
@@ -99,9 +125,12 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     import xarray
 
     structure, bodies = robot.structure, len(robot.structure.bodies)
-    poses = motion.states[:, : 7 * bodies].reshape(-1, bodies, 7)
-    given = motion.states, motion.modes, motion.signals, motion.drives
-    nodes, cable_forces, ground_forces = forces_of_motion(robot.model, *given)
+    poses = motion.first_states(robot)[:, : 7 * bodies].reshape(-1, bodies, 7)
+    parts = [
+        forces_of_motion(phase.robot.model, part.states, part.modes, part.signals, part.drives)
+        for phase, part in motion.by_phase(robot)
+    ]
+    nodes, cable_forces, ground_forces = map(np.concatenate, zip(*parts, strict=True))
     if motion.ground_forces is not None:
         ground_forces = motion.ground_forces
     free_lengths = np.tile(structure.cables["free_length"], (len(motion.times), 1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -13,18 +14,19 @@ from tetra_drake.errors import InputError
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import cable
 from tetra_drake.laws.actuator import DrivenCables
-from tetra_drake.laws.contact import MODE_COLUMNS, Ground
+from tetra_drake.laws.contact import MODE_COLUMNS, Ground, NormalForce
 from tetra_drake.laws.feedback import Senses
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.mode_change import modes_after_step
 from tetra_drake.laws.model import Bodies, Model
 from tetra_drake.laws.oscillator import Network, steered_input
 from tetra_drake.laws.terrain import Flat
+from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import Equilibrium, Unactuated, find_equilibrium
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import lift, make_ground
 from tetra_drake.robot.network import SteeringSignal, Weights, checked_turn
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, with_origins
 from tetra_drake.robot.struts import (
     axial_forces,
     check_apart,
@@ -32,6 +34,7 @@ from tetra_drake.robot.struts import (
     elongated,
     strut_contact_law,
 )
+from tetra_drake.scenario.events import Event, blueprint_after, up_to_each
 from tetra_drake.scenario.scenario import Scenario
 
 MOST_CORRECTIONS = 100
@@ -53,6 +56,8 @@ class Robot:
     """Signals (m,) in N at t = 0. The actuators start in the state that fits these signals."""
     has_network: bool = True
     """False if the signals are given, by a command or a controller."""
+    before: Robot | None = None
+    """The robot at t = 0, if this one is what events have left of it; otherwise None."""
 
     @classmethod
     def of(cls, scenario: Scenario, *, at_rest: bool = False) -> Self:
@@ -60,13 +65,15 @@ class Robot:
         by the offsets of its bodies, on the scenario's terrain.
 
         Args:
-            at_rest: leaves out the offsets. Also allows struts to overlap at the positions of the
-                settings, because the search for the equilibrium may move them apart.
+            at_rest: leaves out the offsets and the events. Also allows struts to overlap at the
+                positions of the settings, because the search for the equilibrium may move them
+                apart.
 
         Raises:
             InputError: if the robot has no equilibrium, or would start in the ground, outside its
                 terrain or with struts that overlap.
         """
+        scenario = scenario.with_sections(events=[]) if at_rest else scenario
         placed = structure = _placed(scenario)
         check_apart(scenario, placed, may_overlap=at_rest)
         model = make_model(scenario.with_sections(terrain=Flat()), placed)
@@ -86,7 +93,9 @@ class Robot:
             raise InputError(scenario.name, "terrain", problem)
         structure = structure.turned(slope)
 
-        model = model._replace(ground=make_ground(scenario, structure))
+        loses = any(event.lose for event in scenario.events)
+        isotropic = model.isotropic and not loses  # a lost mass may change the moments of inertia
+        model = model._replace(ground=make_ground(scenario, structure), isotropic=isotropic)
         return cls(scenario, structure, model, first_signals=np.zeros(structure.signals))
 
     def without_network(self) -> Robot:
@@ -134,6 +143,8 @@ class Robot:
         """Equilibrium of the robot on flat ground without actuation, found at the first use. The
         scenario's terrain and the offsets of the bodies at the start are ignored. Raises InputError
         if there is no equilibrium."""
+        if self.before is not None:
+            return self.before.equilibrium
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
         return equilibrium_of(self.scenario, _placed(self.scenario))
@@ -143,6 +154,9 @@ class Robot:
         """Constants for the feedback from cable lengths and contacts to the oscillators; see
         laws.feedback. Raises InputError if the feedback of lengths needs the robot's equilibrium
         and there is none."""
+        if self.before is not None:
+            senses = self.before.senses
+            return senses._replace(per_length=senses.per_length * self.model.cables.law.intact)
         structure, pathways = self.structure, self.scenario.cpg.feedback if self.has_network else []
         drivers = structure.cables["signal"].copy()
         last = [max(structure.bodies_at(cables)) for cables in structure.groups]
@@ -158,6 +172,35 @@ class Robot:
             per_length=1.0 / (neutral * sizes),
             per_load=np.array([per_load]),
         )
+
+    @functools.cached_property
+    def phases(self) -> tuple[Phase, ...]:
+        """The robot from t = 0 on, and after each event of the scenario, in the order of time."""
+        start = Phase(0.0, self, np.zeros_like(self.structure.p_WB))
+        return start, *map(self._after, up_to_each(self.scenario.events))
+
+    def _after(self, events: Sequence[Event]) -> Phase:
+        """What is left of the robot after `events`, with its nodes at the same places."""
+        left = blueprint_after(self.structure, events)
+        mass, p_FC, unit_inertia = body_inertias(left)
+        p_BC = p_FC - body_inertias(self.structure)[1]
+        state = with_origins(self.structure.initial_state, p_BC)
+        structure = dataclasses.replace(
+            left,
+            p_BN=left.p_BN - np.vstack([p_BC, np.zeros(3)])[left.carriers],
+            mass=mass,
+            unit_inertia=unit_inertia,
+            p_WB=state[: 7 * len(mass)].reshape(-1, 7)[:, 4:],
+        )
+        changed = self.scenario.after(events)
+        normal = NormalForce(changed.ground.stiffness, changed.ground.damping)
+        ground = self.ground._replace(normal=np.array(normal), friction=changed.friction.law())
+        model = make_model(changed.with_sections(terrain=Flat()), structure)
+        model = model._replace(ground=ground, isotropic=self.model.isotropic)
+        robot = dataclasses.replace(
+            self, scenario=changed, structure=structure, model=model, before=self
+        )
+        return Phase(events[-1].at, robot, p_BC)
 
     def network(self, gait: Gait) -> Network:
         """Constants of the oscillator network that a gait gives this robot. Raises InputError if
@@ -226,6 +269,18 @@ class Robot:
         parts = Packed((self.model, Forces.of(self.model)))
         modes_after_step(parts, self.structure.initial_state, modes)
         return modes
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A robot between two events."""
+
+    begins: float
+    """Time (s) of the event before; 0 at the start."""
+    robot: Robot
+    p_BC: np.ndarray
+    """Positions (bodies, 3) in m of its bodies' centres of mass, the origins of their frames now,
+    in the frames that they have at t = 0."""
 
 
 def _placed(scenario: Scenario) -> Structure:

@@ -95,8 +95,9 @@ class Structure(Blueprint):
         cables["signal"] = cable.PASSIVE
         for oscillator, driven in enumerate(self.groups):
             cables["signal"][list(driven)] = oscillator
+        laws = [cable.CableLaw(**law) for law in self.cable_laws]
         for name in cable.CableLaw._fields:
-            cables[name] = [law[name] for law in self.cable_laws]
+            cables[name] = [getattr(law, name) for law in laws]
         return cables
 
     @functools.cached_property
@@ -229,6 +230,22 @@ def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
     nodes = np.empty((len(structure.node_names), kinematics.NODE_COLUMNS))
     kinematics.move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
+
+
+def with_origins(states: np.ndarray, p_BC: np.ndarray) -> np.ndarray:
+    """States [q; v] (..., 13*n) of the same motion of n bodies, after the origins of their frames
+    were moved to the points p_BC (n, 3) in m. Nothing is computed where no point is moved."""
+    if not p_BC.any():
+        return states
+    moved, bodies = states.copy(), len(p_BC)
+    q = moved[..., : 7 * bodies].reshape(*moved.shape[:-1], bodies, 7)
+    v = moved[..., 7 * bodies :].reshape(*moved.shape[:-1], bodies, 6)
+    scalar, vector = q[..., :1], q[..., 1:4]
+    turn = 2.0 / (q[..., :4] ** 2).sum(axis=-1, keepdims=True) * np.cross(vector, p_BC)
+    p_BC_W = p_BC + scalar * turn + np.cross(vector, turn)
+    q[..., 4:] += p_BC_W
+    v[..., 3:] += np.cross(v[..., :3], p_BC_W)
+    return np.concatenate([part.reshape(*moved.shape[:-1], -1) for part in (q, v)], axis=-1)
 
 
 def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:

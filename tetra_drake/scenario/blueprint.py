@@ -261,7 +261,8 @@ class Blueprint:
         """Raises InputError, naming the key of the robot's settings, if it cannot be simulated."""
         self.check_sizes()
         self._check_joints()
-        self._check_bodies()
+        self.check_masses()
+        self._check_places()
         self._check_cables()
 
         sizes = np.diff(self.first_node)
@@ -305,8 +306,8 @@ class Blueprint:
             if 0.0 < mass < LIGHTEST:
                 refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
-    def _check_bodies(self) -> None:
-        """Raises InputError for bodies of hardly any mass, and for two nodes at the same position.
+    def check_masses(self) -> None:
+        """Raises InputError for bodies of hardly any mass.
 
         The point masses of a body with several nodes do not count, as they have no inertia about
         the line between two of them.
@@ -332,6 +333,8 @@ class Blueprint:
             expected = f"expected at least {LIGHTEST:g} kg"
             refuse(f"nodes.{self.node_names[node]}", f"{problem}, {expected}")
 
+    def _check_places(self) -> None:
+        """Raises InputError for two nodes at the same position."""
         p_WN, least = self.p_WN, LEAST_DISTANCE * self.shortest
         for node in range(1, len(p_WN)):
             distances = np.linalg.norm(p_WN[:node] - p_WN[node], axis=1)

@@ -6,6 +6,7 @@ file.
 
 from __future__ import annotations
 
+import operator
 from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated
@@ -115,6 +116,15 @@ def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mappi
 Spread = Annotated[float, Field(gt=0, le=0.5)]
 
 
+class Cuts(Section):
+    """Cables that break in each draw of disturbances, chosen at random."""
+
+    count: int = Field(default=1, ge=1)
+    """Number of cables."""
+    at: Time = Field(default=0.0, ge=0)
+    """Time at which they break."""
+
+
 class Disturbances(Section):
     """Random changes of robot and surroundings during evolution. A draw is one set of such changes.
 
@@ -130,6 +140,9 @@ class Disturbances(Section):
     start: float = Field(default=0.0, ge=0, le=0.5)
     """Largest displacement of a body at t = 0 along x, y and up, as a share of the spacing of
     tetrahedra, or of the shortest strut of a structure. Each draw displaces every body."""
+    cuts: Cuts | None = Field(default=None, exclude_if=operator.not_)
+    """Cables that break in each draw; none if not given. A gait that copes is one that walks in all
+    draws."""
     tail: float = Field(default=1.0, gt=0, le=1)
     """Share of the draws, the worst ones, whose mean is a gait's fitness (the conditional value at
     risk). 1 is the mean over all draws. At least one draw counts."""

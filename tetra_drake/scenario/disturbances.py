@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.events import Event
 from tetra_drake.scenario.scenario import Scenario
 
 IterationSeed = tuple[int, int, int]
@@ -28,6 +29,8 @@ class Draw:
     moves: np.ndarray | None = None
     """Displacement of each body at t = 0 (n, 3), in m."""
     terrain_seed: int | None = None
+    events: tuple[Event, ...] = ()
+    """Events in addition to the scenario's: cables that break."""
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
@@ -42,18 +45,24 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
         factors[joined] = 1.0 + _stream(seed, *separate(joined)).uniform(-spread, spread)
     moves = _stream(seed, "start").uniform(-1.0, 1.0, (scenario.robot.body_count, 3))
     moves[:, 2] = np.abs(moves[:, 2])  # not into the ground
+    events: tuple[Event, ...] = ()
+    if (cuts := settings.cuts) is not None:
+        names = scenario.whole_cables
+        chosen = sorted(_stream(seed, "cuts").choice(len(names), cuts.count, replace=False))
+        events = (Event(at=cuts.at, cut=[names[number] for number in chosen]),)
     reach = settings.start * scenario.robot.size
     terrain_seed = int(_stream(seed, "terrain").integers(2**31))
     return Draw(
         factors=factors,
         moves=reach * moves if reach else None,
         terrain_seed=terrain_seed if hasattr(scenario.terrain, "seed") else None,
+        events=events,
     )
 
 
 def _stream(seed: Sequence[int], *names: str) -> np.random.Generator:
-    """Random generator for the disturbance of the scenario keys `names`, or "start" or "terrain".
-    Its numbers do not depend on which other disturbances there are."""
+    """Random generator for the disturbance of the scenario keys `names`, or "start", "terrain" or
+    "cuts". Its numbers do not depend on which other disturbances there are."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
@@ -73,7 +82,8 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
         robot = robot.model_copy(update={"offsets": offsets.tolist()})
     if draw.terrain_seed is not None:
         terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
-    return changed.with_sections(robot=robot, terrain=terrain, disturbances=None)
+    events = [*scenario.events, *draw.events]
+    return changed.with_sections(robot=robot, terrain=terrain, events=events, disturbances=None)
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:

@@ -27,7 +27,8 @@ _INTRODUCTION = """\
 
 - A quantity may have any unit that converts to the one given here.
 - A key without a default is in your file or in its `base`.
-- Of the kinds of a section, the first needs no tag. NAME stands for a name of your choice."""
+- Of the kinds of a section, the first needs no tag. NAME stands for a name of your choice,
+  [0] for any item of a list."""
 
 _WORDS = {"string": "text", "boolean": "true or false"}
 _LIMITS = {
@@ -61,11 +62,15 @@ def keys_page() -> str:
     parts, others = [_INTRODUCTION], []
     schema = Scenario.model_json_schema()
     for key, node in schema["properties"].items():
-        sections = [member for member in members_of(node, schema) if "$ref" in member]
+        items = node.get("items")
+        sections = [one for one in members_of(items or node, schema) if "$ref" in one]
+        inner = f"{key}[0]" if items else key
         for section in sections:
-            parts.append(f"## `{key}`" + (f": `{section['title']}`" if "title" in section else ""))
+            parts.append(
+                f"## `{inner}`" + (f": `{section['title']}`" if "title" in section else "")
+            )
             parts.append(" ".join(section["description"].split()))
-            rows = [row for row in keys_in(section, schema, key) if "description" in row[1]]
+            rows = [row for row in keys_in(section, schema, inner) if "description" in row[1]]
             parts += [_table_of_keys(rows)] if rows else []
         others += [] if sections else [(key, node)]
     parts += ["## Other keys", _table_of_keys(others)]
@@ -97,6 +102,8 @@ def _value(node: Tree) -> str:
         return " or ".join(_value(part) for part in node["anyOf"] if part != {"type": "null"})
     if "properties" in node:
         return "by metric"
+    if "$ref" in node:
+        return "mapping"
     if "additionalProperties" in node:
         return _value(node["additionalProperties"])
     unit = node.get("unit", "")

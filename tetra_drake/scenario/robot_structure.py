@@ -298,7 +298,7 @@ class StructureFile(Section):
         makes = [self.struts[strut.group] for strut in struts]
         ends = [[number[node] for node in strut.nodes] for strut in struts]
         cables = self._cables_of(number, body_of)
-        cable_numbers = _cable_numbers(cables["cable_names"])
+        numbers = cable_numbers(cables["cable_names"])
 
         return Blueprint(
             bodies=self._names_of_bodies(bodies, nodes),
@@ -327,7 +327,7 @@ class StructureFile(Section):
             contacts=np.array(sorted({number[node] for node in touching}), dtype=int),
             oscillators=tuple(self.actuated),
             groups=tuple(  # unknown cables are refused by _check_actuated()
-                tuple(cable_numbers[name] for name in names if name in cable_numbers)
+                tuple(numbers[name] for name in names if name in numbers)
                 for names in self.actuated.values()
             ),
         )
@@ -577,7 +577,7 @@ class StructureFile(Section):
     def _check_actuated(self, cable_names: Sequence[str]) -> None:
         """Raises InputError if `actuated` names a cable that is not among `cable_names`, the names
         of all cables, or gives a cable to a second oscillator."""
-        numbers, drivers = _cable_numbers(cable_names), dict[int, str]()
+        numbers, drivers = cable_numbers(cable_names), dict[int, str]()
         for oscillator, names in self.actuated.items():
             for i, name in enumerate(names):
                 key = f"actuated.{oscillator}[{i}]"
@@ -598,7 +598,7 @@ scenario.metrics), `unit`, `blueprint()` and `implied_changes()`.
 """
 
 
-def _cable_numbers(names: Iterable[str]) -> dict[str, int]:
+def cable_numbers(names: Iterable[str]) -> dict[str, int]:
     """Indices of cables by their names, such as "side n1 n2". Each cable is listed with its nodes
     in either order."""
     numbers: dict[str, int] = {}

@@ -6,6 +6,7 @@ import functools
 import itertools
 import json
 import math
+import operator
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -31,9 +32,10 @@ from tetra_drake.scenario.common_sections import (
     separate,
 )
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
+from tetra_drake.scenario.events import Event, check_taken, up_to_each
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.robot_structure import RobotKind
+from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import by_name
@@ -59,6 +61,9 @@ _WIDTH, _ROWS = 100, 20
 
 _OF_WEIGHTS = {name: inverse(unit) for name, unit in UNITS.items()}
 """Units of the weights in an objective, by metric."""
+
+CHANGEABLE = "friction.", "ground."
+"""First parts of the keys whose numbers an event may change."""
 
 MOST_SAMPLES = 2_000_000
 """Largest number of recorded poses of all bodies in one simulation. They need about 2 GB."""
@@ -89,6 +94,8 @@ class Scenario(Section):
     require: Annotated[dict[str, float], *by_name(UNITS)] = Field(default={})
     """Limits of metrics: a gait that does not meet one counts as failed. A file replaces all limits
     of its base."""
+    events: list[Event] = Field(default=[], exclude_if=operator.not_)
+    """Changes of robot or ground during the simulation, such as a cable that breaks."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()
@@ -190,6 +197,14 @@ class Scenario(Section):
         return *self.robot.lacking, *self.actuation.lacking
 
     @property
+    def whole_cables(self) -> list[str]:
+        """Names of the cables that no event cuts."""
+        names = self.robot.blueprint().cable_names
+        numbers = cable_numbers(names)
+        cut = {numbers[name] for event in self.events for name in event.cut}
+        return [name for number, name in enumerate(names) if number not in cut]
+
+    @property
     def draw_count(self) -> int:
         """Number of simulations per gait in evolution: one, or one per draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
@@ -224,6 +239,13 @@ class Scenario(Section):
         robot = changes.get("robot")
         implied = isinstance(robot, dict) and changed.robot.implied_changes(self.robot, robot)
         return self.from_tree(merged(tree, {"robot": implied}), source) if implied else changed
+
+    def after(self, events: Sequence[Event]) -> Self:
+        """Checked copy with the numbers that `events` change, and without events. Raises InputError
+        for a number that its key does not allow."""
+        alone = self.with_sections(events=[], disturbances=None)
+        changes = {key: number for event in events for key, number in event.change.items()}
+        return alone.with_changes(changes) if changes else alone
 
     def on_engine(self, name: str | None) -> Self:
         """This scenario with the engine called `name`, such as "compiled", in its default settings.
@@ -293,11 +315,45 @@ class Scenario(Section):
         return self
 
     @model_validator(mode="after")
+    def _check_events(self) -> Self:
+        """Refuses events after the end, unknown or repeated names, and changes that are no numbers
+        of ground or friction."""
+        if not self.events:
+            return self
+        check_taken(self.events, self.robot.blueprint())
+        changeable = [key for key in self.numbers() if key.startswith(CHANGEABLE)]
+        order = sorted(range(len(self.events)), key=lambda i: self.events[i].at)
+        for i, events in zip(order, up_to_each(self.events), strict=True):
+            place, event = f"events[{i}]", self.events[i]
+            self._check_time(f"{place}.at", event.at)
+            if not (event.cut or event.lose or event.change):
+                refuse(place, "changes nothing, expected cut, lose or change")
+            for key in event.change:
+                if key not in changeable:
+                    found = f"'{key}' is no number of ground or friction"
+                    refuse(f"{place}.change", f"{found}; {hint(key, changeable)}")
+            try:
+                self.after(events)
+            except InputError as error:
+                refuse(f"{place}.change.{error.key}", error.problem)
+        return self
+
+    def _check_time(self, key: str, time: float) -> None:
+        end = self.simulation.duration
+        if time >= end:
+            refuse(key, f"found {time:g} s, expected less than the duration, {end:g} s")
+
+    @model_validator(mode="after")
     def _check_disturbances(self) -> Self:
         """Raises InputError if `disturbances` name no number of the scenario, or if their largest
         changes would make a number invalid."""
         if self.disturbances is None:
             return self
+        if cuts := self.disturbances.cuts:
+            self._check_time("disturbances.cuts.at", cuts.at)
+            whole = len(self.whole_cables)
+            if cuts.count > whole:
+                refuse("disturbances.cuts.count", f"found {cuts.count}, expected at most {whole}")
         undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
         for joined, spread in self.disturbances.spreads.items():
             place, keys = f"disturbances.spreads.{joined}", separate(joined)

@@ -45,13 +45,13 @@ from tetra_drake.settings.section import varied, written
 from tetra_drake.study.statistics import interval, json_rows, share_interval
 
 NOTHING, ALL = "nothing", "all"
-START, TERRAIN = "displaced start", "terrain seed"
+START, TERRAIN, CUTS = "displaced start", "terrain seed", "cut cables"
 """Names of the changes that are not scenario keys."""
 
 PERCENT, DRAWS = 5.0, 200
 ALONE = 8
-"""Number of draws whose initial positions and terrain seed are also simulated as the only
-disturbance."""
+"""Number of draws whose initial positions, terrain seed and cut cables are each also simulated as
+the only disturbance."""
 
 LOSS = 0.1
 """Largest loss of distance, as a share of the undisturbed distance, for which a gait "keeps" a
@@ -93,8 +93,8 @@ class Judgement:
     """A row per gait and draw. Further columns: the number of the draw, and a factor for each key
     of the scenario's spreads."""
     alone: pandas.DataFrame
-    """A row per gait and single change. More columns: what (a key, START or TERRAIN), spread (the
-    relative change of the key), draw (the draw that start or terrain seed are taken from)."""
+    """A row per gait and single change. More columns: what (a key, START, TERRAIN or CUTS),
+    spread (the relative change of the key), draw (the draw that what is no key is taken from)."""
 
     def compared(self, table: pandas.DataFrame) -> pandas.DataFrame:
         """A copy of `table`, one of the tables of this Judgement, with three more columns:
@@ -183,6 +183,8 @@ def robustness(
             if draw.terrain_seed is not None:
                 seeded = Draw({}, terrain_seed=draw.terrain_seed)
                 plan.append(({"what": TERRAIN, "draw": i}, seeded))
+            if draw.events:
+                plan.append(({"what": CUTS, "draw": i}, Draw({}, events=draw.events)))
 
     rows = _simulated(scenario, plan, walkers, workers)
     changed = [row for row in rows if row["what"] not in (NOTHING, ALL)]

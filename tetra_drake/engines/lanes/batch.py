@@ -36,7 +36,9 @@ from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.command import driven_robot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
+from tetra_drake.robot.structure import with_origins
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.scenario import Scenario
 
@@ -100,9 +102,8 @@ class LaneBatch(Batch):
             return False
         self.stop(place)
         start, heights = prepared.start, robot.robot.ground.heights
-        constants, state = self._places.constants[place], self._places.states[place]
-        constants[:] = numbers_of(prepared.constants)
-        constants[self._first_height] = place * self._heights.shape[1]
+        state = self._places.states[place]
+        self._put_constants(place, prepared.constants)
         self._heights[place, : heights.size] = heights
         network = prepared.constants.network
         for thread in self._threads:  # one range of inhibiting neurons, the widest, for all lanes
@@ -126,13 +127,28 @@ class LaneBatch(Batch):
         self.readings.time[place] = 0.0
         self._wall_times[place] = self._tried[place] = 0.0
         self._controlled[place] = robot.is_controlled
+        self._phases[place] = robot.robot.phases
         return True
+
+    def _put_constants(self, place: int, constants: loop.Constants) -> None:
+        self._places.constants[place] = numbers_of(constants)
+        self._places.constants[place, self._first_height] = place * self._heights.shape[1]
+
+    def _become(self, place: int, robot: Robot, p_BC: np.ndarray) -> None:
+        prepared = self._prepared[place]
+        assert prepared is not None
+        model = robot.model._replace(ground=robot.ground._replace(heights=None))
+        changed = prepared.constants._replace(robot=model, senses=robot.senses)
+        self._put_constants(place, changed)
+        bodies = self._places.states[place, -13 * len(p_BC) :]  # step.state, the last numbers
+        bodies[:] = with_origins(bodies, p_BC)
 
     def stop(self, place: int) -> float:
         for thread in self._threads:
             thread.leave(place)
         self._status[place] = loop.IDLE
         self._prepared[place] = self.failures[place] = None
+        self._phases[place] = ()
         return float(self._wall_times[place])
 
     def copy(self, place: int, to: int) -> None:
@@ -149,6 +165,7 @@ class LaneBatch(Batch):
             table[to] = table[place]
         self._places.constants[to, self._first_height] = to * self._heights.shape[1]
         self._prepared[to], self.failures[to] = self._prepared[place], self.failures[place]
+        self._phases[to] = self._phases[place]
 
     def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         places, log = self._places, self._log

@@ -1,0 +1,153 @@
+"""Events: cables that break, masses that fall off and friction that changes, on all engines."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.actuations import LIMITED
+from helpers.anchored import floating_prism
+from helpers.converged import shortly
+from helpers.states import energy_and_momenta
+
+from tetra_drake.engines.engine import engine_of
+from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.laws.kinematics import P_WN, V_WN
+from tetra_drake.robot.command import Command, controlled_robot
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.robot.structure import moved_nodes
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.scenario import Scenario
+
+CUT, LOST, MASS = "T1-T2 outer top", "n0", 0.05
+
+
+def with_mass(**changes: Any) -> Scenario:
+    """The prism without weight, with a mass at a node."""
+    prism = floating_prism(**changes)
+    return prism.with_changes({"robot.masses": {LOST: f"{MASS} kg"}})
+
+
+def test_a_cut_takes_the_energy_of_its_spring_and_a_loss_the_momentum_of_its_mass():
+    events = [{"at": "0.2 s", "cut": ["side n3 n0"]}, {"at": "0.3 s", "lose": [LOST]}]
+    offsets = [["0 m", "2 mm", "1 mm"], ["0 m", "0 m", "0 m"], ["3 mm", "0 m", "0 m"]]
+    changes = {
+        f"robot.cables.{group}.damping": "0 N*s/m" for group in floating_prism().robot.cables
+    }
+    changes |= {
+        "robot.offsets": offsets,
+        "events": events,
+        "engine": "!Compiled {tolerance: 1e-7 m/s}",
+    }
+    scenario = with_mass(duration=0.5).with_changes(changes)
+    robot = controlled_robot(scenario)
+    driven = DrivenRobot(robot=robot, name="still", samples=robot.first_signals[np.newaxis])
+    batch = engine_of(scenario).start([driven], record=True)
+    batch.advance()
+
+    parts = batch.motion(0).by_phase(robot)
+    sums = [
+        np.array([energy_and_momenta(phase.robot, state) for state in part.states])
+        for phase, part in parts
+    ]
+    assert [len(part) > 5 for part in sums] == [True] * 3
+    size = np.abs(sums[0]).max(axis=0) + 1e-4
+    for own in sums:
+        assert (np.ptp(own, axis=0) < 2e-5 * size).all()
+    structure = robot.structure
+    (number,) = np.flatnonzero(parts[1][0].robot.structure.cables["intact"] == 0.0)
+    assert structure.cable_names[number] in ("side n3 n0", "side n0 n3")
+    for k, (before, after) in enumerate(itertools.pairwise(sums)):
+        structure = parts[k][0].robot.structure
+        nodes, law = moved_nodes(structure, parts[k][1].states[-1]), structure.cables[number]
+        p_WN, v_WN = (nodes[:, first : first + 3] for first in (P_WN, V_WN))
+        taken = np.zeros(7)
+        if k == 0:
+            length = np.linalg.norm(p_WN[law["node_b"]] - p_WN[law["node_a"]])
+            taken[0] = 0.5 * law["stiffness"] * (length - law["free_length"]) ** 2
+        else:
+            p, v = (x[structure.node_names.index(LOST)] for x in (p_WN, v_WN))
+            taken = np.hstack([0.5 * MASS * v @ v, MASS * v, np.cross(p, MASS * v)])
+        assert np.abs(taken).max() > 1e-5
+        np.testing.assert_allclose(before[-1] - after[0], taken, rtol=0.0, atol=2e-5 * size.max())
+
+
+@pytest.fixture
+def walk(engine: str) -> Scenario:
+    """A walk of two tetrahedra on an engine."""
+    changes = {"engine": engine, "robot.tetrahedra": 2, "friction.stiffness": "0 N/m"}
+    return shortly(load_scenario("coulomb"), 0.4, **{"cpg.gain": "4 lbf"}).with_changes(changes)
+
+
+def test_events_at_the_start_give_the_changed_scenario(walk):
+    gait = seeded_gait(walk, 1)
+    slippery = {"friction.kinetic": 0.1, "friction.static": 0.1}
+    walks = [
+        simulate(walk.with_changes(changes), gait, record=True).trajectory
+        for changes in (slippery, {"events": [{"at": "0 s", "change": slippery}]}, {})
+    ]
+    changed, event, plain = (walk.p_WN.values for walk in walks)
+    within = 1e-5 if walk.engine_name == "drake" else 1e-12  # its integrator begins anew
+    np.testing.assert_allclose(event, changed, rtol=0.0, atol=within)
+    assert np.abs(event - plain).max() > 1e-4
+
+
+def test_a_cut_cable_has_no_tension_in_steps_of_a_program_and_in_a_command(walk):
+    events = [{"at": "0.1303 s", "cut": ["T1-T2 outer bottom_left"]}]
+    scenario = walk.with_changes({"events": events})
+    actions = 2.0 + np.sin(np.arange(20))[:, np.newaxis] * [1.0, -1.0]
+    simulation = Simulation(scenario, record=True)
+    for each in actions:
+        readings = simulation.step(each)
+    steps = simulation.result().trajectory
+    command = simulate(scenario, command=Command("same", 0.02, actions), record=True).trajectory
+    for trajectory in (steps, command):
+        tension = trajectory.tension.sel(cable="T1-T2 outer bottom_left")
+        assert (tension[trajectory.time <= 0.1303] > 1.0).all()
+        assert (tension[trajectory.time > 0.131] == 0.0).all()
+    assert readings.tensions[0, 0] == 0.0
+    within = 1e-3 if walk.engine_name == "drake" else 1e-6
+    np.testing.assert_allclose(steps.p_WN, command.p_WN, rtol=0.0, atol=within)
+
+
+@pytest.mark.parametrize("kind", LIMITED)
+def test_the_actuator_of_a_cut_cable_turns_freely(kind):
+    prism = shortly(load_scenario("prism"), 0.5, engine="!Compiled", actuation=LIMITED[kind])
+    driven = prism.robot.actuated[next(iter(prism.robot.actuated))][0]
+    scenario = prism.with_changes({"events": [{"at": "0.2 s", "cut": [driven]}]})
+    cable = simulate(scenario, seeded_gait(scenario, 1), record=True).trajectory.sel(cable=driven)
+    after = cable.isel(time=cable.time.values > 0.2)
+    assert (after.tension == 0.0).all() and (cable.tension[:5] > 0.0).all()
+    start = float(cable.free_length[0])
+    assert float(after.free_length[-1]) == pytest.approx(start, abs=1e-6)
+
+
+def test_a_robot_with_an_event_disturbs_no_other_in_its_batch():
+    scenario = shortly(load_scenario("thesis"), 0.4, engine="!Compiled")
+    lost = scenario.with_changes({"robot.payload": ["9 g"] * 5})
+    events = [{"at": "0.2 s", "cut": [CUT]}, {"at": "0.2 s", "lose": ["T2", "T5"]}]
+    scenarios = [scenario, lost.with_changes({"events": events}), lost]
+    gait = seeded_gait(scenario, 2)
+    together = simulate_many(scenarios, [gait] * 3, workers=1)
+    alone = [simulate(each, gait).metrics for each in scenarios]
+    assert [result.metrics for result in together] == alone
+    assert len({metrics.distance for metrics in alone}) == 3
+
+
+def test_drawn_missing_cables_repeat_with_their_seed():
+    cuts = {"draws": 3, "cuts": {"count": 2, "at": "0.1 s"}}
+    events = [{"at": "0.2 s", "cut": [CUT]}]
+    scenario = load_scenario("thesis").with_changes({"events": events, "disturbances": cuts})
+    draws = [draw_disturbances(scenario, (seed,)) for seed in (*range(40), 0)]
+    assert draws[0].events == draws[-1].events != draws[1].events
+    names = {name for draw in draws for event in draw.events for name in event.cut}
+    assert len(names) == 23 and CUT not in names
+    changed = disturbed(scenario, draws[0])
+    first, *_ = Robot.of(changed).phases[1:]
+    assert first.begins == 0.1
+    cut = np.array(first.robot.structure.cable_names)[first.robot.model.cables.law.intact == 0.0]
+    assert cut.tolist() == changed.events[1].cut and len(cut) == 2

@@ -1,0 +1,92 @@
+"""Events during a simulation: cables that break, masses that fall off, a ground that changes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TypeVar
+
+from pydantic import Field
+
+from tetra_drake.errors import InputError
+from tetra_drake.laws.cable import CableLaw
+from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.scenario.robot_structure import cable_numbers
+from tetra_drake.settings.quantities import Keyed, Time
+from tetra_drake.settings.refusals import hint, refuse
+from tetra_drake.settings.section import Section
+
+BlueprintT = TypeVar("BlueprintT", bound=Blueprint)
+
+
+class Event(Section):
+    """Change of robot or ground during the simulation. The time step ends there."""
+
+    at: Time = Field(ge=0)
+    """Time of the event."""
+    cut: list[str] = Field(default=[])
+    """Names of cables that break, such as T1-T2 outer top or side n1 n2. A cut cable has no
+    tension, and its actuator turns freely."""
+    lose: list[str] = Field(default=[])
+    """Point masses that fall off: nodes in `masses` of a structure, or bodies with a `payload` of a
+    row. The rest of the body keeps its velocity."""
+    change: Keyed[str, float | str] = Field(default={})
+    """New numbers by scenario key, such as friction.static, of the ground and its friction."""
+
+
+def up_to_each(events: Sequence[Event]) -> list[list[Event]]:
+    """For each event, in the order of time, all events up to it."""
+    ordered = sorted(events, key=lambda event: event.at)
+    return [ordered[: k + 1] for k in range(len(ordered))]
+
+
+def blueprint_after(blueprint: BlueprintT, events: Sequence[Event]) -> BlueprintT:
+    """Copy of a blueprint without the cables and point masses that `events` take away. The cables
+    stay in its lists."""
+    numbers, laws = cable_numbers(blueprint.cable_names), [*blueprint.cable_laws]
+    node_mass, payload = blueprint.node_mass.copy(), blueprint.payload.copy()
+    for event in events:
+        for cable in (numbers[name] for name in event.cut):
+            laws[cable] = CableLaw(**laws[cable]).cut()._asdict()
+        for name in event.lose:
+            of_nodes = name in blueprint.node_names
+            masses = node_mass if of_nodes else payload
+            masses[(blueprint.node_names if of_nodes else blueprint.bodies).index(name)] = 0.0
+    return dataclasses.replace(
+        blueprint, cable_laws=tuple(laws), node_mass=node_mass, payload=payload
+    )
+
+
+def check_taken(events: Sequence[Event], blueprint: Blueprint) -> None:
+    """Refuses names of cables and point masses that the robot does not have or that two events take
+    away, and the loss of all of a body's mass. Keys begin with "events"."""
+    cables = cable_numbers(blueprint.cable_names)
+    masses = {name: number for number, name in enumerate(_point_masses(blueprint))}
+    taken: dict[object, str] = {}
+    for i, event in enumerate(events):
+        place = f"events[{i}]"
+        named = [(f"{place}.cut[{k}]", name, cables) for k, name in enumerate(event.cut)]
+        named += [(f"{place}.lose[{k}]", name, masses) for k, name in enumerate(event.lose)]
+        for key, name, known in named:
+            if name not in known:
+                what = "cable" if known is cables else "point mass"
+                refuse(key, f"found unknown {what} '{name}'; {hint(name, known)}")
+            earlier = taken.setdefault((known is cables, known[name]), key)
+            if earlier != key:
+                refuse(key, f"found '{name}', which {earlier} takes away; expected it once")
+        try:
+            blueprint_after(blueprint, events[: i + 1]).check_masses()
+        except InputError as error:
+            refuse(f"{place}.lose", f"{error.key} {error.problem}")
+
+
+def _point_masses(blueprint: Blueprint) -> list[str]:
+    """Names of the nodes and bodies with a point mass. A body whose mass is given in place of its
+    parts has none that could be lost."""
+    of_nodes = zip(blueprint.node_names, blueprint.node_mass, blueprint.carriers, strict=True)
+    given, of_bodies = (
+        blueprint.given_inertia,
+        zip(blueprint.bodies, blueprint.payload, strict=True),
+    )
+    names = [name for name, mass, body in of_nodes if mass > 0.0 and body not in given]
+    return names + [name for name, mass in of_bodies if mass > 0.0]
