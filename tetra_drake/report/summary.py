@@ -107,7 +107,7 @@ def run_text(run: Run) -> str:
         best = run.fittest()
         gaits = [run.initial_best(best["trial"]), best]
         texts.append(metrics_table(["initially", "best"], gaits, run.scenario).text())
-        if still := stillness_remark(Robot.of(run.scenario), best["distance"]):
+        if still := stillness_remark(Robot.of(run.best_scenario()), best["distance"]):
             texts.append(sentence(still))
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
