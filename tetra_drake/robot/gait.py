@@ -279,8 +279,10 @@ class ParameterSpace:
         for key in self.free_body:
             if key not in given:
                 raise InputError("ParameterSpace", f"gait {gait.name}", f"lacks the body's {key}")
-            unit = getattr(self.evolve[key][0], "unit", "")
-            body.append(given_quantity(str(given[key]), unit, f"gait {gait.name}", key))
+            unit, value = getattr(self.evolve[key][0], "unit", ""), given[key]
+            if isinstance(value, str):
+                value = given_quantity(value, unit, gait.name, key)
+            body.append(value)
         return np.concatenate([weights, gains, body, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:

@@ -64,7 +64,7 @@ class GaitBounds(Section):
         return self
 
 
-BodyBound = Annotated[Any, WithJsonSchema({"type": ["string", "number"]})]
+BodyBound = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})]
 """A bound of a number in SI, or a text with a unit. Its key decides which units are possible."""
 
 BodyBounds = Annotated[

@@ -8,7 +8,7 @@ import json
 import math
 import operator
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
@@ -304,11 +304,11 @@ class Scenario(Section):
     def _check_evolve(self) -> Self:
         """Raises InputError if `evolve` names no number of the robot, or has bounds that the number
         cannot have. Converts the bounds to SI numbers with units."""
-        fixed, numbers = self.with_sections(evolve={}), self.numbers() if self.evolve else {}
+        fixed = self.with_sections(evolve={})
         for joined, bounds in self.evolve.items():
             place, keys, tree = f"evolve.{joined}", separate(joined), fixed.model_dump()
             for key in keys:
-                self._check_body_key(key, value_at(tree, key), numbers, place)
+                self._check_body_key(key, value_at(tree, key), place)
             for index, bound in enumerate(bounds):
                 try:
                     changed = fixed.with_changes(dict.fromkeys(keys, bound))
@@ -321,22 +321,22 @@ class Scenario(Section):
                 refuse(place, f"found {low} to {high}, expected the least value first")
         return self
 
-    @staticmethod
-    def _check_body_key(key: str, value: Any, numbers: Iterable[str], place: str) -> None:
+    def _check_body_key(self, key: str, value: Any, place: str) -> None:
         """Raises InputError, naming `place`, unless `key` is a key of a number of the robot.
         `value` is its value in the scenario; None if there is none."""
         if key.partition(".")[0] not in BODY_SECTIONS:
             expected = f"expected a key of {listed(BODY_SECTIONS)}"
             refuse(place, f"'{key}' is no key of the robot, {expected}")
         if value is None:
-            own = [number for number in numbers if number.startswith(BODY_SECTIONS)]
+            own = [name for name in self.values() if name.startswith(BODY_SECTIONS)]
             refuse(place, f"'{key}' is no number of the scenario; {hint(key, own)}")
         if isinstance(value, int) and not isinstance(value, bool):
             refuse(
                 place, f"'{key}' is a count, expected a number that leaves the structure as it is"
             )
         if not isinstance(value, float):
-            refuse(place, f"found {described(value)}, expected the key of a number")
+            example = f", such as {key}[0]" if isinstance(value, list) else ""
+            refuse(place, f"found {described(value)}, expected the key of a number{example}")
 
     @model_validator(mode="after")
     def _check_disturbances(self) -> Self:
@@ -344,7 +344,8 @@ class Scenario(Section):
         changes would make a number invalid."""
         if self.disturbances is None:
             return self
-        undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
+        undisturbed = self.with_sections(disturbances=None, evolve={})
+        numbers = self.numbers()
         for joined, spread in self.disturbances.spreads.items():
             place, keys = f"disturbances.spreads.{joined}", separate(joined)
             for key in keys:
