@@ -25,6 +25,7 @@ from tetra_drake.study.sweep import sweep
 
 SIDE, UPPER = "robot.cables.side.stiffness", "robot.nodes.n3[2], robot.nodes.n4[2]"
 BODY = {SIDE: ["50 N/m", "0.4 kN/m"], "friction.kinetic": [0.4, 0.5], UPPER: ["15 cm", "17 cm"]}
+DRAWN = {"disturbances": {"draws": 2, "spreads": {SIDE: 0.2}}}
 LEARNING = [SteadyState(population=8), CmaEs(sample=8)]
 ALL = [*LEARNING, RandomSearch(), QualityDiversity()]
 
@@ -74,19 +75,20 @@ def test_a_stiffness_is_found_whose_best_is_known(tmp_path, kind):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_vectors_stay_within_the_bounds_of_a_body_and_come_near_them(prism, kind, sign):
     space = ParameterSpace.of(prism)
-    body, width = space.body, (space.high - space.low)[space.body]
+    body = space.body
     assert space.names[body] == tuple(BODY)
 
     def share(vector):
-        return float(((vector - space.low)[body] / width).mean())
+        return float(((vector - space.low) / (space.high - space.low))[body].mean())
 
     def judged(vector):
         return Evaluation(2.0 + sign * share(vector), {"travelling_index": 0.5, "lifted": 0.5})
 
     optimizer = optimizer_of(kind)(space, prism.evolution, np.random.default_rng(4))
     vectors = np.concatenate(optimise(optimizer, judged, 400)[0])
-    assert (vectors[:, body] >= space.low[body]).all()
-    assert (vectors[:, body] <= space.high[body]).all()
+    assert np.array_equal(
+        vectors[:, body], vectors[:, body].clip(space.low[body], space.high[body])
+    )
     best = max(vectors, key=lambda vector: sign * share(vector))
     assert abs(share(best) - 0.5 - 0.5 * sign) < (0.25 if kind == RandomSearch() else 0.1)
     assert np.array_equal(space.vector(space.gait(best, name="best")), best)
@@ -103,18 +105,18 @@ def test_a_gait_has_its_body_wherever_it_is_simulated(prism, run):
     changes = {"robot.cables.top.stiffness": ["150 N/m"]}
     swept = sweep(prism, [seeded_gait(own), gait], changes).fitness.to_numpy()[0]
     assert swept[1] == sweep(own, bare, changes).fitness.item() != swept[0]
-    judged = [robustness(s, {0: g}, draws=2, alone=False) for s, g in ((run, gait), (own, bare))]
-    assert judged[0].draws.equals(judged[1].draws)
+    pairs = (prism.with_changes(DRAWN), gait), (own.with_changes(DRAWN), bare)
+    judged = [robustness(s, {0: g}, draws=2, alone=False).draws for s, g in pairs]
+    assert judged[0].equals(judged[1])
     assert f'href="trial_00/{BEST_SCENARIO}"' in (run.directory / "report.html").read_text()
 
 
 def test_disturbances_change_the_evolved_body(prism):
-    drawn = prism.with_changes({"disturbances": {"draws": 2, "spreads": {SIDE: 0.2}}})
+    drawn = prism.with_changes(DRAWN)
     space = ParameterSpace.of(drawn)
     vector = space.random(np.random.default_rng(2))
     own, _ = with_body(drawn, space.gait(vector, name="it"))
-    bare = np.delete(vector, space.body)
-    expected = GaitEvaluation(own)(*tasks_of([bare], (1, 2, 3)))
+    expected = GaitEvaluation(own)(*tasks_of([np.delete(vector, space.body)], (1, 2, 3)))
     with in_lanes(pickle.loads(pickle.dumps(GaitEvaluation(drawn))), 1) as submit:
         found = evaluated(submit, tasks_of([vector], (1, 2, 3)))[0]
     assert found.draws == expected.draws and len({*found.draws["fitness"]}) == 2
@@ -139,11 +141,10 @@ def test_a_body_that_cannot_be_fails_with_a_reason(prism, bounds, reason, seed):
     space = ParameterSpace.of(scenario)
     vector = space.random(np.random.default_rng(2))
     vector[space.body] = space.high[space.body]
-    (task,) = tasks_of([vector], seed)
+    failure = GaitEvaluation(scenario)(*tasks_of([vector], seed)).failure
+    assert "no start" in failure and reason in failure, failure
     with in_lanes(GaitEvaluation(scenario), 1) as submit:
-        found = evaluated(submit, [task])[0]
-    assert found.failure == GaitEvaluation(scenario)(task).failure and "no start" in found.failure
-    assert reason in found.failure, found.failure
+        assert evaluated(submit, tasks_of([vector], seed))[0].failure == failure
 
 
 def test_a_gait_file_with_a_wrong_body_is_refused(tmp_path, prism, run, refused):
@@ -164,12 +165,10 @@ def test_a_gait_file_with_a_wrong_body_is_refused(tmp_path, prism, run, refused)
         (SIDE, ["4 s", "50 N/m"], "found '4 s', expected a quantity that converts to N/m"),
         (SIDE, [4.0, "50 N/m"], "found 4.0 without a unit"),
         (SIDE, ["-4 N/m", "50 N/m"], "found '-4 N/m', expected greater than 0"),
-        (SIDE, ["50 N/m"], "found a list, expected at least 2 items, not 1"),
         (f"{SIDE}, friction.static", ["50 N/m", "60 N/m"], "expected a valid number"),
         ("robot.cables.side.stifness", ["5 N/m", "6 N/m"], f"did you mean '{SIDE}'?"),
         ("robot.cables.side.pairs", ["5 N/m", "6 N/m"], "found a list, expected the key of"),
         ("robot.nodes.n3.z", ["5 cm", "6 cm"], "did you mean 'robot.nodes.n3'?"),
-        ("cpg.signals", [1.0, 2.0], "found 'listing', expected the key of a number"),
         ("friction.kinetic", [0.1, 0.9], "found 0.9, expected at most static, 0.5"),
         ("gait_bounds.tau_a_min", ["0.1 s", "0.2 s"], "is no key of the robot, expected a key of"),
         ("engine.tolerance", ["1 m/s", "2 m/s"], "is no key of the robot, expected a key of"),
