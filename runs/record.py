@@ -92,10 +92,22 @@ def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, An
 
 
 _SHORT, _SETTLED = _by(CmaEs(), 3, 2000), _by(CmaEs(), 10, 2000)
-_STRUCTURE = _by(CmaEs(), 3, 1500) | {
-    "simulation.duration": "15 s",
-    "require": {"clearance": "8 mm", "tension": 0.0},  # 8 mm: the diameter of the thickest struts
+_APART = {"require": {"clearance": "8 mm", "tension": 0.0}}
+"""Requirements: struts do not touch, 8 mm being the thickest's diameter, and cables never push."""
+
+_STRUCTURE = _by(CmaEs(), 3, 1500) | {"simulation.duration": "15 s"} | _APART
+
+_BODY = {
+    "evolve": {
+        "robot.cables.bottom.stiffness": ["50 N/m", "200 N/m"],
+        "robot.cables.top.stiffness": ["50 N/m", "200 N/m"],
+        "robot.cables.side.stiffness": ["50 N/m", "200 N/m"],
+        "robot.cables.side.free_length": ["7 cm", "13 cm"],
+        "robot.nodes.n3[2], robot.nodes.n4[2], robot.nodes.n5[2]": ["12 cm", "20 cm"],
+    }
 }
+"""Numbers of a prism that evolve: cables, and the height of the upper nodes, which gives the
+lengths of the struts."""
 
 EXPERIMENTS = {
     "thesis": Experiment("the thesis's experiment, ten trials", "thesis", {}),
@@ -147,6 +159,16 @@ EXPERIMENTS = {
         "gaits that differ, the fittest of each kind", "thesis", _by(QualityDiversity(), 1, 30000)
     ),
     "prism": Experiment("a prism of three struts", "prism", _STRUCTURE, film=True),
+    "co-evolution": Experiment(
+        "a prism whose body evolves with its gait, in 8 s, ten trials",
+        "prism",
+        _by(CmaEs(), 10, 600) | _APART | _BODY,
+    ),
+    "co-evolution-gait": Experiment(
+        "the same prism as it is, its gait alone, in 8 s, ten trials",
+        "prism",
+        _by(CmaEs(), 10, 600) | _APART,
+    ),
     "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE, film=True),
     "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE, film=True),
     "pair": Experiment(

@@ -669,16 +669,16 @@ def _chosen_gait(
 ) -> tuple[Scenario, Gait]:
     """The scenario, with the named engine, and the gait that a command simulates, from its options.
     `gait` is a gait file or the folder of a run. Without it, the gait is random, by `seed` or by a
-    seed that walks."""
+    seed that walks. The scenario has the body that evolved with the gait, if any."""
     from tetra_drake.evolution.run import load_source
-    from tetra_drake.robot.gait import WALKING_SEED, seeded_gait
+    from tetra_drake.robot.gait import WALKING_SEED, seeded_gait, with_body
     from tetra_drake.scenario.load import load_scenario
 
     if gait is None:
         chosen = load_scenario(scenario or "thesis").on_engine(engine)
         return chosen, seeded_gait(chosen, WALKING_SEED if seed is None else seed)
     source = load_source(gait, scenario=scenario, warn=_warn)
-    return source.scenario.on_engine(engine), source.best
+    return with_body(source.scenario.on_engine(engine), source.best)
 
 
 def _warn(text: str) -> None:

@@ -5,6 +5,7 @@ import json
 import pytest
 from helpers.analytic import Bowl, read_record, record_run, small_scenario
 
+from tetra_drake.evolution.entries import BEST_SCENARIO
 from tetra_drake.optimizers import quality_diversity
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
 
@@ -31,13 +32,19 @@ def a_small_map(monkeypatch):
     monkeypatch.setattr(quality_diversity, "BATCH", 4)
 
 
-@pytest.mark.parametrize("optimizer", OPTIMIZERS)
-def test_an_interrupted_run_ends_alike_and_evaluates_nothing_again(optimizer, tmp_path):
-    changes = {"optimizer": optimizer, "evolution.evaluations": 40}
+BODY = {"robot.cables.outer_stiffness": ["5 lbf/in", "50 lbf/in"]}
+
+
+@pytest.mark.parametrize(
+    ("optimizer", "body"), [*((kind, {}) for kind in OPTIMIZERS), (SteadyState(population=8), BODY)]
+)
+def test_an_interrupted_run_ends_alike_and_evaluates_nothing_again(optimizer, body, tmp_path):
+    changes = {"optimizer": optimizer, "evolution.evaluations": 40, "evolve": body}
     scenario = small_scenario().with_changes(changes)
     statuses = record_run(tmp_path / "whole", scenario, workers=1)
     assert [status.evaluations for status in statuses] == [40, 40]
     whole = read_record(tmp_path / "whole")
+    assert (f"trial_01/{BEST_SCENARIO}" in whole) == bool(body)
     # After two iterations of the first trial, within one, and in the second trial.
     ends = (tmp_path / "whole/trial_00/iterations.jsonl").read_text().splitlines()
     counts = [json.loads(line)["evaluations"] for line in (ends[0], ends[-1])]

@@ -115,7 +115,7 @@ class SimulationQueue:
     def _driven(self, job: _Job) -> DrivenRobot:
         """The robot of a job. Gaits on the same scenario share a robot."""
         scenario, driver = job.scenario, job.driver
-        if not isinstance(driver, Gait):
+        if not isinstance(driver, Gait) or driver.body:
             return driven_robot(scenario, driver)
         with self._robots_lock:
             robot = self._robots.pop(id(scenario), None) or Robot.of(scenario)

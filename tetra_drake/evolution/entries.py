@@ -5,6 +5,7 @@ trial_00/
   iterations.jsonl        one line per iteration: best fitness, the optimiser's report
   in_progress.jsonl       evaluations of the current iteration that are done
   best_gait.json          gait file of the fittest gait so far
+  best.yaml               scenario with the body of this gait (only if bodies evolve)
   reevaluations.jsonl     gaits evaluated once more on the Drake diagram
 elites.jsonl              the map's gaits on disturbed robots (only with !QualityDiversity)
 spreads.jsonl             ranges of the metrics of the run's best gait for moved starts
@@ -40,6 +41,7 @@ from tetra_drake.scenario.metrics import wrong_metric
 
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
+BEST_SCENARIO = "best.yaml"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
 SPREADS = "spreads.jsonl"
 

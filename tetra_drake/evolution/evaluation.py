@@ -28,7 +28,7 @@ from tetra_drake.errors import (
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, ParameterSpace
+from tetra_drake.robot.gait import Gait, ParameterSpace, with_body
 from tetra_drake.scenario.disturbances import draws_of_iteration
 from tetra_drake.scenario.metrics import METRICS, unmet_requirements
 from tetra_drake.scenario.scenario import Scenario
@@ -109,22 +109,31 @@ class GaitEvaluation:
 
     def _simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
         """Scenario and gait of each simulation that a task needs: one simulation, or with
-        disturbances one per draw (randomly changed scenario)."""
+        disturbances one per draw (randomly changed scenario). A body that cannot be disturbed,
+        because no robot can have it, needs one simulation, which refuses it."""
         gait = self._space.gait(task.vector, name=str(task))
-        scenarios = [self.scenario] if task.seed is None else self._draws(task.seed)
-        return [(scenario, gait) for scenario in scenarios]
+        if task.seed is None:
+            return [(self.scenario, gait)]
+        if not gait.body:
+            return [(scenario, gait) for scenario in self._draws(task.seed)]
+        try:
+            scenario, bare = with_body(self.scenario, gait)
+        except InputError:
+            return [(self.scenario, gait)]
+        return [(draw, bare) for draw in draws_of_iteration(scenario, task.seed)]
 
     def _judged(self, scenario: Scenario, simulation: Callable[[], SimulationResult]) -> Evaluation:
         """Calls `simulation`, which simulates a gait on `scenario`, and evaluates its result. A
         simulation that fails, or an unmet requirement, gives an evaluation with the reason. An
-        InputError counts as a failure only if the scenario is disturbed; otherwise it is raised."""
+        InputError counts as a failure only if the scenario is disturbed or bodies evolve; otherwise
+        it is raised."""
         try:
             result = simulation()
         except (SimulationFailure, TimeBudgetExceeded) as error:
             failure = f"{_KINDS[type(error)]}: {error}"
             return Evaluation(failure=failure, wall_time=error.wall_time)
         except InputError as error:
-            if scenario is self.scenario:
+            if scenario is self.scenario and not scenario.evolve:
                 raise
             return Evaluation(failure=f"no start: {error}")
         fitness = self._fitness(result)

@@ -28,7 +28,7 @@ from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
 from tetra_drake.formatting import Say, TextTable, heading_html, rounded, silent
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import Gait, ParameterSpace, Vector, load_gait
+from tetra_drake.robot.gait import Gait, ParameterSpace, Vector, load_gait, with_body
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS, MetricRanges
 from tetra_drake.scenario.scenario import Scenario
@@ -57,8 +57,8 @@ class Run:
       population
     - the metrics in SI (distance ...), distance_in (inches)
     - lifted_T1 ...: Metrics.lifted_shares, by the names of the bodies
-    - the parameters: weight_1 ... (order of the thesis's listing), gain_length ..., tau_a_s,
-      tau_b_s; NaN in a thinned run
+    - the parameters: weight_1 ... (order of the thesis's listing), gain_length ..., numbers of the
+      body in SI by their keys, tau_a_s, tau_b_s; NaN in a thinned run
     - with disturbances: draws_fitness and draws_distance (m), lists with one number per draw, and
       worst_distance (m). Lists are missing if the evaluation failed.
     """
@@ -167,6 +167,11 @@ class Run:
         """The fittest gait of all trials. Raises InputError if no gait has a fitness yet."""
         best = self.fittest()
         return self.gait(best["trial"], best["index"])
+
+    def best_scenario(self) -> Scenario:
+        """The run's scenario with the body of its best gait, if bodies evolved. Raises InputError
+        if no gait has a fitness yet."""
+        return with_body(self.scenario, self.best_gait())[0]
 
     def gaits(self, count: int = 1) -> list[Gait]:
         """The `count` fittest different gaits of each trial, in the order of best(). The name of
@@ -277,7 +282,8 @@ def _parameters(scenario: Scenario) -> list[str]:
     """Names of the columns of Run.evaluations that hold the parameters of a gait, such as
     "weight_1" and "tau_a_s". They are in the order of the parameter vector."""
     space = ParameterSpace.of(scenario)
-    others = [f"gain_{name}" for name in space.pathways] + ["tau_a_s", "tau_b_s"]
+    gains = [f"gain_{name}" for name in space.pathways]
+    others = [*gains, *space.free_body, "tau_a_s", "tau_b_s"]
     weights = len(space.names) - len(others)
     return [f"weight_{number}" for number in range(1, weights + 1)] + others
 

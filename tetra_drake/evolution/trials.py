@@ -20,6 +20,7 @@ from pydantic import ValidationError
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import (
     BEST_GAIT,
+    BEST_SCENARIO,
     EVALUATIONS,
     IN_PROGRESS,
     ITERATIONS,
@@ -32,9 +33,10 @@ from tetra_drake.evolution.entries import (
 )
 from tetra_drake.evolution.evaluators import Submit, evaluate_all, finished
 from tetra_drake.evolution.manifest import RunRecord
+from tetra_drake.files import write_whole
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
-from tetra_drake.robot.gait import ParameterSpace, save_gait
+from tetra_drake.robot.gait import ParameterSpace, save_gait, with_body
 from tetra_drake.settings.units import INCHES, Units
 
 _SHOW_PERIOD = 1.0  # s
@@ -185,6 +187,9 @@ class Trial:
             task, _ = self._saved = self._best
             gait = self._manifest.gait(task.vector, trial=task.trial, index=task.index)
             save_gait(gait, self._best_gait, self._manifest.scenario)
+            if gait.body:
+                found, _ = with_body(self._manifest.scenario, gait)
+                write_whole(self._best_gait.with_name(BEST_SCENARIO), found.to_yaml())
 
     def _add(self, task: Task, evaluation: Evaluation) -> None:
         status = self.status

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tetra_drake.optimizers.base import Evaluation, Iteration
-from tetra_drake.optimizers.generational import MIDDLE, Generational, Matrix, Ranges
+from tetra_drake.optimizers.generational import MIDDLE, Box, Generational, Matrix, Ranges
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
 
@@ -114,25 +113,6 @@ class CmaEsOptimizer(Generational[kinds.CmaEs]):
         search = Search(self.settings.population, self._ranges, self.generator, start)
         self._searches.append(search)
         return search
-
-
-@dataclass(frozen=True)
-class Box:
-    """Search space of parameters between 0 and 1. An angle, the root, stands for each parameter.
-
-    pycma searches the roots, in units of pi: parameter = (1 - cos(pi root)) / 2. So every root
-    gives a valid parameter.
-    """
-
-    size: int
-
-    def from_roots(self, roots: Matrix) -> Matrix:
-        """Converts roots, the numbers that pycma varies, to parameters: (1 - cos(pi root)) / 2."""
-        return 0.5 - 0.5 * np.cos(np.pi * roots)
-
-    def roots(self, points: Matrix) -> Matrix:
-        """Converts parameters to roots between 0 and 1; the inverse of from_roots()."""
-        return np.arccos(1.0 - 2.0 * points) / np.pi
 
 
 class Search:

@@ -23,11 +23,31 @@ MIDDLE = 0.5
 """Middle of a range, in units of the range."""
 
 
+@dataclass(frozen=True)
+class Box:
+    """Search space of parameters between 0 and 1. An angle, the root, stands for each parameter.
+
+    pycma searches the roots, in units of pi: parameter = (1 - cos(pi root)) / 2. So every root
+    gives a valid parameter.
+    """
+
+    size: int
+
+    def from_roots(self, roots: Matrix) -> Matrix:
+        """Converts roots, the numbers that pycma varies, to parameters: (1 - cos(pi root)) / 2."""
+        return 0.5 - 0.5 * np.cos(np.pi * roots)
+
+    def roots(self, points: Matrix) -> Matrix:
+        """Converts parameters to roots between 0 and 1; the inverse of from_roots()."""
+        return np.arccos(1.0 - 2.0 * points) / np.pi
+
+
 class Ranges:
     """Search space of an optimiser: the free parameters, scaled so that random gaits have values
     between 0 and 1.
 
-    A search may leave this range. Only floors (lower limits) are respected.
+    A search may leave this range. Only floors (lower limits) are respected, and both bounds of the
+    numbers of a body; see Box.
     """
 
     def __init__(self, space: ParameterSpace) -> None:
@@ -39,6 +59,10 @@ class Ranges:
         """Range of each free parameter in random gaits."""
         self.size = len(self.width)
         self.floors = (space.floors - space.low)[self.free] / self.width
+        in_body = np.zeros(len(self.free), dtype=bool)
+        in_body[space.body] = True
+        self._in_body = in_body[self.free]
+        self._box = Box(len(space.free_body))
 
     def random(self, count: int, generator: np.random.Generator) -> Matrix:
         """Points (count, size) of random gaits, one per row: their free parameters, scaled to 0 to
@@ -48,18 +72,23 @@ class Ranges:
 
     def from_roots(self, roots: Matrix) -> Matrix:
         """Converts roots, the numbers that a search varies, to points (scaled parameters): floor +
-        root^2 / (4 (0.5 - floor)). A parameter without a floor is its own root.
+        root^2 / (4 (0.5 - floor)). A number of a body is as in Box. Another parameter without a
+        floor is its own root.
 
         Every root is a valid point. Fitness is a smooth function of the root even at the floor. In
         the middle of the range, point and root change at the same rate.
         """
         points = self.floors + roots**2 / (4.0 * (MIDDLE - self.floors))
-        return np.where(np.isfinite(self.floors), points, roots)
+        points = np.where(np.isfinite(self.floors), points, roots)
+        points[..., self._in_body] = self._box.from_roots(roots[..., self._in_body])
+        return points
 
     def roots(self, points: Matrix) -> Matrix:
         """Converts points to roots; the inverse of from_roots(), without negative roots."""
         roots = 2.0 * np.sqrt((MIDDLE - self.floors) * (points - self.floors))
-        return np.where(np.isfinite(self.floors), roots, points)
+        roots = np.where(np.isfinite(self.floors), roots, points)
+        roots[..., self._in_body] = self._box.roots(points[..., self._in_body])
+        return roots
 
 
 SettingsT = TypeVar("SettingsT")

@@ -20,6 +20,9 @@ from tetra_drake.scenario.common_sections import EvolutionSection
 GAIN_MUTATION = 0.2
 """Largest change of a feedback gain in one mutation."""
 
+BODY_MUTATION = 0.1
+"""Largest change of a number of the body in one mutation, as a share of its range."""
+
 
 @dataclass(eq=False)
 class SteadyStateOptimizer:
@@ -104,6 +107,7 @@ def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector
     step = settings.tau_mutation_range
     steps[TAU_A] = 0.0 if settings.tau_mutation == "listing" else step
     steps[TAU_B] = TAU_B_PER_TAU_A * step
+    steps[space.body] = BODY_MUTATION * (space.high - space.low)[space.body]
     return np.where(space.low == space.high, 0.0, steps)
 
 

@@ -22,7 +22,7 @@ from tetra_drake.laws.cable import CableLaw
 from tetra_drake.prototype.command_file import command_text, load_command, table_text
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import GivenGait, given_gait
+from tetra_drake.robot.gait import GivenGait, given_gait, with_body
 from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import length_rates
@@ -76,7 +76,7 @@ def export(
         SimulationFailure: if the simulation of the gait fails.
     """
     scenario = given_scenario(scenario)
-    gait = given_gait(gait, scenario)
+    scenario, gait = with_body(scenario, given_gait(gait, scenario))
     check_type("export", "rate", rate, numbers.Real)
     most, duration = 1.0 / scenario.cpg.listing_step, scenario.simulation.duration
     in_range, periods = 0.0 < rate <= most * (1.0 + 1e-9), duration * rate

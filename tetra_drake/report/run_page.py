@@ -20,7 +20,7 @@ import pandas
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
+from tetra_drake.evolution.entries import BEST_GAIT, BEST_SCENARIO, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST, read_manifest
 from tetra_drake.evolution.run import Run, gait_label, load_run
 from tetra_drake.figures.fitness import (
@@ -56,7 +56,7 @@ ELITES, ELITES_CSV = "elites", "elites/elites.csv"
 
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
 # Settings that are not shown among those that differ from the thesis's; some are elsewhere.
-_NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
+_NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "evolve.", "simulation.duration")
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,8 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
     gains = [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
     turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
     times = [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
-    best_gait = str(trial_folder(Path(), trial) / BEST_GAIT)
+    folder_of_best = trial_folder(Path(), trial)
+    best_gait = str(folder_of_best / BEST_GAIT)
     named = {"initially": shown.initial.recorded, "best": best.recorded}
     gaits = [
         GaitColumn(names, row, best_gait if "best" in names else None)
@@ -276,7 +277,13 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         parameters=listed([*times, *turn, *gains]),
         weights=dict(zip(gait.weight_names, gait.weights, strict=True)),
         differences=differences,
-        files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES, "elites": ELITES_CSV},
+        files={
+            "scenario": SCENARIO,
+            "replay": REPLAY,
+            "figures": FIGURES,
+            "elites": ELITES_CSV,
+            "body": folder_of_best / BEST_SCENARIO,
+        },
         summary=summary,
         metrics=metrics,
         versions=versions,

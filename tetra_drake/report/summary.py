@@ -13,6 +13,7 @@ from tetra_drake.formatting import TextTable, fixed, rounded, sentence, uncertai
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.remarks import sinking_remark, start_up_remark, stillness_remark
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.metrics import (
     METRICS,
     UNITS,
@@ -21,6 +22,7 @@ from tetra_drake.scenario.metrics import (
     unmet_requirements,
 )
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.section import value_at
 from tetra_drake.settings.units import Units
 
 if TYPE_CHECKING:
@@ -129,7 +131,7 @@ def run_text(run: Run) -> str:
         spread = run.spread_of(best)
         gaits = [run.initial_best(best["trial"]), best]
         texts.append(metrics_table(["initially", "best"], gaits, run.scenario, spread).text())
-        remarks = RANGES if spread else "", stillness_remark(Robot.of(run.scenario), best)
+        remarks = RANGES if spread else "", stillness_remark(Robot.of(run.best_scenario()), best)
         texts += [sentence(remark) for remark in remarks if remark]
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
@@ -164,12 +166,26 @@ def results(run: Run) -> list[tuple[str, str]]:
     rows = [
         (name.replace("_", " "), f"{shown} {unit}".rstrip() + f", {gait_label(fittest)}"),
         ("best initial gait", f"{three(initial[name])}, {gait_label(initial)}"),
+        *_body_of_best(run),
     ]
     if len(best) > 1:
         median = three(best[name].median())
         low, high = (three(best[name].quantile(share)) for share in (0.25, 0.75))
         rows.append(("best of each trial", f"median {median}, quartiles {low} and {high}"))
     return rows + effort
+
+
+def _body_of_best(run: Run) -> list[tuple[str, str]]:
+    """Numbers of the body of a run's best gait with their bounds, by key; none without a body."""
+    scenario, found = run.scenario, run.best_scenario().model_dump()
+
+    def shown(number: float) -> str:
+        return scenario.units.shown(number, getattr(number, "unit", ""))
+
+    return [
+        (key, f"{shown(value_at(found, separate(key)[0]))}, from {shown(low)} to {shown(high)}")
+        for key, (low, high) in scenario.evolve.items()
+    ]
 
 
 def trials_table(run: Run) -> TextTable:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import Gait, with_body
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
@@ -45,9 +45,10 @@ def driven_robot(
     setpoint begins at the time of its sample and takes one such step. `steering`, a function from
     time (s) to the turn (-1 to 1), replaces the constant turn of a gait; a command ignores it.
     Raises InputError for a command without samples, or whose number of cables is not the robot's
-    number of driven cables.
+    number of driven cables. The robot of a gait with a body has this body.
     """
     if isinstance(driver, Gait):
+        scenario, driver = with_body(scenario, driver)
         return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
     robot = Robot.of(scenario).without_network()
     driven = robot.driven

@@ -1,8 +1,11 @@
 """Gaits, gait files, and the parameter space that evolution searches."""
 
+import dataclasses
+import functools
 import json
 import math
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, Self
@@ -17,9 +20,12 @@ from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import TextTable, heading_html
 from tetra_drake.laws.feedback import Gains
 from tetra_drake.robot.network import NEURONS, Weights
+from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.section import Section
+from tetra_drake.settings.quantities import Quantity
+from tetra_drake.settings.section import Section, written
+from tetra_drake.settings.units import given_quantity
 
 LARGEST_GAIN = 1.0
 """Largest absolute value of a feedback gain in random gaits."""
@@ -40,8 +46,8 @@ _MOST_COLUMNS = 8
 
 @dataclass(frozen=True)
 class Gait:
-    """Parameters of an oscillator network (weights, time constants, turn, gains): what evolution
-    searches for."""
+    """Parameters of an oscillator network (weights, time constants, turn, gains), and of the body
+    that evolved with it, if any: what evolution searches for."""
 
     name: str
     weights: tuple[float, ...]
@@ -52,6 +58,9 @@ class Gait:
     turn: float = 0.0
     """Steering, -1 to 1. Left oscillators get the input u0 (1 + turn), right ones u0 (1 - turn)."""
     gains: Gains = field(default_factory=Gains)
+    body: tuple[tuple[str, float | str], ...] = ()
+    """Numbers of the robot that evolved with the gait: scenario keys, and values as texts with
+    units, or as numbers that have none. See Scenario.evolve."""
     scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if it is unknown."""
     weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -96,9 +105,11 @@ class Gait:
 
     @property
     def _further(self) -> list[list[str]]:
-        """Names and values, as texts, of the turn and the feedback gains, except zeros."""
+        """Names and values, as texts, of the turn and the feedback gains, except zeros; and of the
+        numbers of the body."""
         numbers = {"turn": self.turn, **{f"gain of {name}": gain for name, gain in self.gains}}
-        return [[name, f"{number:.4g}"] for name, number in numbers.items() if number]
+        rows = [[name, f"{number:.4g}"] for name, number in numbers.items() if number]
+        return rows + [[key, _four_digits(value)] for key, value in self.body]
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """Content of a gait file, for json.dumps(). The gait must fit `scenario`, which gives the
@@ -115,15 +126,37 @@ class Gait:
             content["turn"] = self.turn
         if gains := {name: gain for name, gain in self.gains if gain}:
             content["gains"] = gains
+        if self.body:
+            content["body"] = dict(self.body)
         return content
+
+
+def _four_digits(value: float | str) -> str:
+    """A number, or the number of a quantity given as text, with four significant digits."""
+    number, blank, unit = str(value).partition(" ")
+    return f"{float(number):.4g}{blank}{unit}"
+
+
+def with_body(scenario: Scenario, gait: Gait) -> tuple[Scenario, Gait]:
+    """A scenario with the numbers of a gait's body, and the gait without them.
+
+    Nothing changes for a gait that evolved without a body. Otherwise the scenario has no section
+    `evolve`. Raises InputError if the scenario cannot have such a robot.
+    """
+    if not gait.body:
+        return scenario, gait
+    changes = {key: value for joined, value in gait.body for key in separate(joined)}
+    changed = scenario.with_sections(evolve={}).with_changes(changes)
+    return changed, dataclasses.replace(gait, body=())
 
 
 @dataclass(frozen=True)
 class ParameterSpace:
     """Parameter space of a scenario's gaits, for your own search algorithm.
 
-    A vector has the weights, the feedback gains (if the scenario has feedback), and the time
-    constants tau_A and tau_B in s.
+    A vector has the weights, the feedback gains (if the scenario has feedback), the numbers of the
+    body in SI (those that `evolve` of the scenario leaves free), and the time constants tau_A and
+    tau_B in s.
 
     >>> space = td.ParameterSpace.of("thesis")
     >>> vector = space.repair(0.5 * (space.low + space.high))
@@ -132,7 +165,7 @@ class ParameterSpace:
     """
 
     names: tuple[str, ...]
-    """Names such as "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
+    """Names such as "weight 3->1 extensor", "gain length", "robot.density", "tau_A", "tau_B"."""
     low: Vector
     high: Vector
     """Upper bounds of the parameters of random gaits; `low` are the lower bounds (Table 5)."""
@@ -148,6 +181,18 @@ class ParameterSpace:
     """Names of the feedback pathways with a gain."""
     turn: float
     """Steering of all gaits; see Gait.turn."""
+    evolve: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """Bounds of the numbers of the body, also of fixed ones; see Scenario.evolve."""
+
+    @functools.cached_property
+    def free_body(self) -> tuple[str, ...]:
+        """Keys of the numbers of the body that are parameters: their bounds differ."""
+        return tuple(key for key, (low, high) in self.evolve.items() if low < high)
+
+    @property
+    def body(self) -> slice:
+        """Places of the body's numbers in a vector."""
+        return slice(len(self.names) - 2 - len(self.free_body), len(self.names) - 2)
 
     @classmethod
     def of(cls, scenario: GivenScenario) -> Self:
@@ -165,6 +210,7 @@ class ParameterSpace:
         chosen, parameters = np.unique(shared, return_inverse=True)
         names = [f"weight {weight_names[i]}" for i in chosen]
         names += [f"gain {name}" for name in pathways]
+        body = {key: pair for key, pair in scenario.evolve.items() if pair[0] < pair[1]}
         # Rows: low, high, floors. Columns: weight, gain, tau_A, tau_B.
         rows = [
             [bounds.weight_min, -LARGEST_GAIN, bounds.tau_a_min, bounds.tau_a_min],
@@ -173,9 +219,12 @@ class ParameterSpace:
         ]
         limits = np.repeat(rows, [len(chosen), len(pathways), 1, 1], axis=1)
         limits[:, TAU_B] *= TAU_B_PER_TAU_A
-        low, high, floors = limits
+        columns = [[low, high, -math.inf] for low, high in body.values()]
+        low, high, floors = np.insert(
+            limits, [TAU_A] * len(body), np.reshape(columns, (-1, 3)).T, axis=1
+        )
         return cls(
-            names=(*names, "tau_A", "tau_B"),
+            names=(*names, *body, "tau_A", "tau_B"),
             low=low,
             high=high,
             floors=floors,
@@ -184,6 +233,7 @@ class ParameterSpace:
             weight_names=weight_names,
             pathways=pathways,
             turn=bounds.turn,
+            evolve=scenario.evolve,
         )
 
     def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
@@ -191,7 +241,7 @@ class ParameterSpace:
         `names`; the bounds are not checked. Raises InputError for a vector of another size, a
         number that is not finite, a weight below 0, or a time constant that is not above 0."""
         vector = self._numbers(vector)
-        first_gain = len(self.names) - 2 - len(self.pathways)
+        first_gain = self.body.start - len(self.pathways)
         gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
         return Gait(
             name=name,
@@ -200,20 +250,41 @@ class ParameterSpace:
             tau_b=float(vector[TAU_B]),
             turn=self.turn,
             gains=Gains(**gains),
+            body=self._body_of(vector),
             weight_names=self.weight_names,
         )
 
+    def _body_of(self, vector: Vector) -> tuple[tuple[str, float | str], ...]:
+        """Keys of all numbers of the body, and their values as in Gait.body."""
+        numbers = dict(zip(self.free_body, vector[self.body].tolist(), strict=True))
+        values = {
+            key: Quantity(numbers.get(key, low), low.unit)
+            if isinstance(low, Quantity)
+            else numbers.get(key, low)
+            for key, (low, _) in self.evolve.items()
+        }
+        return tuple(written(values).items())
+
     def vector(self, gait: Gait) -> Vector:
-        """Parameter vector of a gait, without its name and turn. With mirrored weights, a left
-        weight and its right image share a parameter, which the first of the two gives. Raises
-        InputError if the gait has another number of weights."""
+        """Parameter vector of a gait, without its name, its turn and fixed numbers of its body.
+        With mirrored weights, a left weight and its right image share a parameter, which the first
+        of the two gives. Raises InputError if the gait has another number of weights, or lacks a
+        number of the body."""
         if len(gait.weights) != len(self.weights):
             problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
             raise InputError("ParameterSpace", f"gait {gait.name}", problem)
         _, first = np.unique(self.weights, return_index=True)
         weights = np.array(gait.weights)[first]
         gains = [getattr(gait.gains, name) for name in self.pathways]
-        return np.concatenate([weights, gains, [gait.tau_a, gait.tau_b]])
+        given, body = dict(gait.body), []
+        for key in self.free_body:
+            if key not in given:
+                raise InputError("ParameterSpace", f"gait {gait.name}", f"lacks the body's {key}")
+            unit, value = getattr(self.evolve[key][0], "unit", ""), given[key]
+            if isinstance(value, str):
+                value = given_quantity(value, unit, gait.name, key)
+            body.append(value)
+        return np.concatenate([weights, gains, body, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:
         """Random parameter vector, uniform between `low` and `high`. tau_B is not drawn: it is
@@ -222,10 +293,12 @@ class ParameterSpace:
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
     def repair(self, vector: npt.ArrayLike) -> Vector:
-        """A copy of the vector with tau_B = 2 tau_A, for example after mutation. If the scenario
-        makes tau_B independent of tau_A, tau_B stays as given. The bounds are not enforced. Raises
-        InputError for a vector of another size."""
-        repaired = self._numbers(vector)
+        """A copy of the vector with tau_B = 2 tau_A, and the numbers of the body within their
+        bounds, for example after mutation. If the scenario makes tau_B independent of tau_A, tau_B
+        stays as given. Other bounds are not enforced. Raises InputError for a vector of another
+        size."""
+        repaired, body = self._numbers(vector), self.body
+        repaired[body] = repaired[body].clip(self.low[body], self.high[body])
         if self.couples_tau_b:
             repaired[TAU_B] = TAU_B_PER_TAU_A * repaired[TAU_A]
         return repaired
@@ -289,6 +362,8 @@ class GaitFile(Section):
     tau_b_s: float | None = Field(default=None, gt=0)
     turn: float = Field(default=0.0, ge=-1, le=1)
     gains: Gains = Gains()
+    body: dict[str, float | str] = Field(default={})
+    """Numbers of the body by scenario key, quantities as texts with units."""
 
 
 def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Gait:
@@ -329,10 +404,16 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
         tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
         turn=file.turn,
         gains=file.gains,
+        body=tuple(file.body.items()),
         scenario=file.scenario,
         weight_names=names,
     )
     check_gait(gait, scenario, own, source=path, key=key)
+    try:
+        with_body(scenario, gait)
+    except InputError as error:
+        place = f"{key}.body.{error.key}".strip(".")
+        raise InputError(path, place, error.problem) from error
     return gait
 
 

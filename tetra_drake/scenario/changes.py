@@ -10,7 +10,7 @@ from tetra_drake.scenario.yaml_text import parse_yaml
 from tetra_drake.settings.refusals import TAG
 from tetra_drake.settings.section import Tree, joined, mapped, parts_of, tree_value
 
-REPLACED = ("objective", "require", "robot.actuated")
+REPLACED = ("objective", "require", "evolve", "robot.actuated")
 """Keys of mappings that a file replaces as a whole, instead of merging them."""
 
 REMOVABLE = ("disturbances",)
@@ -33,8 +33,8 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
       changes nothing; `disturbances:` removes the section.
     - A mapping with a tag, such as `!Coulomb`, replaces the mapping of the base and all its keys.
       Without a tag it changes keys.
-    - `objective`, `require` and `robot.actuated` are replaced as a whole. Only dotted keys from
-      Python, such as "objective.speed", change single keys of them.
+    - `objective`, `require`, `evolve` and `robot.actuated` are replaced as a whole. Only dotted
+      keys from Python, such as "objective.speed", change single keys of them.
     - Numbers, texts, lists, and sections from Python replace the base's value. Only keys from
       Python, such as "robot.loads.n3[2]", change an item of a list.
     """

@@ -9,14 +9,29 @@ from __future__ import annotations
 import operator
 from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.settings.quantities import Keyed, Speed, Time, Value
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
+
+
+def separate(joined: str) -> list[str]:
+    """Splits a key that joins scenario keys by commas: "cpg.gain, robot.density" gives two keys."""
+    return [key.strip() for key in joined.split(",")]
+
+
+def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mapping[str, Value]:
+    """Checks a mapping whose keys may each name several scenario keys, such as "a.b, c.d", and
+    returns it. Raises InputError, naming `source`, if a scenario key occurs twice."""
+    counts = Counter(key for joined in by_joined for key in separate(joined))
+    for key, count in counts.items():
+        if count > 1:
+            raise InputError(source, key, "is given twice")
+    return by_joined
 
 
 class GaitBounds(Section):
@@ -49,6 +64,18 @@ class GaitBounds(Section):
                 refuse(f"{name}_min", problem)
         return self
 
+
+BodyBound = Annotated[Any, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})]
+"""A bound of a number in SI, or a text with a unit. Its key decides which units are possible."""
+
+BodyBounds = Annotated[
+    Keyed[str, Annotated[list[BodyBound], Field(min_length=2, max_length=2)]],
+    AfterValidator(different_keys),
+]
+"""Least and greatest value of numbers of the robot, by scenario key or by joined keys."""
+
+BODY_SECTIONS = ("robot", "actuation", "cpg", "friction", "ground", "strut_contact")
+"""Sections of a scenario whose numbers can evolve with the gait."""
 
 LONGEST_SETTLING = 3.0
 """Upper limit (s) of the default of SimulationSection.steady_from."""
@@ -96,21 +123,6 @@ class EvolutionSection(Section):
     population, then two gaits in each iteration."""
     time_budget: Time = Field(gt=0)
     """Longest wall time of a simulation; one that takes longer counts as failed."""
-
-
-def separate(joined: str) -> list[str]:
-    """Splits a key that joins scenario keys by commas: "cpg.gain, robot.density" gives two keys."""
-    return [key.strip() for key in joined.split(",")]
-
-
-def different_keys(by_joined: Mapping[str, Value], *, source: str = "") -> Mapping[str, Value]:
-    """Checks a mapping whose keys may each name several scenario keys, such as "a.b, c.d", and
-    returns it. Raises InputError, naming `source`, if a scenario key occurs twice."""
-    counts = Counter(key for joined in by_joined for key in separate(joined))
-    for key, count in counts.items():
-        if count > 1:
-            raise InputError(source, key, "is given twice")
-    return by_joined
 
 
 Spread = Annotated[float, Field(gt=0, le=0.5)]

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.formatting import TextTable, heading_html
+from tetra_drake.formatting import TextTable, heading_html, listed
 from tetra_drake.laws.actuator import Actuation, Force
 from tetra_drake.laws.capsules import NoStrutContact, StrutContactKind
 from tetra_drake.laws.contact import GroundSection
@@ -25,6 +25,8 @@ from tetra_drake.laws.oscillator import CpgSection
 from tetra_drake.laws.terrain import Flat, Terrain
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
+    BODY_SECTIONS,
+    BodyBounds,
     Disturbances,
     EvolutionSection,
     GaitBounds,
@@ -39,8 +41,8 @@ from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import by_name
-from tetra_drake.settings.refusals import TAG, hint, refuse
-from tetra_drake.settings.section import Section, Tree, flattened, written
+from tetra_drake.settings.refusals import TAG, described, hint, refuse
+from tetra_drake.settings.section import Section, Tree, flattened, value_at, written
 from tetra_drake.settings.units import (
     SYSTEMS,
     Units,
@@ -86,6 +88,11 @@ class Scenario(Section):
     actuation: Actuation = Force()
     cpg: CpgSection
     gait_bounds: GaitBounds
+    evolve: Annotated[BodyBounds, Field(exclude_if=operator.not_)] = Field(default={})
+    """Bounds of the numbers of the robot that evolve together with the gait, by scenario key, such
+    as `robot.cables.side.stiffness: [50 N/m, 400 N/m]` or `robot.nodes.n3[2]` for a coordinate z.
+    Keys that are joined by commas get the same value. Each candidate is a robot of its own, at its
+    own equilibrium. Equal bounds fix a number. A file replaces all bounds of its base."""
     simulation: SimulationSection
     engine: EngineKind = Drake()
     objective: Annotated[dict[str, float], *by_name(_OF_WEIGHTS), Field(min_length=1)]
@@ -344,6 +351,44 @@ class Scenario(Section):
             refuse(key, f"found {time:g} s, expected less than the duration, {end:g} s")
 
     @model_validator(mode="after")
+    def _check_evolve(self) -> Self:
+        """Raises InputError if `evolve` names no number of the robot, or has bounds that the number
+        cannot have. Converts the bounds to SI numbers with units."""
+        fixed = self.with_sections(evolve={})
+        for joined, bounds in self.evolve.items():
+            place, keys, tree = f"evolve.{joined}", separate(joined), fixed.model_dump()
+            for key in keys:
+                self._check_body_key(key, value_at(tree, key), place)
+            for index, bound in enumerate(bounds):
+                try:
+                    changed = fixed.with_changes(dict.fromkeys(keys, bound))
+                except InputError as error:
+                    leads = "" if error.key in keys else f"{_text(bound)}: {error.key}: "
+                    refuse(place, f"{leads}{error.problem}")
+                bounds[index] = value_at(changed.model_dump(), keys[0])
+            low, high = bounds
+            if not low <= high:
+                refuse(place, f"found {low} to {high}, expected the least value first")
+        return self
+
+    def _check_body_key(self, key: str, value: Any, place: str) -> None:
+        """Raises InputError, naming `place`, unless `key` is a key of a number of the robot.
+        `value` is its value in the scenario; None if there is none."""
+        if key.partition(".")[0] not in BODY_SECTIONS:
+            expected = f"expected a key of {listed(BODY_SECTIONS)}"
+            refuse(place, f"'{key}' is no key of the robot, {expected}")
+        if value is None:
+            own = [name for name in self.values() if name.startswith(BODY_SECTIONS)]
+            refuse(place, f"'{key}' is no number of the scenario; {hint(key, own)}")
+        if isinstance(value, int) and not isinstance(value, bool):
+            refuse(
+                place, f"'{key}' is a count, expected a number that leaves the structure as it is"
+            )
+        if not isinstance(value, float):
+            example = f", such as {key}[0]" if isinstance(value, list) else ""
+            refuse(place, f"found {described(value)}, expected the key of a number{example}")
+
+    @model_validator(mode="after")
     def _check_disturbances(self) -> Self:
         """Raises InputError if `disturbances` name no number of the scenario, or if their largest
         changes would make a number invalid."""
@@ -354,7 +399,7 @@ class Scenario(Section):
             whole = len(self.whole_cables)
             if cuts.count > whole:
                 refuse("disturbances.cuts.count", f"found {cuts.count}, expected at most {whole}")
-        undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
+        undisturbed, numbers = self.with_sections(disturbances=None, evolve={}), self.numbers()
         for joined, spread in self.disturbances.spreads.items():
             place, keys = f"disturbances.spreads.{joined}", separate(joined)
             for key in keys:

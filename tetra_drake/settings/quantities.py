@@ -27,6 +27,9 @@ class Quantity(float):
         made.unit = unit
         return made
 
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
+        return float(self), self.unit
+
     def __str__(self) -> str:
         return plainest(self, self.unit)
 

@@ -35,7 +35,7 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import TextTable, fixed, percents, ranged, rounded, signed
 from tetra_drake.machine import versions
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, GivenGait, given_gait
+from tetra_drake.robot.gait import Gait, GivenGait, given_gait, with_body
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -186,7 +186,11 @@ def robustness(
             if draw.events:
                 plan.append(({"what": CUTS, "draw": i}, Draw({}, events=draw.events)))
 
-    rows = _simulated(scenario, plan, walkers, workers)
+    walks: dict[int, tuple[Scenario, dict[Any, Gait]]] = {}
+    for key, gait in walkers.items():
+        own, bare = with_body(scenario, gait)
+        walks.setdefault(id(own), (own, {}))[1][key] = bare
+    rows = [row for own, group in walks.values() for row in _simulated(own, plan, group, workers)]
     changed = [row for row in rows if row["what"] not in (NOTHING, ALL)]
     return Judgement(
         scenario=scenario,

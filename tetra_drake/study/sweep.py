@@ -12,7 +12,7 @@ import numpy as np
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.robot.gait import GivenGait, given_gait
+from tetra_drake.robot.gait import GivenGait, given_gait, with_body
 from tetra_drake.scenario.changes import given_changes
 from tetra_drake.scenario.common_sections import different_keys, separate
 from tetra_drake.scenario.load import GivenScenario, given_scenario
@@ -74,9 +74,15 @@ def sweep(
         raise InputError("sweep", "changes", f"found {count} simulations, expected at most {MOST}")
     grid = [dict(zip(changes, each, strict=True)) for each in itertools.product(*changes.values())]
     scenarios = [with_joined_changes(base, each) for each in grid]
+    bodies = [with_body(base, gait) for gait in walkers]
+    walks = [
+        (changed if own is base else with_joined_changes(own, each), bare)
+        for each, changed in zip(grid, scenarios, strict=True)
+        for own, bare in bodies
+    ]
     outcomes = simulate_many(
-        [changed for changed in scenarios for _ in walkers],
-        walkers * len(scenarios),
+        [changed for changed, _ in walks],
+        [bare for _, bare in walks],
         workers=workers,
     )
 
