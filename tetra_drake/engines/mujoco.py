@@ -190,12 +190,10 @@ class _MujocoRobot(LoneRobot):
     def _moved(self, states: Array, p_BC: Array) -> Array:
         """MuJoCo's states (rows, numbers) of the same motion, after the origins of the bodies'
         frames were moved to p_BC (bodies, 3) in m."""
-        moved, rows, end = states.copy(), len(states), 1 + self._model.nq
-        q, v = np.split(with_origins(self._body_states(states), p_BC), [end - 1], axis=1)
-        qpos, qvel = moved[:, 1:end].reshape(rows, -1, 7), moved[:, end:].reshape(rows, -1, 6)
-        qpos[:, :, :3] = q.reshape(rows, -1, 7)[:, :, 4:]
-        qvel[:, :, :3] = v.reshape(rows, -1, 6)[:, :, 3:]
-        moved[:, 1:] = np.hstack([qpos.reshape(rows, -1), qvel.reshape(rows, -1)])
+        moved, after = states.copy(), with_origins(self._body_states(states), p_BC)
+        bodies = np.arange(len(p_BC))[:, np.newaxis]
+        p, v = 7 * bodies + np.arange(3), self._model.nq + 6 * bodies + np.arange(3)
+        moved[:, 1 + p], moved[:, 1 + v] = after[:, 4 + p], after[:, 3 + v]
         return moved
 
     def copied(self) -> _MujocoRobot:

@@ -77,7 +77,7 @@ class Motion:
         is interpolated."""
         return self._rows(np.searchsorted(self.times, times))
 
-    def _rows(self, rows: np.ndarray | slice) -> Motion:
+    def _rows(self, rows: np.ndarray) -> Motion:
         given = {name: table for name, table in vars(self).items() if table is not None}
         return Motion(**{name: table[rows] for name, table in given.items()})
 
@@ -91,12 +91,9 @@ class Motion:
         """The motion between the events of the robot's scenario, each part with its robot. At the
         time of an event, the robot is still the one before."""
         begins = [phase.begins for phase in robot.phases[1:]]
-        ends = np.searchsorted(self.times, [*begins, np.inf], side="right")
-        rows = zip([0, *ends], ends, strict=False)
-        return [
-            (phase, self._rows(slice(*which)))
-            for phase, which in zip(robot.phases, rows, strict=True)
-        ]
+        ends = np.searchsorted(self.times, begins, side="right")
+        rows = np.split(np.arange(len(self.times)), ends)
+        return [(phase, self._rows(its)) for phase, its in zip(robot.phases, rows, strict=True)]
 
     def first_states(self, robot: Robot) -> np.ndarray:
         """States [q; v] (k, 13 n) of the frames that the bodies have at t = 0, whose origins are

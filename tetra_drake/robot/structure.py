@@ -237,15 +237,15 @@ def with_origins(states: np.ndarray, p_BC: np.ndarray) -> np.ndarray:
     were moved to the points p_BC (n, 3) in m. Nothing is computed where no point is moved."""
     if not p_BC.any():
         return states
-    moved, bodies = states.copy(), len(p_BC)
-    q = moved[..., : 7 * bodies].reshape(*moved.shape[:-1], bodies, 7)
-    v = moved[..., 7 * bodies :].reshape(*moved.shape[:-1], bodies, 6)
-    scalar, vector = q[..., :1], q[..., 1:4]
-    turn = 2.0 / (q[..., :4] ** 2).sum(axis=-1, keepdims=True) * np.cross(vector, p_BC)
+    bodies, xyz = np.arange(len(p_BC))[:, np.newaxis], np.arange(3)
+    q, v = 7 * bodies, 7 * len(p_BC) + 6 * bodies
+    scalar, vector, moved = states[..., q], states[..., q + 1 + xyz], states.copy()
+    turn = 2.0 * np.cross(vector, p_BC)
+    turn /= scalar**2 + (vector**2).sum(axis=-1, keepdims=True)
     p_BC_W = p_BC + scalar * turn + np.cross(vector, turn)
-    q[..., 4:] += p_BC_W
-    v[..., 3:] += np.cross(v[..., :3], p_BC_W)
-    return np.concatenate([part.reshape(*moved.shape[:-1], -1) for part in (q, v)], axis=-1)
+    moved[..., q + 4 + xyz] += p_BC_W
+    moved[..., v + 3 + xyz] += np.cross(states[..., v + xyz], p_BC_W)
+    return moved
 
 
 def length_rates(structure: Structure, p_WN: np.ndarray, v_WN: np.ndarray) -> np.ndarray:
