@@ -1,6 +1,7 @@
 """A recorded run in a tenth of its size, for publishing.
 
-    manifest.json, scenario.yaml, trial_00/best_gait.json    unchanged, but the first has `thinned`
+    manifest.json, scenario.yaml    unchanged, but the first has `thinned`
+    trial_00/best_gait.json, trial_00/best.yaml    unchanged
     trial_00/evaluations.jsonl.xz      genomes and all digits of the kept gaits; for other gaits few
                                        digits of the metrics that select gaits
     trial_00/iterations.jsonl.xz, trial_00/reevaluations.jsonl.xz (without genomes), elites.jsonl.xz
@@ -22,6 +23,7 @@ import pandas
 
 from tetra_drake.evolution.entries import (
     BEST_GAIT,
+    BEST_SCENARIO,
     ELITES,
     EVALUATIONS,
     ITERATIONS,
@@ -66,10 +68,11 @@ def thin(source: Path, out: Path) -> None:
         _write(run, out, EVALUATIONS, thinned, trial=trial)
         _write(run, out, ITERATIONS, _entries(run, ITERATIONS, trial), trial=trial)
         _write(run, out, REEVALUATIONS, again, trial=trial)
-        best_gait = trial_folder(source, trial) / BEST_GAIT
-        if best_gait.exists():
-            text = best_gait.read_text(encoding="utf-8")
-            write_whole(trial_folder(out, trial) / BEST_GAIT, text)
+        for name in (BEST_GAIT, BEST_SCENARIO):
+            best = trial_folder(source, trial) / name
+            if best.exists():
+                text = best.read_text(encoding="utf-8")
+                write_whole(trial_folder(out, trial) / name, text)
     _write(run, out, ELITES, _entries(run, ELITES))
     run.scenario.terrain.save(out)
     write_whole(out / SCENARIO, (source / SCENARIO).read_text(encoding="utf-8"))
