@@ -160,11 +160,19 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
 
 
 @inlined
+def between(nodes: Table, a: int, b: int) -> tuple[Vector3, Vector3]:
+    """Position (m) and velocity (m/s) of node b relative to node a, in the world frame. `nodes` is
+    the table of laws.kinematics."""
+    p_AB = difference(vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN))
+    v_AB = difference(vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN))
+    return p_AB, v_AB
+
+
+@inlined
 def span(nodes: Table, a: int, b: int) -> tuple[Vector3, Real, Real]:
     """Direction from node a to node b, their distance (m) and its rate (m/s). `nodes` is the table
     of laws.kinematics."""
-    p_AB = difference(vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN))
-    v_AB = difference(vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN))
+    p_AB, v_AB = between(nodes, a, b)
     square = dot(p_AB, p_AB)
     per_length = inverse_sqrt(square)
     direction = scaled(per_length, p_AB)
@@ -299,13 +307,8 @@ def add_state_forces(robot: Model, state: Table, forces: Forces) -> None:
 
     for i in range(joints.node_a.size):
         a, b = joints.node_a[i], joints.node_b[i]
-        apart = difference(
-            vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN)
-        )
-        parts = difference(
-            vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN)
-        )
-        force = sum_of(scaled(joints.stiffness[i], apart), scaled(joints.damping[i], parts))
+        p_AB, v_AB = between(nodes, a, b)
+        force = sum_of(scaled(joints.stiffness[i], p_AB), scaled(joints.damping[i], v_AB))
         add_vector(force, a, kinematics.FORCE, nodes)
         add_vector(scaled(-1.0, force), b, kinematics.FORCE, nodes)
 

@@ -17,6 +17,16 @@ WORLD = -1
 """Body index that stands for the world. Fixed nodes have it, because they belong to no body."""
 
 
+def carriers_of(first_node: Table, *, nodes: int) -> Table:
+    """Index of the body that each of a number of nodes belongs to (nodes,); WORLD for a fixed node.
+
+    `first_node` is the index of each body's first node (bodies + 1,); the last number is the index
+    of the first fixed node.
+    """
+    of_bodies = np.repeat(np.arange(len(first_node) - 1), np.diff(first_node))
+    return np.pad(of_bodies, (0, nodes - len(of_bodies)), constant_values=WORLD)
+
+
 class Bodies(NamedTuple):
     """Masses, inertias and sizes of a robot's rigid bodies; SI units."""
 

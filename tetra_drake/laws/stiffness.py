@@ -14,7 +14,7 @@ from scipy.sparse import bsr_array
 
 from tetra_drake.laws import cable, capsules, contact, kinematics
 from tetra_drake.laws.forces import Forces
-from tetra_drake.laws.model import WORLD, Model
+from tetra_drake.laws.model import WORLD, Model, carriers_of
 from tetra_drake.laws.struts import Axes, axes_of, vector_between
 
 
@@ -43,8 +43,7 @@ def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
     the forces of a state without motion, with all tables computed.
     """
     bodies = robot.bodies.mass.size
-    carriers = np.full(len(robot.p_BN), WORLD)
-    carriers[: robot.first_node[-1]] = np.repeat(np.arange(bodies), np.diff(robot.first_node))
+    carriers = carriers_of(robot.first_node, nodes=len(robot.p_BN))
     kinds = [_cables, _supports]
     if robot.cables.routes.nodes.size:
         kinds += [_pieces, _paths]

@@ -13,7 +13,7 @@ import numpy as np
 
 from tetra_drake.laws.cable import CableLaw, elastic_tension
 from tetra_drake.laws.kinematics import rigid_motions
-from tetra_drake.laws.model import WORLD
+from tetra_drake.laws.model import WORLD, carriers_of
 from tetra_drake.settings.refusals import refuse
 
 TOLERANCE = 1e-6
@@ -156,9 +156,7 @@ class Blueprint:
     @functools.cached_property
     def carriers(self) -> np.ndarray:
         """Index of the body that each node belongs to (nodes,); WORLD (-1) for a fixed node."""
-        of_bodies = np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
-        fixed = len(self.node_names) - len(of_bodies)
-        return np.pad(of_bodies, (0, fixed), constant_values=WORLD)
+        return carriers_of(self.first_node, nodes=len(self.node_names))
 
     @functools.cached_property
     def segments(self) -> Segments:

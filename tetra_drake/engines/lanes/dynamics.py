@@ -19,7 +19,7 @@ from tetra_drake.laws.cable import DIRECTION, TENSION_PER_RATE
 from tetra_drake.laws.forces import Forces
 from tetra_drake.laws.friction import friction_damping
 from tetra_drake.laws.kinematics import P_BN_W
-from tetra_drake.laws.model import WORLD, Joints, Model
+from tetra_drake.laws.model import Joints, Model, carriers_of
 from tetra_drake.laws.terrain import to_world
 from tetra_drake.laws.vectors import cross, dot, put_vector, vector_at
 
@@ -54,10 +54,8 @@ class Solver(NamedTuple):
     def of(cls, robot: Model) -> Self:
         """The solver for a robot, whose bodies are coupled in pairs by cables and joints."""
         couplings, joints, routes = robot.couplings, robot.joints, robot.cables.routes
-        body_of = np.full(len(robot.p_BN), WORLD)
-        sizes = np.diff(robot.first_node)
-        body_of[: robot.first_node[-1]] = np.repeat(np.arange(len(sizes)), sizes)
-        paths = np.split(body_of[routes.nodes], routes.first[1:-1])
+        carriers = carriers_of(robot.first_node, nodes=len(robot.p_BN))
+        paths = np.split(carriers[routes.nodes], routes.first[1:-1])
         on_paths = [pair for path in paths for pair in itertools.product(path.tolist(), repeat=2)]
         return cls._of(
             len(robot.bodies.mass),
