@@ -90,6 +90,8 @@ class Motion:
     def by_phase(self, robot: Robot) -> list[tuple[Phase, Motion]]:
         """The motion between the events of the robot's scenario, each part with its robot. At the
         time of an event, the robot is still the one before."""
+        if len(robot.phases) == 1:
+            return [(robot.phases[0], self)]
         begins = [phase.begins for phase in robot.phases[1:]]
         ends = np.searchsorted(self.times, begins, side="right")
         rows = np.split(np.arange(len(self.times)), ends)

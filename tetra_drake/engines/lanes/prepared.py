@@ -115,8 +115,10 @@ class Prepared:
         )
         if not is_alike:
             return Prepared.of(driven, record=self.record)
-        turns, drives = driven.turns, self.start.drives.copy()
-        drives[:, DRIVE] = robot.starting_drives()
+        turns, drives = driven.turns, self.start.drives
+        if robot is not own:
+            drives = drives.copy()
+            drives[:, DRIVE] = robot.starting_drives()
         return dataclasses.replace(
             self,
             driven=driven,
