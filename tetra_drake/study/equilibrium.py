@@ -25,7 +25,7 @@ from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.laws.kinematics import FORCE, rigid_motions
-from tetra_drake.laws.terrain import Flat
+from tetra_drake.laws.terrain import Flat, Nothing
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
 from tetra_drake.robot.ground import START_DEPTH
@@ -188,10 +188,11 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     each actuator is an ideal force. A structure gets Coulomb friction.
 
     A structure stands on the ground of the scenario `prism`, or on a stiffer one if it is too heavy
-    for it. A file of the NASA Tensegrity Robotics Toolkit (NTRT) has bare numbers, so it needs a
-    `unit` of length, such as "dm". Struts may overlap in the file, as they do in some of NTRT's; in
-    equilibrium they touch. If the axes of two struts meet, as in plane models, all struts pass
-    through each other. Raises InputError that names file and key.
+    for it. Without weight it floats, and there is no ground. A file of the NASA Tensegrity Robotics
+    Toolkit (NTRT) has bare numbers, so it needs a `unit` of length, such as "dm". Struts may
+    overlap in the file, as they do in some of NTRT's; in equilibrium they touch. If the axes of two
+    struts meet, as in plane models, all struts pass through each other. Raises InputError that
+    names file and key.
     """
     shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
     if name_or_file not in shipped and not os.path.exists(name_or_file):
@@ -205,6 +206,8 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     else:
         structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
         given = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
+        if not structure.gravity:  # else rounding decides which nodes touch the ground
+            given = given.with_sections(terrain=Nothing())
         placed = Structure.of(structure.blueprint())
         crossing = overlaps(given, placed, placed.initial_state).values()
         if any(distance <= MEETING for _, distance in crossing):
