@@ -10,7 +10,7 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 from tetra_drake.laws import cable, capsules, contact, kinematics
 from tetra_drake.laws.forces import Forces
@@ -75,10 +75,10 @@ def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
     turning[:, :3, :3] = trace - 0.5 * (products + products.transpose(0, 2, 1))
     row, column = np.concatenate([*rows, carriers]), np.concatenate([*columns, carriers])
     moving = (row != WORLD) & (column != WORLD)
-    places = (row * bodies + column)[moving]
-    order = np.argsort(places, kind="stable")
-    place, begins = np.unique(places[order], return_index=True)
-    data = np.add.reduceat(np.concatenate([*blocks, turning])[moving][order], begins)
+    place, of_block = np.unique((row * bodies + column)[moving], return_inverse=True)
+    of_place = csr_array((np.ones(of_block.size), (of_block, np.arange(of_block.size))))
+    summed = np.concatenate([*blocks, turning])[moving].reshape(-1, 36)
+    data = (of_place @ summed).reshape(-1, 6, 6)
     first = np.searchsorted(place, bodies * np.arange(bodies + 1))
     return bsr_array((data, place % bodies, first), shape=(6 * bodies, 6 * bodies))
 

@@ -147,10 +147,18 @@ def eliminate(blocks: Table, schedule: Schedule, i: int, a: int, end: int, produ
         column = factors(blocks, i, a, t)
         for c in range(t, BLOCK):
             blocks[j, t, c] = reduced(blocks[j, t, c], column, blocks, a, c)
+    if a + 1 == end:
+        return
+    for t in range(0, BLOCK, 3):  # three rows at a time, which share the numbers of block b
+        first, second = factors(blocks, i, a, t), factors(blocks, i, a, t + 1)
+        third = factors(blocks, i, a, t + 2)
         for b in range(a + 1, end):
-            target = schedule.target[product + b - a - 1]
+            k = schedule.target[product + b - a - 1]
             for c in range(BLOCK):
-                blocks[target, t, c] = reduced(blocks[target, t, c], column, blocks, b, c)
+                x = reduced(blocks[k, t, c], first, blocks, b, c)
+                y = reduced(blocks[k, t + 1, c], second, blocks, b, c)
+                z = reduced(blocks[k, t + 2, c], third, blocks, b, c)
+                blocks[k, t, c], blocks[k, t + 1, c], blocks[k, t + 2, c] = x, y, z
 
 
 @inlined
