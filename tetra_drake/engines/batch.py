@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -12,12 +13,17 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.command import policy_signals
 from tetra_drake.robot.readings import Readings
-from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.structure import Structure
 
 if TYPE_CHECKING:
     import xarray
+
+
+BRIEF = 0.03
+"""Wall time (s) after which Batch.advance() returns with `briefly`."""
 
 
 class Viewer(Protocol):
@@ -48,6 +54,9 @@ class Batch:
         """Failure of the robot in each place; None if it has not failed."""
         self.signals = structure.signals
         """Number m of actuator signals of each robot."""
+        self._due, self._held = np.full(places, math.inf), np.zeros((places, self.signals))
+        """Next time (s) at which the policy of each robot acts, infinite without one; and the
+        signals (N, m) in N that it holds until then."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
         """Puts robots in the first places, in their order. Raises InputError if one differs too
@@ -97,7 +106,36 @@ class Batch:
         if signals is not None:
             shape = places, self.signals
             signals = checked_numbers(signals, shape, source="Batch", key="signals")
-        self._advance(np.broadcast_to(times, places), signals, briefly)
+        until, started = np.broadcast_to(times, places), time.perf_counter()
+        while True:
+            has_policy = bool(np.isfinite(self._due).any())
+            held = self._held if has_policy else signals
+            self._advance(np.minimum(until, self._due), held, briefly and not has_policy)
+            over = [place for place in range(places) if self.ended(place)]
+            self._due[over] = math.inf
+            due = np.flatnonzero(np.isfinite(self._due) & (self._due <= until)).tolist()
+            if due:
+                self._act(due)
+            is_enough = bool(over) or time.perf_counter() - started > BRIEF
+            if not due or (briefly and is_enough):
+                return
+
+    def _set_policy(self, place: int, robot: DrivenRobot) -> None:
+        """Sets when the policy of a robot at its start acts next, if it has one, and its first
+        signals."""
+        self._due[place] = math.inf if robot.pilot is None else _next_action(robot, 0.0)
+        self._held[place] = robot.robot.first_signals
+
+    def _act(self, places: list[int]) -> None:
+        """Lets the policies of the robots in `places`, which have reached their time, act."""
+        robots = [self._driven(place) for place in places]
+        self._held[places] = policy_signals(robots, self.readings.rows(places))
+        for place, robot in zip(places, robots, strict=True):
+            self._due[place] = _next_action(robot, self._due[place])
+
+    def _driven(self, place: int) -> DrivenRobot:
+        """The robot in a place that is not idle."""
+        raise NotImplementedError
 
     def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         raise NotImplementedError
@@ -178,7 +216,13 @@ class SerialBatch(Batch):
         self._robots[place] = self._start(robot)
         self.failures[place], self.readings.time[place] = None, 0.0
         self._reached[place], self._ends[place] = 0.0, robot.robot.scenario.simulation.duration
+        self._set_policy(place, robot)
         return True
+
+    def _driven(self, place: int) -> DrivenRobot:
+        robot = self._robots[place]
+        assert robot is not None
+        return robot.driven
 
     def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
         until = np.minimum(until, self._ends)
@@ -210,13 +254,23 @@ class SerialBatch(Batch):
         robot = self._robots[place]
         self._robots[to] = None if robot is None else robot.copied()
         self.failures[to] = self.failures[place]
-        self._reached[to], self._ends[to] = self._reached[place], self._ends[place]
+        for table in (self._reached, self._ends, self._due, self._held):
+            table[to] = table[place]
         self.readings.put(to, self.readings.rows(place))
 
     def stop(self, place: int) -> float:
         robot, self._robots[place] = self._robots[place], None
+        self._due[place] = math.inf
         self.failures[place] = None
         return 0.0 if robot is None else robot.wall_time
+
+
+def _next_action(robot: DrivenRobot, time: float) -> float:
+    """Time (s) at which a robot's policy acts next after an action at `time` (s)."""
+    scenario = robot.robot.scenario
+    step = scenario.cpg.listing_step
+    steps = round(scenario.simulation.control_period / step)
+    return round(step * (steps * (round(time / (steps * step)) + 1)), MARK_DECIMALS)
 
 
 def checked_numbers(

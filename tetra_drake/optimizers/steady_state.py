@@ -97,8 +97,10 @@ def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector
     equal.
 
     With `tau_mutation: listing`, tau_A does not mutate, like in the thesis's listing A.3.4, whose
-    index 26 means tau_B.
+    index 26 means tau_B. For a policy it is a tenth of the range.
     """
+    if space.of_policy:
+        return 0.1 * (space.high - space.low)
     is_gain = np.array([name.startswith("gain ") for name in space.names])
     steps = np.where(is_gain, GAIN_MUTATION, settings.weight_mutation)
     step = settings.tau_mutation_range

@@ -1,19 +1,23 @@
-"""Robots without a network: driven by a command, or by a controller."""
+"""Robots without a network: driven by a command, a controller or a policy."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import AnyGait, PolicyParameters
 from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot, Pilot
+from tetra_drake.scenario.policies import DrivenRobots
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -32,24 +36,39 @@ class Command:
     `actuation` in the scenario defines which."""
 
 
-Driver = Gait | Command
-"""A gait or a command: what drives the actuators if there is no controller."""
+Driver = AnyGait | Command
+"""A gait, a policy's parameters or a command: what drives the actuators without a controller."""
 
 
 def driven_robot(
-    scenario: Scenario, driver: Driver, *, steering: SteeringSignal | None = None
+    scenario: Scenario,
+    driver: Driver,
+    *,
+    steering: SteeringSignal | None = None,
+    robot: Robot | None = None,
 ) -> DrivenRobot:
-    """The robot of a scenario, driven by a gait or a command.
+    """The robot of a scenario, driven by a gait, a command, or the scenario's policy.
 
     The signals of a command are linear between multiples of `cpg.listing_step` (s). A change of
     setpoint begins at the time of its sample and takes one such step. `steering`, a function from
     time (s) to the turn (-1 to 1), replaces the constant turn of a gait; a command ignores it.
+    `robot` is the scenario's robot if it is made already.
+
     Raises InputError for a command without samples, or whose number of cables is not the robot's
-    number of driven cables.
+    number of driven cables. Also for a gait if the scenario has a policy, for parameters of a
+    policy that it does not have, and for steering of a policy.
     """
-    if isinstance(driver, Gait):
-        return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
-    robot = Robot.of(scenario).without_network()
+    robot = robot or Robot.of(scenario)
+    if isinstance(driver, PolicyParameters):
+        if steering is not None:
+            raise InputError("steering", "", f"found a function, and {driver.name} is for a policy")
+        return _piloted_robot(robot, driver)
+    if not isinstance(driver, Command):
+        if scenario.policy is not None:
+            expected = f"expected parameters of a policy, which scenario {scenario.name} has"
+            raise InputError(f"gait {driver.name}", "", f"found a gait, {expected}")
+        return DrivenRobot.of(robot, driver, steering=steering)
+    robot = robot.without_network()
     driven = robot.driven
     problem = "" if len(driver.samples) else "has none, expected one at least"
     if driver.samples.shape[1:] != driven.shape:
@@ -71,8 +90,57 @@ def controlled_robot(scenario: Scenario) -> Robot:
 
     Its `first_signals`, the signals at t = 0, let the actuators start in the same state as with the
     network."""
-    by_network, actuation = Robot.of(scenario), scenario.actuation
-    setpoints = actuation.commands(by_network.starting_cables())
-    robot = by_network.without_network()
-    law = CableLaw.of(robot.structure.cables[robot.driven])
-    return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
+    return Robot.of(scenario).controlled
+
+
+def _piloted_robot(robot: Robot, parameters: PolicyParameters) -> DrivenRobot:
+    """A robot driven by its scenario's policy with these parameters, whose first signals act from
+    the start on. Raises InputError if the scenario has no policy, or one with other parameters."""
+    scenario, expected = robot.scenario, len(robot.scenario.policy_parameters)
+    if len(parameters.values) != expected:
+        problem = f"found {len(parameters.values)}, scenario {scenario.name} has {expected}"
+        raise InputError(f"policy {parameters.name}", "parameters", problem)
+    controlled, structure = robot.controlled, robot.structure
+    cables = robot.starting_cables()
+    law: Any = CableLaw.of(controlled.structure.cables[robot.driven])
+    first = structure.p_WN[structure.struts[:1]]
+    size = np.linalg.norm(first[:, 1] - first[:, 0], axis=-1)
+    robots = DrivenRobots(
+        actuation=scenario.actuation,
+        gain=scenario.cpg.gain,
+        ends=structure.cable_ends[robot.driven],
+        law=CableLaw(*(values[np.newaxis] for values in law)),
+        rest=scenario.actuation.commands(cables)[np.newaxis],
+        lengths=structure.initial_lengths[np.newaxis],
+        weight=np.array([robot.weight]),
+        size=size if size.size else np.array([scenario.robot.size]),
+    )
+    samples = np.zeros((1, robot.driven.size))
+    pilot = Pilot(parameters=parameters, robots=robots)
+    driven = DrivenRobot(robot=controlled, name=parameters.name, samples=samples, pilot=pilot)
+    readings = Readings(*(np.array(values)[np.newaxis] for values in first_readings(controlled)))
+    first_signals = policy_signals([driven], readings)
+    controlled = dataclasses.replace(controlled, first_signals=first_signals[0])
+    return dataclasses.replace(driven, robot=controlled, samples=first_signals)
+
+
+def policy_signals(robots: Sequence[DrivenRobot], readings: Readings) -> np.ndarray:
+    """Signals (N, m) in N that the policies of N robots give for their readings. Raises InputError
+    if a user's policy returns anything but finite numbers of this shape."""
+    signals = np.empty((len(robots), robots[0].samples.shape[1]))
+    policies = [robot.robot.scenario.policy for robot in robots]
+    for policy in {id(policy): policy for policy in policies}.values():
+        rows = [i for i, other in enumerate(policies) if other is policy]
+        pilots = [pilot for i in rows if (pilot := robots[i].pilot) is not None]
+        assert policy is not None
+        parts = [pilot.robots for pilot in pilots]
+        together = parts[0]._replace(
+            law=CableLaw(*np.concatenate([part.law for part in parts], axis=1)),
+            rest=np.concatenate([part.rest for part in parts]),
+            lengths=np.concatenate([part.lengths for part in parts]),
+            weight=np.concatenate([part.weight for part in parts]),
+            size=np.concatenate([part.size for part in parts]),
+        )
+        values = np.array([pilot.parameters.values for pilot in pilots])
+        signals[rows] = policy.signals(together, readings.rows(rows), values)
+    return signals

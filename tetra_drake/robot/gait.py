@@ -3,6 +3,7 @@
 import json
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, Self
@@ -118,11 +119,48 @@ class Gait:
 
 
 @dataclass(frozen=True)
+class PolicyParameters:
+    """Parameters of a policy, in place of a gait: what evolution searches for in a scenario with a
+    policy."""
+
+    name: str
+    values: tuple[float, ...]
+    """Parameters in the order of Scenario.policy_parameters."""
+    scenario: str = field(default="", compare=False)
+    """Name of the scenario that they were made for; "" if it is unknown."""
+
+    def __str__(self) -> str:
+        least, most = min(self.values), max(self.values)
+        return f"{self.name}: {len(self.values)} parameters of a policy, {least:.4g} to {most:.4g}"
+
+    def __repr__(self) -> str:
+        return f"<PolicyParameters {self.name}>"
+
+    def to_json(self, scenario: Scenario) -> dict[str, Any]:
+        """Content of a file, for json.dumps(). The parameters must fit `scenario`, which gives
+        their names."""
+        parameters = dict(zip(scenario.policy_parameters, self.values, strict=True))
+        made_for = self.scenario or scenario.name
+        return {"schema": 1, "name": self.name, "scenario": made_for, "parameters": parameters}
+
+
+AnyGait = Gait | PolicyParameters
+"""A gait, or the parameters of a policy in its place."""
+
+
+def network_gait(gait: AnyGait) -> Gait:
+    """The given gait. Raises InputError for parameters of a policy, which has no network."""
+    if isinstance(gait, Gait):
+        return gait
+    raise InputError(gait.name, "", "found parameters of a policy, expected a gait of a network")
+
+
+@dataclass(frozen=True)
 class ParameterSpace:
     """Parameter space of a scenario's gaits, for your own search algorithm.
 
     A vector has the weights, the feedback gains (if the scenario has feedback), and the time
-    constants tau_A and tau_B in s.
+    constants tau_A and tau_B in s. In a scenario with a policy it has the policy's parameters.
 
     >>> space = td.ParameterSpace.of("thesis")
     >>> vector = space.repair(0.5 * (space.low + space.high))
@@ -147,6 +185,8 @@ class ParameterSpace:
     """Names of the feedback pathways with a gain."""
     turn: float
     """Steering of all gaits; see Gait.turn."""
+    of_policy: bool = False
+    """True if the parameters are of a policy."""
 
     @classmethod
     def of(cls, scenario: GivenScenario) -> Self:
@@ -156,6 +196,8 @@ class ParameterSpace:
         bounds of tau_B are twice the bounds of tau_A. The bounds of feedback gains are -1 and 1.
         """
         scenario = given_scenario(scenario)
+        if scenario.policy is not None:
+            return cls._of_policy(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
         weight_names, pathways = weights.names, tuple(scenario.cpg.feedback)
         shared = np.arange(len(weight_names))
@@ -185,11 +227,29 @@ class ParameterSpace:
             turn=bounds.turn,
         )
 
-    def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
+    @classmethod
+    def _of_policy(cls, scenario: Scenario) -> Self:
+        low, high = np.array([*scenario.policy_parameters.values()]).T
+        return cls(
+            names=tuple(scenario.policy_parameters),
+            low=low,
+            high=high,
+            floors=np.full(low.size, -math.inf),
+            couples_tau_b=False,
+            weights=np.zeros(0, dtype=np.int64),
+            weight_names=(),
+            pathways=(),
+            turn=0.0,
+            of_policy=True,
+        )
+
+    def gait(self, vector: npt.ArrayLike, *, name: str) -> AnyGait:
         """Gait called `name` with the parameters of a vector (parameters,), in the order of
         `names`; the bounds are not checked. Raises InputError for a vector of another size, a
         number that is not finite, a weight below 0, or a time constant that is not above 0."""
         vector = self._numbers(vector)
+        if self.of_policy:
+            return PolicyParameters(name, tuple(vector.tolist()))
         first_gain = len(self.names) - 2 - len(self.pathways)
         gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
         return Gait(
@@ -202,10 +262,12 @@ class ParameterSpace:
             weight_names=self.weight_names,
         )
 
-    def vector(self, gait: Gait) -> Vector:
+    def vector(self, gait: AnyGait) -> Vector:
         """Parameter vector of a gait, without its name and turn. With mirrored weights, a left
         weight and its right image share a parameter, which the first of the two gives. Raises
         InputError if the gait has another number of weights."""
+        if isinstance(gait, PolicyParameters):
+            return self._numbers(gait.values)
         if len(gait.weights) != len(self.weights):
             problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
             raise InputError("ParameterSpace", f"gait {gait.name}", problem)
@@ -217,6 +279,8 @@ class ParameterSpace:
     def random(self, generator: np.random.Generator) -> Vector:
         """Random parameter vector, uniform between `low` and `high`. tau_B is not drawn: it is
         2 tau_A, even if a search may change it independently later."""
+        if self.of_policy:
+            return generator.uniform(self.low, self.high)
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
@@ -245,7 +309,7 @@ WALKING_SEED = 80
 """Seed of a random gait that walks forward on the thesis's scenario: the default gait."""
 
 
-def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
+def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> AnyGait:
     """Random gait, the same for the same seed: uniform between the scenario's bounds of gaits.
 
     The default bounds are from Table 5 of the thesis.
@@ -266,7 +330,7 @@ def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
     return space.gait(space.random(np.random.default_rng(seed)), name=f"random gait {seed}")
 
 
-def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
+def save_gait(gait: AnyGait, path: str | Path, scenario: Scenario) -> None:
     """Writes a gait file (JSON) at `path`. The gait must fit `scenario`, which gives the names of
     its weights. load_gait() reads exactly the same numbers."""
     write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
@@ -290,8 +354,18 @@ class GaitFile(Section):
     gains: Gains = Gains()
 
 
-def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Gait:
-    """Reads a gait for the scenario's robot.
+class PolicyFile(Section):
+    """Content of a file of policy parameters as it was read; see PolicyParameters."""
+
+    version: Literal[1] = Field(alias="schema")
+    name: str = ""
+    scenario: str = ""
+    parameters: dict[str, float]
+    """Parameters by name, in any order; see Scenario.policy_parameters."""
+
+
+def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> AnyGait:
+    """Reads a gait for the scenario's robot, or the parameters of the scenario's policy.
 
         >>> gait = td.load_gait("gait.json", td.load_scenario("quick"))
 
@@ -306,21 +380,20 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     """
     raw = read_json(given_path(path, "load_gait", "path"), "gait file")
     raw = raw.get(key) if key and isinstance(raw, dict) else raw
-    file = GaitFile.from_tree(raw, path, key=key)
     scenario = given_scenario(scenario)
+    if scenario.policy is not None:
+        if isinstance(raw, dict) and "weights" in raw:
+            problem = f"is a gait, expected parameters: scenario {scenario.name} has a policy"
+            raise InputError(path, key, problem)
+        policy = PolicyFile.from_tree(raw, path, key=key)
+        place = f"{key}.parameters".strip(".")
+        values = _in_order(policy.parameters, [*scenario.policy_parameters], path, place)
+        return PolicyParameters(policy.name or Path(path).stem, tuple(values), policy.scenario)
+    file = GaitFile.from_tree(raw, path, key=key)
     own, weights = Weights.of(scenario), file.weights
     names = own.names
     if isinstance(weights, dict):
-        missing = [name for name in names if name not in weights]
-        unknown = [name for name in weights if name not in names]
-        problems = [f"lacks {len(missing)} names, such as '{missing[0]}'"] if missing else []
-        if unknown:
-            problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
-        if problems:
-            found = f"found {len(weights)}, expected the {len(names)} of the scenario"
-            problem = f"{found}; {' and '.join(problems)}"
-            raise InputError(path, f"{key}.weights".strip("."), problem)
-        weights = [weights[name] for name in names]
+        weights = _in_order(weights, names, path, f"{key}.weights".strip("."))
     gait = Gait(
         name=file.name or Path(path).stem,
         weights=tuple(weights),
@@ -335,20 +408,36 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     return gait
 
 
+def _in_order(
+    given: dict[str, float], names: Sequence[str], source: object, key: str
+) -> list[float]:
+    """The values of `given` in the order of `names`. Raises InputError, naming source and key,
+    unless the names are the same."""
+    missing = [name for name in names if name not in given]
+    unknown = [name for name in given if name not in names]
+    problems = [f"lacks {len(missing)} names, such as '{missing[0]}'"] if missing else []
+    if unknown:
+        problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
+    if problems:
+        found = f"found {len(given)}, expected the {len(names)} of the scenario"
+        raise InputError(source, key, f"{found}; {' and '.join(problems)}")
+    return [given[name] for name in names]
+
+
 class HasBestGait(Protocol):
     """Object with a best gait, such as a run."""
 
-    def best_gait(self) -> Gait: ...
+    def best_gait(self) -> AnyGait: ...
 
 
-GivenGait = Gait | HasBestGait | str | Path
-"""A gait, its file, or a run; a run means its best gait."""
+GivenGait = AnyGait | HasBestGait | str | Path
+"""A gait, parameters of a policy, their file, or a run; a run means its best gait."""
 
 
-def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
+def given_gait(gait: GivenGait, scenario: Scenario) -> AnyGait:
     """The gait that an argument means: a gait itself, one read from a file for `scenario`, or the
     best gait of a run. Raises InputError for anything else."""
-    if isinstance(gait, Gait):
+    if isinstance(gait, AnyGait):
         return gait
     if isinstance(gait, (str, Path)):
         if os.path.isdir(gait):

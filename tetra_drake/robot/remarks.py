@@ -27,7 +27,7 @@ def gain_remark(robot: Robot) -> str:
     """Remark on a `cpg.gain` (N) whose signals change the length of no cable by 1% (LEAST_MOTION),
     or exceed the limits of the actuators. It is "" if the gain is sensible."""
     cpg, driven = robot.scenario.cpg, robot.structure.cables[robot.driven]
-    if not driven.size:
+    if not driven.size or robot.scenario.policy is not None:
         return ""
     signal, stretch = _usual_signal(robot)
     share = np.max(stretch / robot.structure.initial_lengths[robot.driven])
@@ -46,9 +46,11 @@ def stillness_remark(robot: Robot, distance: float) -> str:
     length = np.ptp(robot.structure.p_WN, axis=0).max()
     if not looks_for_distance(scenario.objective) or not abs(distance) < STILL * length:
         return ""
+    way = f"walks {units.shown(distance, 'm')}, less than a tenth of its length"
+    if scenario.policy is not None:
+        return f"the robot {way}"
     _, stretch = _usual_signal(robot)
     signals = f"signals with cpg.gain {units.shown(scenario.cpg.gain, 'N')}"
-    way = f"walks {units.shown(distance, 'm')}, less than a tenth of its length"
     most = units.shown(stretch.max(initial=0.0), "m")
     return f"the robot {way}; {signals} stretch cables by {most} at most"
 
@@ -57,7 +59,7 @@ def start_up_remark(robot: Robot) -> str:
     """Remark on a simulation that ends by the start-up time `cpg.start_up`, before which signals
     are zero, so no cable is ever actuated. It is "" otherwise."""
     start_up, duration = robot.scenario.cpg.start_up, robot.scenario.simulation.duration
-    if start_up < duration:
+    if start_up < duration or robot.scenario.policy is not None:
         return ""
     return f"within {duration:g} s no cable is actuated, as cpg.start_up is {start_up:g} s"
 

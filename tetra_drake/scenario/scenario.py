@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import json
@@ -33,6 +34,7 @@ from tetra_drake.scenario.common_sections import (
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
+from tetra_drake.scenario.policies import Policy, PolicyBounds
 from tetra_drake.scenario.robot_structure import RobotKind
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
@@ -80,6 +82,9 @@ class Scenario(Section):
     strut_contact: StrutContactKind = NoStrutContact()
     actuation: Actuation = Force()
     cpg: CpgSection
+    policy: Policy | None = Field(default=None, exclude_if=lambda policy: policy is None)
+    """A closed loop in place of the oscillator network; evolution searches its parameters. An empty
+    key removes the base's."""
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: EngineKind = Drake()
@@ -194,6 +199,15 @@ class Scenario(Section):
         """Number of simulations per gait in evolution: one, or one per draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
 
+    @functools.cached_property
+    def policy_parameters(self) -> Mapping[str, PolicyBounds]:
+        """Names of the parameters of the scenario's policy, with their bounds in random policies;
+        empty without a policy."""
+        blueprint = self.robot.blueprint()
+        if not self.terrain.is_ground:
+            blueprint = dataclasses.replace(blueprint, contacts=blueprint.contacts[:0])
+        return {} if self.policy is None else self.policy.parameters(blueprint)
+
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
         """Makes a scenario from the content of a file that has all settings. Raises InputError that
@@ -270,6 +284,14 @@ class Scenario(Section):
                     refuse(f"{key}.{name}", f"!{section.tag} {problem}")
 
         blueprint, bounds = self.robot.blueprint(), self.gait_bounds
+        periods = simulation.control_period / step
+        if self.policy and (periods < 0.5 or abs(periods - round(periods)) > 1e-6):
+            expected = f"expected a multiple of cpg.listing_step, {step} s, for a policy"
+            refuse("simulation.control_period", f"found {simulation.control_period} s, {expected}")
+        excluded = {"cpg.feedback": self.cpg.feedback, "gait_bounds.turn": bounds.turn}
+        for key, value in excluded.items():
+            if self.policy and value:
+                refuse(key, f"found {value}, expected none: a policy excludes it")
         is_drake = isinstance(self.engine, Drake)
         most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
         least_step = simulation.duration * blueprint.signals / most_signals

@@ -126,12 +126,18 @@ class LaneBatch(Batch):
         self.readings.time[place] = 0.0
         self._wall_times[place] = self._tried[place] = 0.0
         self._controlled[place] = robot.is_controlled
+        self._set_policy(place, robot)
         return True
+
+    def _driven(self, place: int) -> DrivenRobot:
+        prepared = self._prepared[place]
+        assert prepared is not None
+        return prepared.driven
 
     def stop(self, place: int) -> float:
         for thread in self._threads:
             thread.leave(place)
-        self._status[place] = loop.IDLE
+        self._status[place], self._due[place] = loop.IDLE, math.inf
         self._prepared[place] = self.failures[place] = None
         return float(self._wall_times[place])
 
@@ -144,7 +150,7 @@ class LaneBatch(Batch):
         tables += [self._places.states, self._places.constants]
         tables += [self._places.signals, self._places.holds]
         tables += [self._heights, self._ends, self._wall_times, self._tried, *self.readings]
-        tables.append(self._controlled)
+        tables += [self._controlled, self._due, self._held]
         for table in tables:
             table[to] = table[place]
         self._places.constants[to, self._first_height] = to * self._heights.shape[1]
