@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import AnyGait, PolicyParameters
-from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.network import SteeringSignal, usual_amplitude
 from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot, Pilot
@@ -102,15 +102,14 @@ def _piloted_robot(robot: Robot, parameters: PolicyParameters) -> DrivenRobot:
         raise InputError(f"policy {parameters.name}", "parameters", problem)
     controlled, structure = robot.controlled, robot.structure
     cables = robot.starting_cables()
-    law: Any = CableLaw.of(controlled.structure.cables[robot.driven])
     first = structure.p_WN[structure.struts[:1]]
     size = np.linalg.norm(first[:, 1] - first[:, 0], axis=-1)
     robots = DrivenRobots(
         actuation=scenario.actuation,
-        gain=scenario.cpg.gain,
         ends=structure.cable_ends[robot.driven],
-        law=CableLaw(*(values[np.newaxis] for values in law)),
+        cables=_joined([cables], np.stack),
         rest=scenario.actuation.commands(cables)[np.newaxis],
+        amplitude=np.array([usual_amplitude(scenario.cpg)]),
         lengths=structure.initial_lengths[np.newaxis],
         weight=np.array([robot.weight]),
         size=size if size.size else np.array([scenario.robot.size]),
@@ -128,19 +127,25 @@ def policy_signals(robots: Sequence[DrivenRobot], readings: Readings) -> np.ndar
     """Signals (N, m) in N that the policies of N robots give for their readings. Raises InputError
     if a user's policy returns anything but finite numbers of this shape."""
     signals = np.empty((len(robots), robots[0].samples.shape[1]))
-    policies = [robot.robot.scenario.policy for robot in robots]
-    for policy in {id(policy): policy for policy in policies}.values():
-        rows = [i for i, other in enumerate(policies) if other is policy]
-        pilots = [pilot for i in rows if (pilot := robots[i].pilot) is not None]
+    groups: dict[tuple[int, int], list[int]] = {}
+    for row, robot in enumerate(robots):
+        scenario = robot.robot.scenario
+        groups.setdefault((id(scenario.policy), id(scenario.actuation)), []).append(row)
+    for rows in groups.values():
+        policy = robots[rows[0]].robot.scenario.policy
+        pilots = [pilot for row in rows if (pilot := robots[row].pilot) is not None]
         assert policy is not None
-        parts = [pilot.robots for pilot in pilots]
-        together = parts[0]._replace(
-            law=CableLaw(*np.concatenate([part.law for part in parts], axis=1)),
-            rest=np.concatenate([part.rest for part in parts]),
-            lengths=np.concatenate([part.lengths for part in parts]),
-            weight=np.concatenate([part.weight for part in parts]),
-            size=np.concatenate([part.size for part in parts]),
-        )
+        actuation, ends, *_ = pilots[0].robots
+        arrays = [pilot.robots[2:] for pilot in pilots]
+        together = DrivenRobots(actuation, ends, *_joined(arrays, np.concatenate))
         values = np.array([pilot.parameters.values for pilot in pilots])
         signals[rows] = policy.signals(together, readings.rows(rows), values)
     return signals
+
+
+def _joined(parts: Sequence[Any], join: Callable[[Sequence[np.ndarray]], np.ndarray]) -> Any:
+    """Named tuple of arrays, nested ones included, that `join` makes of the arrays of several."""
+    if not isinstance(parts[0], tuple):
+        return join(parts)
+    fields = [_joined(each, join) for each in zip(*parts, strict=True)]
+    return type(parts[0])._make(fields) if hasattr(parts[0], "_make") else fields

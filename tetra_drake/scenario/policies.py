@@ -19,8 +19,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
-from tetra_drake.laws.actuator import ActuatorKind
-from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.actuator import ActuatorKind, DrivenCables
 from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.settings.quantities import Time
 from tetra_drake.settings.refusals import refuse
@@ -39,21 +38,28 @@ class DrivenRobots(NamedTuple):
 
     actuation: ActuatorKind
     """Kind of the actuators."""
-    gain: float
-    """The setting `cpg.gain` (N)."""
     ends: np.ndarray
     """Indices of the two end nodes of each driven cable (driven, 2)."""
-    law: CableLaw
-    """Constants of the driven cables, arrays (N, driven)."""
+    cables: DrivenCables
+    """Driven cables at the start, arrays (N, driven)."""
     rest: np.ndarray
     """Setpoints (N, driven) of the actuators at the start, where the robots rest: forces, free
     lengths or tensions by the kind of actuators."""
+    amplitude: np.ndarray
+    """Usual amplitudes (N,) of the signals of an oscillator network, which `cpg.gain` sets."""
     lengths: np.ndarray
     """Lengths of all cables at the start (N, cables)."""
     weight: np.ndarray
     """Weights (N,)."""
     size: np.ndarray
     """Lengths of the first strut (N,)."""
+
+    def as_given(self, signals: np.ndarray) -> np.ndarray:
+        """Signals (N, driven) in N for robots without a network, from signals like a network's. For
+        motors that imitate a cable's spring, they are the whole tension at the start's length."""
+        if not self.actuation.plays_cable:
+            return signals
+        return np.asarray(self.actuation.commands(self.cables._replace(signal=signals)))
 
 
 class PolicyKind(Section):
@@ -91,7 +97,7 @@ class RollingPolicy(PolicyKind):
         return dict.fromkeys(["1", "x", "z", "x²", "xz", "z²", "sx", "sz"], (-1.0, 1.0))
 
     def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> np.ndarray:
-        p_WN, law = readings.p_WN, robots.law
+        p_WN, law = readings.p_WN, robots.cables.law
         middles = 0.5 * (p_WN[:, robots.ends[:, 0]] + p_WN[:, robots.ends[:, 1]])
         half = 0.5 * robots.size[:, np.newaxis, np.newaxis]
         places = (middles - p_WN.mean(axis=-2, keepdims=True)) / half
@@ -100,13 +106,14 @@ class RollingPolicy(PolicyKind):
         terms = np.stack([np.ones_like(x), x, z, x * x, x * z, z * z, s * x, s * z], axis=-1)
         shares = np.clip((terms * values[:, np.newaxis]).sum(axis=-1), -self.most, self.most)
         lengths = law.free_length * (1.0 - shares)
-        return np.asarray(law.stiffness * (law.free_length - lengths))
+        return robots.as_given(law.stiffness * (law.free_length - lengths))
 
 
 class SensingPolicy(PolicyKind):
     """Base class for policies that see chosen readings as a list of inputs, numbers of about 1.
 
-    A signal is `cpg.gain` times an output of the policy between -1 and 1.
+    A signal is an output of the policy, between -1 and 1, times the usual amplitude of an
+    oscillator network's signals: half of `cpg.gain` times `cpg.external_input`.
     """
 
     readings: list[
@@ -143,6 +150,10 @@ class SensingPolicy(PolicyKind):
         sizes |= {"q_WB": 4 * bodies, "w_WB": 3 * bodies, "p_WN": 3 * nodes, "v_WN": 3 * nodes}
         return [f"{name} {i + 1}" for name in self.readings for i in range(sizes[name])]
 
+    def signals_of(self, outputs: np.ndarray, robots: DrivenRobots) -> np.ndarray:
+        """Signals (N, driven) in N from the outputs (N, driven) of the policy, -1 to 1."""
+        return robots.as_given(robots.amplitude[:, np.newaxis] * outputs)
+
     def inputs(self, robots: DrivenRobots, readings: Any) -> np.ndarray:
         """Inputs (N, inputs) of the policy of each robot."""
         phase, weight = math.tau * readings.time / self.clock, robots.weight[:, np.newaxis]
@@ -164,8 +175,9 @@ class SensingPolicy(PolicyKind):
 
 
 class LinearPolicy(SensingPolicy):
-    """Linear policy: each signal is `cpg.gain` times a bias plus a weighted sum of the readings,
-    at least -1 and at most 1."""
+    """Linear policy: each output is a bias plus a weighted sum of the readings, at least -1 and at
+    most 1. It is multiplied by the usual amplitude of an oscillator network's signals: half of
+    `cpg.gain` times `cpg.external_input`."""
 
     tag = "Linear"
 
@@ -174,12 +186,13 @@ class LinearPolicy(SensingPolicy):
 
     def signals(self, robots: DrivenRobots, readings: Any, values: np.ndarray) -> np.ndarray:
         outputs = _weighted(values, self.inputs(robots, readings), len(robots.ends))
-        return robots.gain * np.clip(outputs, -1.0, 1.0)
+        return self.signals_of(np.clip(outputs, -1.0, 1.0), robots)
 
 
 class NetworkPolicy(SensingPolicy):
-    """Neural network with one hidden layer: each signal is `cpg.gain` times an output. Neurons of
-    both layers have the activation tanh."""
+    """Neural network with one hidden layer, whose neurons and outputs have the activation tanh. The
+    outputs are multiplied by the usual amplitude of an oscillator network's signals: half of
+    `cpg.gain` times `cpg.external_input`."""
 
     tag = "Network"
 
@@ -195,7 +208,8 @@ class NetworkPolicy(SensingPolicy):
         outputs = len(robots.ends)
         last = outputs * (1 + self.hidden)
         hidden = _weighted(values[:, :-last], self.inputs(robots, readings), self.hidden)
-        return robots.gain * np.tanh(_weighted(values[:, -last:], np.tanh(hidden), outputs))
+        last_sums = _weighted(values[:, -last:], np.tanh(hidden), outputs)
+        return self.signals_of(np.tanh(last_sums), robots)
 
 
 class PythonPolicy(PolicyKind):
@@ -239,7 +253,7 @@ class PythonPolicy(PolicyKind):
             time = readings.time[np.argwhere(~np.isfinite(actions))[0][0]]
             problem = f"returned a number that is not finite, at {time:g} s"
             raise InputError("policy.function", self.function, problem)
-        return np.asarray(robots.actuation.signals(actions, robots.law), dtype=float)
+        return np.asarray(robots.actuation.signals(actions, robots.cables.law), dtype=float)
 
 
 Policy = Annotated[RollingPolicy | LinearPolicy | NetworkPolicy | PythonPolicy, Kinds()]

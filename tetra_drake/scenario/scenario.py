@@ -138,7 +138,7 @@ class Scenario(Section):
         is empty exactly if the scenarios are equal, apart from their names.
         """
         ours, theirs = self.values(), base.values()
-        kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs[key]]
+        kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs.get(key)]
         other_kinds = tuple(key.removesuffix(TAG) for key in kinds)
         found = []
         for key in dict.fromkeys([*ours, *theirs]):
