@@ -99,7 +99,9 @@ def export(
     result = simulate(scenario=finely, gait=gait, record=True)
     robot, motion = result.robot, result.trajectory.isel(time=slice(None, None, refinement))
     loads = actuator_loads(robot, result.trajectory)
-    command = Command(gait.name, 1.0 / rate, loads.commands[::refinement])
+    # A policy acts at an instant; what it commands is there a moment later.
+    first = 0 if scenario.policy is None else 1
+    command = Command(gait.name, 1.0 / rate, loads.commands[first::refinement])
     axes = [f"{node} {axis}_mm" for node in robot.structure.node_names for axis in "xyz"]
     positions = 1e3 * motion.p_WN.values.reshape(-1, len(axes))
     out.parent.mkdir(parents=True, exist_ok=True)
