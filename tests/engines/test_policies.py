@@ -68,23 +68,25 @@ def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine
     setpoints = scenario.actuation.commands(cables._replace(signal=signals))
     command = Command("biases", 1.0, setpoints[np.newaxis])
     played = simulate(scenario, command=command, record=True)
-    for key, error in {"signal": 1e-9, "p_WN": 2e-5}.items():
+    limit = 2e-4 if engine == "!Drake" else 2e-5
+    for key, error in {"signal": 1e-9, "p_WN": limit}.items():
         found, expected = driven.trajectory[key].values, played.trajectory[key].values
         np.testing.assert_allclose(found, expected, rtol=0, atol=error)
     assert np.ptp(driven.trajectory.p_WN.values, axis=0).max() > 1e-4
 
 
 def test_the_engines_agree_on_a_network():
+    """With signals that do not throw the prism about."""
     changes = {"simulation.duration": "1 s", "engine": "!Compiled {tolerance: 1e-6 m/s}"}
     scenario = brief("prism", "!Network {hidden: 3, readings: [clock, lengths, w_WB]}")
-    compiled = scenario.with_changes(changes)
-    fine = "!Drake {accuracy: 1e-5, max_step: 1 ms, look_ahead: 1 us}"
+    compiled = scenario.with_numbers({"cpg.gain": 0.3 * scenario.cpg.gain}).with_changes(changes)
+    fine = "!Drake {accuracy: 1e-4, max_step: 2 ms}"
     gait = td.seeded_gait(scenario, 3)
     results = [
         simulate(each, gait, record=True).trajectory.p_WN.values
         for each in (compiled, compiled.with_changes({"engine": fine}))
     ]
-    np.testing.assert_allclose(*results, rtol=0, atol=2e-4)
+    np.testing.assert_allclose(*results, rtol=0, atol=2e-5)
     assert np.abs(results[0][-1] - results[0][0]).max() > 1e-3
 
 
