@@ -28,6 +28,11 @@ from tetra_drake.settings.section import Kinds, Section
 MOST_PARAMETERS = 100_000
 """Largest number of parameters of a policy."""
 
+Reading = Literal[
+    "clock", "lengths", "rates", "tensions", "normal_forces", "q_WB", "w_WB", "p_WN", "v_WN"
+]
+"""Readings that some policies can see; see robot.readings.Readings."""
+
 PolicyBounds = tuple[float, float]
 """Least and greatest value of a parameter in random policies."""
 
@@ -116,19 +121,7 @@ class SensingPolicy(PolicyKind):
     oscillator network's signals: half of `cpg.gain` times `cpg.external_input`.
     """
 
-    readings: list[
-        Literal[
-            "clock",
-            "lengths",
-            "rates",
-            "tensions",
-            "normal_forces",
-            "q_WB",
-            "w_WB",
-            "p_WN",
-            "v_WN",
-        ]
-    ] = Field(default=["clock", "lengths", "normal_forces"], min_length=1)
+    readings: list[Reading] = Field(default=["clock", "lengths", "normal_forces"], min_length=1)
     """Readings that the policy gets; see the class Readings. `clock` is sine and cosine of a clock.
     Lengths of cables are changes since the start, as shares; rates are shares per second. Forces
     are in units of the robot's weight. Positions of nodes are from the robot's centre, in units of
