@@ -120,6 +120,15 @@ class Robot:
         still = np.zeros(structure.signals)
         return Robot(self.scenario, structure, model, first_signals=still, has_network=False)
 
+    @functools.cached_property
+    def controlled(self) -> Robot:
+        """A copy of the robot without its network, for a controller or a policy. Its first signals
+        let the actuators start in the same state as with the network."""
+        actuation, robot = self.scenario.actuation, self.without_network()
+        setpoints = actuation.commands(self.starting_cables())
+        law = cable.CableLaw.of(robot.structure.cables[robot.driven])
+        return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
+
     @property
     def driven(self) -> np.ndarray:
         """Indices (driven cables,) of the cables that have actuators, in the order of the
