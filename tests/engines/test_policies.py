@@ -17,9 +17,10 @@ from tetra_drake.robot.gait import ParameterSpace, PolicyParameters, load_gait, 
 from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.policies import imported_function
+from tetra_drake.scenario.policies import driven_names, imported_function
 
-ENGINES = ["!Compiled", "!Drake", "!Mujoco"] if installed() else ["!Compiled", "!Drake"]
+DRAKE = "!Drake {accuracy: 1e-4, max_step: 2 ms}"
+ENGINES = ["!Compiled", DRAKE, "!Mujoco"] if installed() else ["!Compiled", DRAKE]
 COEFFICIENTS = (0.2, -0.4, 0.7, -0.6, 0.3, 0.5, -0.2, 0.4)
 
 
@@ -53,10 +54,12 @@ def test_the_rolling_policy_moves_the_rover_as_a_controller_of_its_formula_does(
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", ["prism", "rover", "motors"])
 def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine):
-    """With forces, free lengths and tensions."""
-    if (name, engine) in {("rover", "!Drake"), ("motors", "!Mujoco")}:
+    """With forces, free lengths and tensions, also after a driven cable was cut."""
+    if (name, engine) in {("rover", DRAKE), ("motors", "!Mujoco")}:
         pytest.skip("slow, and the others show it")
     scenario = brief(name, engine=engine, friction="!Coulomb {stiffness: 0 N/m}")
+    cut = driven_names(scenario.robot.blueprint())[0]
+    scenario = scenario.with_changes({"events": [{"at": "0.21 s", "cut": [cut]}]})
     robot = Simulation(scenario).robot
     biases = np.linspace(-0.3, 0.6, robot.driven.size)
     values = {key: 0.0 for key in scenario.policy_parameters}
@@ -68,7 +71,7 @@ def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine
     setpoints = scenario.actuation.commands(cables._replace(signal=signals))
     command = Command("biases", 1.0, setpoints[np.newaxis])
     played = simulate(scenario, command=command, record=True)
-    limit = 2e-4 if engine == "!Drake" else 2e-5
+    limit = 2e-4 if engine == DRAKE else 2e-5
     for key, error in {"signal": 1e-9, "p_WN": limit}.items():
         found, expected = driven.trajectory[key].values, played.trajectory[key].values
         np.testing.assert_allclose(found, expected, rtol=0, atol=error)
@@ -76,15 +79,16 @@ def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine
 
 
 def test_the_engines_agree_on_a_network():
-    """With signals that do not throw the prism about."""
+    """With signals that do not throw the prism about, before and after a cable is cut between two
+    actions."""
     changes = {"simulation.duration": "1 s", "engine": "!Compiled {tolerance: 1e-6 m/s}"}
+    changes["events"] = [{"at": "0.893 s", "cut": ["side n2 n5"]}]
     scenario = brief("prism", "!Network {hidden: 3, readings: [clock, lengths, w_WB]}")
     compiled = scenario.with_numbers({"cpg.gain": 0.3 * scenario.cpg.gain}).with_changes(changes)
-    fine = "!Drake {accuracy: 1e-4, max_step: 2 ms}"
     gait = td.seeded_gait(scenario, 3)
     results = [
         simulate(each, gait, record=True).trajectory.p_WN.values
-        for each in (compiled, compiled.with_changes({"engine": fine}))
+        for each in (compiled, compiled.with_changes({"engine": DRAKE}))
     ]
     np.testing.assert_allclose(*results, rtol=0, atol=2e-5)
     assert np.abs(results[0][-1] - results[0][0]).max() > 1e-3
@@ -102,10 +106,12 @@ def test_policies_side_by_side_move_as_alone():
     assert len({result["distance"] for result in metrics}) == 12
 
 
+@pytest.mark.parametrize("body", [{}, {"robot.cables.side.stiffness": ["150 N/m", "250 N/m"]}])
 @pytest.mark.parametrize("optimizer", [None, "!CmaEs {population: 4, sample: 2}", "!RandomSearch"])
-def test_evolution_of_a_policy_can_be_resumed_and_replayed(tmp_path, optimizer):
+def test_evolution_of_a_policy_can_be_resumed_and_replayed(tmp_path, optimizer, body):
     changes = {} if optimizer is None else {"optimizer": optimizer}
-    scenario, whole, cut = brief(**changes), tmp_path / "whole", tmp_path / "cut"
+    scenario = brief(evolve=body, **changes)
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
     run = td.evolve(scenario, whole, report=False, reevaluate=False)
     shutil.copytree(whole, cut)
     for file in [*cut.glob("trial_*/*s.jsonl")]:
@@ -118,6 +124,10 @@ def test_evolution_of_a_policy_can_be_resumed_and_replayed(tmp_path, optimizer):
     best, file = run.best_gait(), whole / "trial_00" / "best_gait.json"
     assert load_gait(file, scenario) == best
     assert simulate(scenario, best).fitness == run.fittest()["fitness"]
+    assert dict(best.body).keys() == body.keys()
+    assert not body or file.with_name("best.yaml").exists()
+    vector = ParameterSpace.of(scenario).vector(best)
+    assert vector == pytest.approx(run.vector(0, int(run.fittest()["index"])))
 
 
 def test_the_export_of_a_policy_says_that_it_was_in_a_loop(tmp_path):

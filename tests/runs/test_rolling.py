@@ -36,6 +36,6 @@ def test_a_policy_depends_on_the_shape_alone(run):
     later = readings._replace(
         p_WN=readings.p_WN + np.array([3.0, -2.0, 0.5]), time=readings.time + 5.0 * clock
     )
-    signals = policy_signals([robot], readings)
+    signals = policy_signals([robot.pilot], readings)
     assert np.ptp(signals) > 10.0
-    assert policy_signals([robot], later) == pytest.approx(signals, abs=1e-6)
+    assert policy_signals([robot.pilot], later) == pytest.approx(signals, abs=1e-6)

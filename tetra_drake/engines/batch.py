@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     import xarray
 
 
-_BRIEF = 0.03
-"""Wall time (s) after which Batch.advance() returns with `briefly`."""
 _SAME_TIME = 1e-9
 """Largest difference (s) of two times that are the same except for rounding."""
 
@@ -103,15 +100,16 @@ class Batch:
             signals: m actuator signals (N, m) of each robot, which are forces in newtons. They
                 change linearly from the old ones within one network step, `cpg.listing_step`, and
                 are then constant. A robot that pauses, or has a gait or a command, ignores them.
-            briefly: returns as soon as a robot has ended, or after some 30 ms of wall time. Engines
-                that simulate one robot after another ignore it.
+            briefly: returns as soon as a robot has ended, after some 30 ms of wall time, or at the
+                next event or action of a policy. Engines that simulate one robot after another
+                return only there.
 
         Raises:
             InputError: if an argument has another shape.
         """
         places = len(self.failures)
         times = checked_numbers(until, (), (places,), source="Batch", key="until")
-        until, started = np.broadcast_to(times, places), time.perf_counter()
+        until = np.broadcast_to(times, places)
         if signals is not None:
             shape = places, self.signals
             self._hold(until, checked_numbers(signals, shape, source="Batch", key="signals"))
@@ -123,12 +121,11 @@ class Batch:
             waits = bool(np.isfinite(self._actions).any())
             self._advance(np.minimum(until, instants), briefly=briefly and not waits)
             goes_on = np.isfinite(instants) & (instants <= until)
-            if not goes_on.any():
+            if briefly or not goes_on.any():
                 return
             over = np.array([self.ended(place) for place in range(places)])
             self._events[over] = self._actions[over] = math.inf
-            is_enough = briefly and (over.any() or time.perf_counter() - started > _BRIEF)
-            if is_enough or not (goes_on & ~over).any():
+            if not (goes_on & ~over).any():
                 return
 
     def _follow(self, place: int, robot: DrivenRobot | None) -> None:

@@ -39,13 +39,6 @@ _TOLERANCE = 1e-9
 motor would never be at its limit."""
 
 
-_IN_A_LOOP = (
-    "the commands were recorded in a closed loop; played from a file, they do not react to what "
-    "the prototype does"
-)
-"""Warning about the commands of a policy or of a gait with feedback."""
-
-
 class Loads(NamedTuple):
     """Loads on the actuators of the driven cables in a simulation."""
 
@@ -123,7 +116,8 @@ def export(
         if still := stillness_remark(robot, vars(result.metrics)):
             verdict += f"\n{sentence(still)}"
         if scenario.policy is not None or scenario.cpg.feedback:
-            verdict += f"\nWarning: {_IN_A_LOOP}."
+            warning = "the commands were recorded in a closed loop; played from a file, they"
+            verdict += f"\nWarning: {warning} do not react to what the prototype does."
         template = resources.files("tetra_drake") / "prototype/README.template.md"
         about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
         write_whole(folder / README, template.read_text("utf-8").format(**about))

@@ -298,7 +298,8 @@ def headline(
     walk = " ".join(filter(None, way))
     moves = f"{'rolls' if rolls else 'walks'} {walk}"
     if name == "rolled":
-        turns = f"rolls {size(name, math.tau, 1, 'turns')}{' backward' * (metrics[name] < 0.0)}"
+        backward = " backward" if metrics[name] < 0.0 else ""
+        turns = f"rolls {size(name, math.tau, 1, 'turns')}{backward}"
         text = f"{turns}, {walk if rolls else moves}"
     elif name == "heading_change":
         text = f"turns {size(name, math.radians(1.0), 0, 'degrees')} {seconds}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,18 +106,17 @@ def _piloted_robot(robot: Robot, parameters: PolicyParameters) -> DrivenRobot:
         problem = f"found {len(parameters.values)}, scenario {scenario.name} has {expected}"
         raise InputError(f"policy {parameters.name}", "parameters", problem)
     controlled, structure = robot.controlled, robot.structure
-    cables = robot.starting_cables()
-    first = structure.p_WN[structure.struts[:1]]
-    size = np.linalg.norm(first[:, 1] - first[:, 0], axis=-1)
+    cables, struts = robot.starting_cables(), structure.p_WN[structure.struts]
+    size = np.linalg.norm(np.diff(struts[0], axis=0)) if len(struts) else scenario.robot.size
     robots = DrivenRobots(
         actuation=scenario.actuation,
         ends=structure.cable_ends[robot.driven],
-        cables=_joined([cables], np.stack),
-        rest=scenario.actuation.commands(cables)[np.newaxis],
-        amplitude=np.array([usual_amplitude(scenario.cpg)]),
-        lengths=structure.initial_lengths[np.newaxis],
-        weight=np.array([robot.weight]),
-        size=size if size.size else np.array([scenario.robot.size]),
+        cables=cables,
+        rest=scenario.actuation.commands(cables),
+        amplitude=np.array(usual_amplitude(scenario.cpg)),
+        lengths=structure.initial_lengths,
+        weight=np.array(robot.weight),
+        size=np.array(size),
     )
     period = step * round(scenario.simulation.control_period / step)
     pilot = Pilot(policy=policy, parameters=parameters, robots=robots, period=period)
@@ -137,15 +136,15 @@ def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
     for rows in groups.values():
         some = [pilots[row] for row in rows]
         arrays = [pilot.robots[2:] for pilot in some]
-        together = DrivenRobots(*some[0].robots[:2], *_joined(arrays, np.concatenate))
+        together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
         values = np.array([pilot.parameters.values for pilot in some])
         signals[rows] = some[0].policy.signals(together, readings.rows(rows), values)
     return signals
 
 
-def _joined(parts: Sequence[Any], join: Callable[[Sequence[np.ndarray]], np.ndarray]) -> Any:
-    """Named tuple of arrays, nested ones included, that `join` makes of the arrays of several."""
+def _stacked(parts: Sequence[Any]) -> Any:
+    """Named tuple of arrays, nested ones included, that stacks the arrays of several robots."""
     if not isinstance(parts[0], tuple):
-        return join(parts)
-    fields = [_joined(each, join) for each in zip(*parts, strict=True)]
+        return np.stack(parts)
+    fields = [_stacked(each) for each in zip(*parts, strict=True)]
     return type(parts[0])._make(fields) if hasattr(parts[0], "_make") else fields

@@ -257,58 +257,41 @@ class ParameterSpace:
         bounds of tau_B are twice the bounds of tau_A. The bounds of feedback gains are -1 and 1.
         """
         scenario = given_scenario(scenario)
-        if scenario.policy is not None:
-            return cls._of_policy(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
-        weight_names, pathways = weights.names, tuple(scenario.cpg.feedback)
-        shared = np.arange(len(weight_names))
-        if bounds.mirrored:
+        of_policy = scenario.policy is not None
+        weight_names = () if of_policy else weights.names
+        shared, pathways = np.arange(len(weight_names)), tuple(scenario.cpg.feedback)
+        if bounds.mirrored and not of_policy:
             shared = np.minimum(shared, weights.images)
         chosen, parameters = np.unique(shared, return_inverse=True)
-        names = [f"weight {weight_names[i]}" for i in chosen]
-        names += [f"gain {name}" for name in pathways]
-        body = _free(scenario.evolve)
-        # Rows: low, high, floors. Columns: weight, gain, tau_A, tau_B.
-        rows = [
-            [bounds.weight_min, -LARGEST_GAIN, bounds.tau_a_min, bounds.tau_a_min],
-            [bounds.weight_max, LARGEST_GAIN, bounds.tau_a_max, bounds.tau_a_max],
-            [0.0, -math.inf, bounds.tau_a_min, bounds.tau_a_min],
-        ]
-        limits = np.repeat(rows, [len(chosen), len(pathways), 1, 1], axis=1)
-        limits[:, TAU_B] *= TAU_B_PER_TAU_A
-        columns = [[low, high, -math.inf] for low, high in body.values()]
-        low, high, floors = np.insert(
-            limits, [TAU_A] * len(body), np.reshape(columns, (-1, 3)).T, axis=1
-        )
+
+        # Least and greatest value, and floor.
+        free = {**scenario.policy_parameters, **_free(scenario.evolve)}
+        limits: dict[str, Sequence[float]]
+        limits = {key: (low, high, -math.inf) for key, (low, high) in free.items()}
+        if not of_policy:
+            of_weight = bounds.weight_min, bounds.weight_max, 0.0
+            of_gain = -LARGEST_GAIN, LARGEST_GAIN, -math.inf
+            of_tau = bounds.tau_a_min, bounds.tau_a_max, bounds.tau_a_min
+            limits = {
+                **{f"weight {weight_names[i]}": of_weight for i in chosen},
+                **{f"gain {name}": of_gain for name in pathways},
+                **limits,
+                **{"tau_A": of_tau, "tau_B": [TAU_B_PER_TAU_A * tau for tau in of_tau]},
+            }
+        low, high, floors = np.reshape([*limits.values()], (-1, 3)).T.copy()
         return cls(
-            names=(*names, *body, "tau_A", "tau_B"),
+            names=tuple(limits),
             low=low,
             high=high,
             floors=floors,
-            couples_tau_b=not bounds.independent_tau_b,
+            couples_tau_b=not (bounds.independent_tau_b or of_policy),
             weights=parameters,
             weight_names=weight_names,
             pathways=pathways,
             turn=bounds.turn,
             evolve=scenario.evolve,
-        )
-
-    @classmethod
-    def _of_policy(cls, scenario: Scenario) -> Self:
-        bounds = {**scenario.policy_parameters, **_free(scenario.evolve)}
-        low, high = np.array([*bounds.values()], dtype=float).T
-        return cls(
-            names=tuple(bounds),
-            low=low,
-            high=high,
-            floors=np.full(low.size, -math.inf),
-            couples_tau_b=False,
-            weights=np.zeros(0, dtype=np.int64),
-            weight_names=(),
-            pathways=(),
-            turn=0.0,
-            evolve=scenario.evolve,
-            of_policy=True,
+            of_policy=of_policy,
         )
 
     def gait(self, vector: npt.ArrayLike, *, name: str) -> AnyGait:

@@ -295,10 +295,7 @@ class Phase:
 def _placed(scenario: Scenario) -> Structure:
     """The structure of a scenario's robot at the positions of its settings, before any search for
     equilibrium. It has no contact nodes if the scenario has no ground."""
-    blueprint = scenario.robot.blueprint()
-    if not scenario.terrain.is_ground:
-        blueprint = dataclasses.replace(blueprint, contacts=np.array([], dtype=np.int64))
-    return Structure.of(blueprint)
+    return Structure.of(scenario.blueprint())
 
 
 def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Structure, Model]:

@@ -35,7 +35,7 @@ class Pilot:
     policy: PolicyKind
     parameters: PolicyParameters
     robots: DrivenRobots
-    """Constants of the one robot."""
+    """Constants of the one robot, without the axis of robots."""
     period: float
     """Time (s) between actions, a multiple of `cpg.listing_step`."""
 

@@ -24,6 +24,7 @@ from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
 from tetra_drake.laws.oscillator import CpgSection
 from tetra_drake.laws.terrain import Flat, Terrain
+from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
     BODY_SECTIONS,
@@ -225,10 +226,14 @@ class Scenario(Section):
     def policy_parameters(self) -> Mapping[str, PolicyBounds]:
         """Names of the parameters of the scenario's policy, with their bounds in random policies;
         empty without a policy."""
+        return {} if self.policy is None else self.policy.parameters(self.blueprint())
+
+    def blueprint(self) -> Blueprint:
+        """The blueprint of the robot, without contact nodes if there is no ground."""
         blueprint = self.robot.blueprint()
-        if not self.terrain.is_ground:
-            blueprint = dataclasses.replace(blueprint, contacts=blueprint.contacts[:0])
-        return {} if self.policy is None else self.policy.parameters(blueprint)
+        if self.terrain.is_ground:
+            return blueprint
+        return dataclasses.replace(blueprint, contacts=blueprint.contacts[:0])
 
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
