@@ -110,6 +110,12 @@ _BODY = {
 lengths of the struts."""
 
 EXPERIMENTS = {
+    "rolling": Experiment(
+        "a rover of six struts rolls by a feedback policy, in 10 s",
+        "rolling",
+        {"simulation.steady_from": "2 s"},
+        film=True,
+    ),
     "thesis": Experiment("the thesis's experiment, ten trials", "thesis", {}),
     "thesis-listing": Experiment(
         "the same with the listing's mutation, which never reaches τ_A", "thesis-listing", {}

@@ -8,7 +8,6 @@ Each table is in a Markdown file between two lines:
     <!-- end -->
 
 index.html shows all runs. Each picture opens the replay of a run, on any host of static files.
-The rover's numbers are from rolling.py.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ import numpy as np
 from analyse import MUJOCO, SHOWN, SPEED, TIGHT, TURNED, Analysis, load_analysis
 from PIL import Image
 from record import DIAGRAM, EXPERIMENTS, FILM, PICTURE, load_times
-from rolling import LAPSE, ROLLING, best_of, load_policies, undisturbed
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
@@ -37,7 +35,7 @@ from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import UNITS, looks_for_turns
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.settings.units import INCH, SYSTEMS, Units
+from tetra_drake.settings.units import INCH, Units
 
 HERE = Path(__file__).parent
 FRONT = HERE.parent
@@ -121,7 +119,7 @@ def scenario_of(name: str) -> Scenario:
 
 @dataclass(frozen=True)
 class Best:
-    """The best gait of a run, or the best policy of the rover, for the gallery."""
+    """The best gait of a run for the gallery."""
 
     title: str
     diagram: str
@@ -157,24 +155,8 @@ class Best:
 
 
 def best_of_all(runs: Runs) -> dict[str, Best]:
-    """The rover's policy, then the best gaits of the runs, by name of the folder."""
-    return {name: best_in(name, runs) for name in (ROLLING, *runs)}
-
-
-def best_in(name: str, runs: Runs) -> Best:
-    """The best gait or policy of the folder of this name."""
-    return best_policy() if name == ROLLING else best_gait(name, runs[name])
-
-
-def best_policy() -> Best:
-    """The rover's best policy."""
-    policy = best_of(load_policies())
-    ways = {engine: policy["engines"][engine]["way_m"] for engine in ENGINES}
-    kept = policy["rolls"] / policy["draws"]
-    title = "a rover of six struts rolls by a feedback policy, in 20 s"
-    rover = undisturbed({})
-    pace = ways[ENGINES[0]] / rover.simulation.duration / rover.robot.blueprint().length
-    return Best(title, f"{LAPSE}.svg", ways, kept, SYSTEMS["SI"], relative_speed=pace)
+    """The best gaits of the runs, by name of the folder."""
+    return {name: best_gait(name, run) for name, run in runs.items()}
 
 
 def best_gait(name: str, run: Analysis) -> Best:
@@ -235,6 +217,7 @@ def trust_table(runs: Runs) -> str:
             run
             for name, run in runs.items()
             if isinstance(scenario_of(name).friction, Coulomb) == is_coulomb
+            and scenario_of(name).policy is None  # a rover that rolls has chaotic impacts
         ]
         gaits = [(run, trial) for run in under_law for trial in run.best_gaits.index]
         inches = np.array([distances_of(run, trial) for run, trial in gaits]) / INCH
@@ -259,7 +242,7 @@ def films(names: Mapping[str, str], runs: Runs, *, distances: bool) -> str:
     for name, words in names.items():
         folder = f"{HERE.name}/{name}"
         pictures.append(f'<img src="{folder}/{FILM}" width="{width}" alt="{words}">')
-        far = f": {best_in(name, runs).text('compiled', 1)}" if distances else ""
+        far = f": {best_gait(name, runs[name]).text('compiled', 1)}" if distances else ""
         captions.append(f"[{words}]({folder}/{README}){far}")
     lines = [pictures, [":-:" for _ in names], captions]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

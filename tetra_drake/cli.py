@@ -23,7 +23,7 @@ from tetra_drake.settings.units import INCH, SYSTEMS, shown_in
 
 if TYPE_CHECKING:
     from tetra_drake.figures.style import Print
-    from tetra_drake.robot.gait import Gait
+    from tetra_drake.robot.gait import AnyGait
     from tetra_drake.scenario.scenario import Scenario
 
 FAILED, INTERRUPTED = 1, 130  # exit statuses beside BAD_INPUT
@@ -666,7 +666,7 @@ def _print(width: float, font: float, *, title: bool, pdf: bool) -> Print:
 
 def _chosen_gait(
     scenario: str | None, gait: Path | None, seed: int | None, engine: str | None = None
-) -> tuple[Scenario, Gait]:
+) -> tuple[Scenario, AnyGait]:
     """The scenario, with the named engine, and the gait that a command simulates, from its options.
     `gait` is a gait file or the folder of a run. Without it, the gait is random, by `seed` or by a
     seed that walks. The scenario has the body that evolved with the gait, if any."""

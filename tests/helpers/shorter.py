@@ -4,7 +4,6 @@ import re
 
 NUMBERS = {
     r'(?<="evolution.evaluations": )\d+': "53",
-    r"(?<=generations, most = )\d+": "1",
     r'(?<="popsize": )16': "8",
     r'(?<="simulation.duration": ")[58](?= s")': "3.5",
     r"(?<=\(0\.0, )4\.0": "0.5",

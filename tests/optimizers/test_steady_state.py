@@ -111,6 +111,7 @@ def test_one_iteration_as_the_listing_goes_through_it():
         high=np.array([3.4, 3.4, 0.5, 1.0]),
         floors=np.array([0.0, 0.0, 0.2, 0.4]),
         body=slice(2, 2),
+        of_policy=False,
     )
     mutants = make_children(*population[parents], space, kinds.SteadyState(), script)
     # Children [1.5, 0.1, 0.21, 1.00] and [3.0, 2.5, 0.50, 0.42], moved by [0.1, -0.2, -0.04, 0.0].

@@ -106,7 +106,7 @@ def test_the_gallery_is_current_and_opens_every_replay_in_its_folder():
     assert tables.gallery_page(tables.load_all()) == text
     links = re.findall(r'(?:href|src)="([^":]+)"', text)
     figures = {f"measured/{name}.svg" for name in tables.MEASURED}
-    assert {f"{name}/{REPLAY}" for name in ("rolling", *FOLDERS)} | figures <= set(links)
+    assert {f"{name}/{REPLAY}" for name in FOLDERS} | figures <= set(links)
     for link in links:
         assert (tables.HERE / link).is_file() and ".." not in link
 

@@ -125,7 +125,7 @@ def test_a_duration_is_shortened_by_one_key(name):
     for duration in (0.5, 1.0, 2.0, 15.0):
         changed = shipped.with_changes({"simulation.duration": f"{duration} s"})
         assert changed.simulation.settling_time == min(3.0, duration / 4.0)
-        is_idle = duration <= changed.cpg.start_up
+        is_idle = duration <= changed.cpg.start_up and changed.policy is None
         assert ("cpg.start_up" in start_up_remark(Robot.of(changed))) == is_idle
 
 

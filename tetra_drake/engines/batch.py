@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.command import policy_signals
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Phase, Robot
-from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot, Pilot
 from tetra_drake.robot.structure import Structure
 
 if TYPE_CHECKING:
@@ -55,6 +56,11 @@ class Batch:
         """Number m of actuator signals of each robot."""
         self._phases: list[tuple[Phase, ...]] = [()] * places
         """The present phase of the robot in each place, and the phases after coming events."""
+        self._pilots: list[Pilot | None] = [None] * places
+        """The policy of the robot in each place; None without one."""
+        self._events, self._actions = np.full((2, places), math.inf)
+        """Times (s) of the next event, and of the next action of the policy, in each place;
+        infinite if there is none."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
         """Puts robots in the first places, in their order. Raises InputError if one differs too
@@ -94,38 +100,72 @@ class Batch:
             signals: m actuator signals (N, m) of each robot, which are forces in newtons. They
                 change linearly from the old ones within one network step, `cpg.listing_step`, and
                 are then constant. A robot that pauses, or has a gait or a command, ignores them.
-            briefly: returns as soon as a robot has ended, or after some 30 ms of wall time. Engines
-                that simulate one robot after another ignore it.
+            briefly: returns as soon as a robot has ended, after some 30 ms of wall time, or at the
+                next event or action of a policy. Engines that simulate one robot after another
+                return only there.
 
         Raises:
             InputError: if an argument has another shape.
         """
         places = len(self.failures)
         times = checked_numbers(until, (), (places,), source="Batch", key="until")
+        until = np.broadcast_to(times, places)
         if signals is not None:
             shape = places, self.signals
-            signals = checked_numbers(signals, shape, source="Batch", key="signals")
+            self._hold(until, checked_numbers(signals, shape, source="Batch", key="signals"))
         while True:
-            events = self._pass_events()
-            self._advance(np.minimum(times, events), signals, briefly)
-            goes_on = np.isfinite(events) & (events <= times)
-            goes_on &= [failure is None for failure in self.failures]
+            self._pass_events()
+            self._act()
+            instants = np.minimum(self._events, self._actions)
+            # The policies act together: their robots wait for each other.
+            waits = bool(np.isfinite(self._actions).any())
+            self._advance(np.minimum(until, instants), briefly=briefly and not waits)
+            goes_on = np.isfinite(instants) & (instants <= until)
             if briefly or not goes_on.any():
                 return
-            signals = None  # held from now on
+            over = np.array([self.ended(place) for place in range(places)])
+            self._events[over] = self._actions[over] = math.inf
+            if not (goes_on & ~over).any():
+                return
 
-    def _pass_events(self) -> np.ndarray:
-        """Changes the robots that are at the time of an event. Returns the time (s) of the next
-        event in each place (N,), infinite if there is none."""
-        following = np.full(len(self.failures), math.inf)
-        for place, phases in enumerate(self._phases):
-            while len(phases) > 1 and self.readings.time[place] >= phases[1].begins - _SAME_TIME:
+    def _follow(self, place: int, robot: DrivenRobot | None) -> None:
+        """Notes what will happen to a robot at its start in a place: the events of its scenario,
+        and the actions of its policy. None for a place without a robot."""
+        self._phases[place] = () if robot is None else robot.robot.phases
+        self._pilots[place] = pilot = None if robot is None else robot.pilot
+        self._events[place] = _next_event(self._phases[place])
+        self._actions[place] = math.inf if pilot is None else pilot.acts_after(0.0)
+
+    def _copy_instants(self, place: int, to: int) -> None:
+        """Makes the same happen to the robot in place `to` as to the one in `place`."""
+        self._phases[to], self._pilots[to] = self._phases[place], self._pilots[place]
+        self._events[to], self._actions[to] = self._events[place], self._actions[place]
+
+    def _pass_events(self) -> None:
+        """Changes the robots that are at the time of an event."""
+        for place in self._places_at(self._events):
+            phases = self._phases[place]
+            while self.readings.time[place] >= _next_event(phases) - _SAME_TIME:
                 before, after, *_ = phases
                 self._become(place, after.robot, after.p_BC - before.p_BC)
-                self._phases[place] = phases = phases[1:]
-            if len(phases) > 1:
-                following[place] = phases[1].begins
-        return following
+                phases = phases[1:]
+            self._phases[place], self._events[place] = phases, _next_event(phases)
+
+    def _act(self) -> None:
+        """Lets the policies act whose robots are at the time of an action."""
+        if not (places := self._places_at(self._actions)):
+            return
+        pilots = [pilot for place in places if (pilot := self._pilots[place]) is not None]
+        signals, until = np.zeros((len(self._pilots), self.signals)), np.zeros(len(self._pilots))
+        signals[places] = policy_signals(pilots, self.readings.rows(places))
+        until[places] = math.inf
+        self._hold(until, signals)
+        for place, pilot in zip(places, pilots, strict=True):
+            self._actions[place] = pilot.acts_after(self._actions[place])
+
+    def _places_at(self, instants: np.ndarray) -> list[int]:
+        """Places whose robots are at their time (s) in `instants`."""
+        return np.flatnonzero(self.readings.time >= instants - _SAME_TIME).tolist()
 
     def _become(self, place: int, robot: Robot, p_BC: np.ndarray) -> None:
         """Replaces the robot in a place by another one of the same structure, whose nodes move on
@@ -133,7 +173,12 @@ class Batch:
         frames of the old one."""
         raise NotImplementedError
 
-    def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
+    def _hold(self, until: np.ndarray, signals: np.ndarray) -> None:
+        """Sets the signals (N, m) of the robots that have not reached their time (s) in `until`;
+        see advance()."""
+        raise NotImplementedError
+
+    def _advance(self, until: np.ndarray, *, briefly: bool) -> None:
         raise NotImplementedError
 
     def ended(self, place: int) -> bool:
@@ -214,19 +259,25 @@ class SerialBatch(Batch):
         if structure.signals != self.signals or not fits:
             return False
         self._robots[place] = self._start(robot)
-        self._phases[place] = robot.robot.phases
+        self._follow(place, robot)
         self.failures[place], self.readings.time[place] = None, 0.0
         self._reached[place], self._ends[place] = 0.0, robot.robot.scenario.simulation.duration
         return True
 
-    def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
-        until = np.minimum(until, self._ends)
-        for place in np.flatnonzero(until > self._reached).tolist():
-            robot = self._robots[place]
-            if robot is None or self.failures[place] is not None:
-                continue
-            if signals is not None and robot.driven.is_controlled:
+    def _hold(self, until: np.ndarray, signals: np.ndarray) -> None:
+        for place, robot in self._before(until):
+            if robot.driven.is_controlled:
                 robot.hold(signals[place])
+
+    def _before(self, until: np.ndarray) -> list[tuple[int, LoneRobot]]:
+        """Places and robots that have neither ended nor reached their time (s) in `until`."""
+        places = np.flatnonzero(np.minimum(until, self._ends) > self._reached).tolist()
+        robots = [(place, self._robots[place]) for place in places if not self.failures[place]]
+        return [(place, robot) for place, robot in robots if robot is not None]
+
+    def _advance(self, until: np.ndarray, *, briefly: bool) -> None:
+        until = np.minimum(until, self._ends)
+        for place, robot in self._before(until):
             try:
                 robot.advance_to(float(until[place]))
             except SimulationFailure as failure:
@@ -253,15 +304,21 @@ class SerialBatch(Batch):
     def copy(self, place: int, to: int) -> None:
         robot = self._robots[place]
         self._robots[to] = None if robot is None else robot.copied()
-        self._phases[to] = self._phases[place]
+        self._copy_instants(place, to)
         self.failures[to] = self.failures[place]
         self._reached[to], self._ends[to] = self._reached[place], self._ends[place]
         self.readings.put(to, self.readings.rows(place))
 
     def stop(self, place: int) -> float:
         robot, self._robots[place] = self._robots[place], None
-        self.failures[place], self._phases[place] = None, ()
+        self.failures[place] = None
+        self._follow(place, None)
         return 0.0 if robot is None else robot.wall_time
+
+
+def _next_event(phases: Sequence[Phase]) -> float:
+    """Time (s) at which the second phase begins; infinite if there is none."""
+    return phases[1].begins if len(phases) > 1 else math.inf
 
 
 def checked_numbers(

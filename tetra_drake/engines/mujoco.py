@@ -214,7 +214,8 @@ class _MujocoRobot(LoneRobot):
         Diverged."""
         from mujoco.rollout import Rollout
 
-        last = min(self._steps, math.ceil(time / self._step - 1e-6))
+        rounding = min(1e-6, 5e-10 / self._step)  # readings there are of this time, to 1e-9 s
+        last = min(self._steps, math.ceil(time / self._step - rounding))
         self._paused = time
         signals = self._signals_at(self._step * np.arange(self._done, last + 1))
         started = perf_counter()

@@ -14,14 +14,16 @@ from tetra_drake.engines.batch import Batch
 from tetra_drake.engines.engine import Engine, engine_of
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.command import Driver, driven_robot
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.command import Command, Driver, driven_robot
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
 
 _GATHERING = 1e-3
 """Time (s) that an idle thread waits for a second simulation before it starts with one."""
+_ROUNDS = 4
+"""Number of robots with a policy per lane. They pause together, so more than one per lane keep the
+lanes full."""
 _ROBOTS = 32
 """Largest number of robots in the cache. Gaits on the same scenario share its robot."""
 
@@ -99,8 +101,8 @@ class SimulationQueue:
                 count = len(crew.idle)
                 if not crew.jobs:
                     share = math.ceil(len(self._waiting) / len(self._threads))
-                    lanes = engine_of(self._waiting[0].scenario).lanes if self._waiting else 0
-                    count = min(share, lanes)
+                    places = _places_for(self._waiting[0].scenario) if self._waiting else 0
+                    count = min(share, places)
                 jobs = [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
 
             refused = [job for job in jobs if not crew.begin(job)]
@@ -115,14 +117,20 @@ class SimulationQueue:
     def _driven(self, job: _Job) -> DrivenRobot:
         """The robot of a job. Gaits on the same scenario share a robot."""
         scenario, driver = job.scenario, job.driver
-        if not isinstance(driver, Gait) or driver.body:
+        if isinstance(driver, Command) or driver.body:
             return driven_robot(scenario, driver)
         with self._robots_lock:
             robot = self._robots.pop(id(scenario), None) or Robot.of(scenario)
             self._robots[id(scenario)] = robot  # keeps the scenario alive, so its id stays unique
             if len(self._robots) > _ROBOTS:
                 del self._robots[next(iter(self._robots))]
-        return DrivenRobot.of(robot, driver)
+        return driven_robot(scenario, driver, robot=robot)
+
+
+def _places_for(scenario: Scenario) -> int:
+    """Number of robots like the scenario's that a thread simulates side by side."""
+    lanes = engine_of(scenario).lanes
+    return lanes * _ROUNDS if scenario.policy is not None and lanes > 1 else lanes
 
 
 @dataclass
@@ -151,8 +159,9 @@ class _Crew:
             elif self.jobs:
                 return False
             else:
-                self.batch = engine.start([robot], places=engine.lanes, record=self.record)
-                self.engine, self.idle, place = engine, list(range(1, engine.lanes)), 0
+                places = _places_for(job.scenario)
+                self.batch = engine.start([robot], places=places, record=self.record)
+                self.engine, self.idle, place = engine, list(range(1, places)), 0
         except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
             return True

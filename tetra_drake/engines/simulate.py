@@ -158,5 +158,8 @@ def check_scenario(scenario: Scenario) -> None:
     if not scenario.oscillators:
         problem = "found no oscillator, expected at least one that drives cables"
         raise InputError(scenario.name, "robot.actuated", problem)
-    Robot.of(scenario).network(seeded_gait(scenario))
+    robot, gait = Robot.of(scenario), seeded_gait(scenario)
+    driven = driven_robot(scenario, gait, robot=robot)
+    if driven.gait is not None:
+        robot.network(driven.gait)
     engine_of(scenario).check(scenario)

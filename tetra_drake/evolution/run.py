@@ -28,7 +28,7 @@ from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
 from tetra_drake.formatting import Say, TextTable, heading_html, rounded, silent
 from tetra_drake.results.result import headline
-from tetra_drake.robot.gait import Gait, ParameterSpace, Vector, load_gait, with_body
+from tetra_drake.robot.gait import AnyGait, ParameterSpace, Vector, load_gait, with_body
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS, MetricRanges
 from tetra_drake.scenario.scenario import Scenario
@@ -163,7 +163,7 @@ class Run:
         first = rows[rows["iteration"] == rows["iteration"].min()]
         return first.loc[first["fitness"].idxmax()]
 
-    def best_gait(self) -> Gait:
+    def best_gait(self) -> AnyGait:
         """The fittest gait of all trials. Raises InputError if no gait has a fitness yet."""
         best = self.fittest()
         return self.gait(best["trial"], best["index"])
@@ -173,7 +173,7 @@ class Run:
         if no gait has a fitness yet."""
         return with_body(self.scenario, self.best_gait())[0]
 
-    def gaits(self, count: int = 1) -> list[Gait]:
+    def gaits(self, count: int = 1) -> list[AnyGait]:
         """The `count` fittest different gaits of each trial, in the order of best(). The name of
         each gait contains its trial and evaluation."""
         best = self.best(count)
@@ -197,7 +197,7 @@ class Run:
             raise InputError(self.directory, "", problem)
         return rows.loc[(trial, index), _parameters(self.scenario)].to_numpy(dtype=np.float64)
 
-    def gait(self, trial: int, index: int) -> Gait:
+    def gait(self, trial: int, index: int) -> AnyGait:
         """The gait of evaluation `index` of a trial."""
         return self.manifest.gait(self.vector(trial, index), trial=trial, index=index)
 
@@ -282,10 +282,12 @@ def _parameters(scenario: Scenario) -> list[str]:
     """Names of the columns of Run.evaluations that hold the parameters of a gait, such as
     "weight_1" and "tau_a_s". They are in the order of the parameter vector."""
     space = ParameterSpace.of(scenario)
-    gains = [f"gain_{name}" for name in space.pathways]
-    others = [*gains, *space.free_body, "tau_a_s", "tau_b_s"]
-    weights = len(space.names) - len(others)
-    return [f"weight_{number}" for number in range(1, weights + 1)] + others
+    others, kind = [*space.free_body], "parameter"
+    if not space.of_policy:
+        gains = [f"gain_{name}" for name in space.pathways]
+        others, kind = [*gains, *others, "tau_a_s", "tau_b_s"], "weight"
+    count = len(space.names) - len(others)
+    return [f"{kind}_{number}" for number in range(1, count + 1)] + others
 
 
 def _check_iterations(
@@ -312,9 +314,9 @@ class GaitSource:
     """Gaits of a file or a run, and the scenario to simulate them on."""
 
     scenario: Scenario
-    best: Gait
+    best: AnyGait
     """The gait of the file, or the best gait of the run."""
-    gaits: dict[str, Gait]
+    gaits: dict[str, AnyGait]
     """The gait of the file by its name, or the best gait of each trial by "trial 0" ..."""
     spread: MetricRanges
     """Recorded ranges of the metrics of a run's best gait; see Run.spread_of()."""

@@ -20,8 +20,9 @@ from tetra_drake.scenario.common_sections import EvolutionSection
 GAIN_MUTATION = 0.2
 """Largest change of a feedback gain in one mutation."""
 
-BODY_MUTATION = 0.1
-"""Largest change of a number of the body in one mutation, as a share of its range."""
+RANGE_MUTATION = 0.1
+"""Largest change of a number of the body, or of a policy, in one mutation, as a share of its
+range."""
 
 
 @dataclass(eq=False)
@@ -100,14 +101,17 @@ def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector
     equal.
 
     With `tau_mutation: listing`, tau_A does not mutate, like in the thesis's listing A.3.4, whose
-    index 26 means tau_B.
+    index 26 means tau_B. For a policy it is a tenth of the range.
     """
+    shares = RANGE_MUTATION * (space.high - space.low)
+    if space.of_policy:
+        return shares
     is_gain = np.array([name.startswith("gain ") for name in space.names])
     steps = np.where(is_gain, GAIN_MUTATION, settings.weight_mutation)
     step = settings.tau_mutation_range
     steps[TAU_A] = 0.0 if settings.tau_mutation == "listing" else step
     steps[TAU_B] = TAU_B_PER_TAU_A * step
-    steps[space.body] = BODY_MUTATION * (space.high - space.low)[space.body]
+    steps[space.body] = shares[space.body]
     return np.where(space.low == space.high, 0.0, steps)
 
 

@@ -61,8 +61,9 @@ def export(
         >>> print(td.export(td.load_scenario("quick"), "gait.json", "prototype"))
 
     The verdict has the loads on the actuators, whether the actuators can bear them, and the
-    distance that the robot walks if the written commands are simulated. For a gait with feedback,
-    the commands are recorded in this one simulation; the prototype's sensors do not change them.
+    distance that the robot walks if the written commands are simulated. For a policy, or a gait
+    with feedback, the commands are recorded in this one simulation; the prototype's sensors do not
+    change them.
 
     Args:
         scenario: a scenario, its name or file, or a run.
@@ -90,9 +91,11 @@ def export(
     refinement = math.ceil(LEAST_RATE / rate)
     finely = scenario.with_numbers({"simulation.sample_period": 1.0 / (rate * refinement)})
     result = simulate(scenario=finely, gait=gait, record=True)
-    robot, motion = Robot.of(scenario), result.trajectory.isel(time=slice(None, None, refinement))
+    robot, motion = result.robot, result.trajectory.isel(time=slice(None, None, refinement))
     loads = actuator_loads(robot, result.trajectory)
-    command = Command(gait.name, 1.0 / rate, loads.commands[::refinement])
+    # A policy acts at an instant; what it commands is there a moment later.
+    first = 0 if scenario.policy is None else 1
+    command = Command(gait.name, 1.0 / rate, loads.commands[first::refinement])
     axes = [f"{node} {axis}_mm" for node in robot.structure.node_names for axis in "xyz"]
     positions = 1e3 * motion.p_WN.values.reshape(-1, len(axes))
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -112,6 +115,9 @@ def export(
         verdict += f"the gait itself goes {_distance(result)}."
         if still := stillness_remark(robot, vars(result.metrics)):
             verdict += f"\n{sentence(still)}"
+        if scenario.policy is not None or scenario.cpg.feedback:
+            warning = "the commands were recorded in a closed loop; played from a file, they"
+            verdict += f"\nWarning: {warning} do not react to what the prototype does."
         template = resources.files("tetra_drake") / "prototype/README.template.md"
         about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
         write_whole(folder / README, template.read_text("utf-8").format(**about))

@@ -176,6 +176,7 @@ def load_result(folder: str | Path) -> SimulationResult:
         gait, robot = None, Robot.of(scenario).without_network()
     else:
         gait, robot = load_gait(path, scenario, key="gait"), Robot.of(scenario)
+        robot = robot if scenario.policy is None else robot.controlled
     times, *centre, heading = (np.array(column, dtype=float) for _, column in file.path)
     return SimulationResult(
         scenario=scenario,

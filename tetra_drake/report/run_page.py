@@ -45,16 +45,18 @@ from tetra_drake.machine import versions
 from tetra_drake.report import summary
 from tetra_drake.report.result_folder import REPLAY, RESULT, load_result
 from tetra_drake.results.result import SimulationResult, headline
-from tetra_drake.robot.gait import save_gait
+from tetra_drake.robot.gait import AnyGait, Gait, PolicyParameters, save_gait
 from tetra_drake.robot.remarks import stillness_remark
 from tetra_drake.scenario import metrics
 from tetra_drake.scenario.load import SCENARIO, load_scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.elites import distinct_gaits, elites, map_of_gaits, notable_gaits
 
 REPORT, FIGURES = "report.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites/elites.csv"
 
 _LONGEST_SETTING = 60  # letters; longer settings are not shown
+_MOST_PARAMETERS = 40  # of a policy; further ones are not shown
 # Settings that are not shown among those that differ from the thesis's; some are elsewhere.
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "evolve.", "simulation.duration")
 
@@ -241,14 +243,25 @@ def _embedded(picture: partial[Any], folder: Path) -> dict[str, str]:
     return {"name": name, "caption": " ".join(caption.split()), "image": image}
 
 
+def _parameters_text(gait: AnyGait, scenario: Scenario) -> str:
+    """Sentence with the parameters of a gait except its weights, or of a policy."""
+    if isinstance(gait, PolicyParameters):
+        pairs = zip(scenario.policy_parameters, gait.values, strict=True)
+        shown = [f"{name}: {rounded(value)}" for name, value in pairs][:_MOST_PARAMETERS]
+        if more := len(gait.values) - len(shown):
+            shown.append(f"{more} more")
+        return f"Parameters of the policy: {listed(shown)}"
+    gains = [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
+    turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
+    times = [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
+    return f"Time constants {listed([*times, *turn, *gains])}"
+
+
 def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str:
     """The report as HTML. It embeds the figures, whose SVG files are in `folder` already."""
     run, best, scenario = shown.run, shown.best, shown.run.scenario
     trial = best.recorded["trial"]
     gait = run.gait(trial, best.recorded["index"])
-    gains = [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
-    turn = [f"turn {rounded(gait.turn)}"] if gait.turn else []
-    times = [f"τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
     folder_of_best = trial_folder(Path(), trial)
     best_gait = str(folder_of_best / BEST_GAIT)
     named = {"initially": shown.initial.recorded, "best": best.recorded}
@@ -274,8 +287,10 @@ def render_report(shown: ShownGaits, pictures: Pictures, *, folder: Path) -> str
         },
         gaits=gaits,
         map=_notable(shown),
-        parameters=listed([*times, *turn, *gains]),
-        weights=dict(zip(gait.weight_names, gait.weights, strict=True)),
+        parameters=_parameters_text(gait, scenario),
+        weights=dict(zip(gait.weight_names, gait.weights, strict=True))
+        if isinstance(gait, Gait)
+        else {},
         differences=differences,
         files={
             "scenario": SCENARIO,

@@ -19,7 +19,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.formatting import Say, fixed, heading_html, silent, uncertain
 from tetra_drake.laws.tally import Tally
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import AnyGait
 from tetra_drake.robot.measures import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
@@ -67,8 +67,8 @@ class SimulationResult:
     """The simulated robot; without a network if it followed a command."""
     name: str
     """Name of the gait or command."""
-    gait: Gait | None = field(repr=False, compare=False)
-    """The gait; None for a command."""
+    gait: AnyGait | None = field(repr=False, compare=False)
+    """The gait, or the parameters of a policy; None for a command."""
     metrics: Metrics
     fitness: float
     duration: float
@@ -221,7 +221,7 @@ def make_result(
         scenario=robot.scenario,
         robot=robot,
         name=driven.name,
-        gait=driven.gait,
+        gait=driven.gait if driven.pilot is None else driven.pilot.parameters,
         metrics=metrics,
         fitness=compute_fitness(metrics, robot.scenario.objective),
         duration=simulation.duration,
@@ -298,7 +298,8 @@ def headline(
     walk = " ".join(filter(None, way))
     moves = f"{'rolls' if rolls else 'walks'} {walk}"
     if name == "rolled":
-        turns = f"rolls {size(name, math.tau, 1, 'turns')}{' backward' * (metrics[name] < 0.0)}"
+        backward = " backward" if metrics[name] < 0.0 else ""
+        turns = f"rolls {size(name, math.tau, 1, 'turns')}{backward}"
         text = f"{turns}, {walk if rolls else moves}"
     elif name == "heading_change":
         text = f"turns {size(name, math.radians(1.0), 0, 'degrees')} {seconds}"

@@ -1,19 +1,23 @@
-"""Robots without a network: driven by a command, or by a controller."""
+"""Robots without a network: driven by a command, a controller or a policy."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import Gait, with_body
-from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.gait import AnyGait, PolicyParameters, with_body
+from tetra_drake.robot.network import SteeringSignal, usual_amplitude
+from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import DrivenRobot
+from tetra_drake.robot.signals import DrivenRobot, Pilot
+from tetra_drake.scenario.policies import DrivenRobots
 from tetra_drake.scenario.scenario import Scenario
 
 
@@ -32,25 +36,43 @@ class Command:
     `actuation` in the scenario defines which."""
 
 
-Driver = Gait | Command
-"""A gait or a command: what drives the actuators if there is no controller."""
+Driver = AnyGait | Command
+"""A gait, a policy's parameters or a command: what drives the actuators without a controller."""
 
 
 def driven_robot(
-    scenario: Scenario, driver: Driver, *, steering: SteeringSignal | None = None
+    scenario: Scenario,
+    driver: Driver,
+    *,
+    steering: SteeringSignal | None = None,
+    robot: Robot | None = None,
 ) -> DrivenRobot:
-    """The robot of a scenario, driven by a gait or a command.
+    """The robot of a scenario, driven by a gait, a command, or the scenario's policy.
 
     The signals of a command are linear between multiples of `cpg.listing_step` (s). A change of
     setpoint begins at the time of its sample and takes one such step. `steering`, a function from
     time (s) to the turn (-1 to 1), replaces the constant turn of a gait; a command ignores it.
+    `robot` is the scenario's robot if it is made already.
+
     Raises InputError for a command without samples, or whose number of cables is not the robot's
-    number of driven cables. The robot of a gait with a body has this body.
+    number of driven cables. Also for a gait if the scenario has a policy, for parameters of a
+    policy that it does not have, and for steering of a policy. The robot of a gait with a body has
+    this body.
     """
-    if isinstance(driver, Gait):
+    if not isinstance(driver, Command) and driver.body:
         scenario, driver = with_body(scenario, driver)
-        return DrivenRobot.of(Robot.of(scenario), driver, steering=steering)
-    robot = Robot.of(scenario).without_network()
+        robot = None
+    robot = robot or Robot.of(scenario)
+    if isinstance(driver, PolicyParameters):
+        if steering is not None:
+            raise InputError("steering", "", f"found a function, and {driver.name} is for a policy")
+        return _piloted_robot(robot, driver)
+    if not isinstance(driver, Command):
+        if scenario.policy is not None:
+            expected = f"expected parameters of a policy, which scenario {scenario.name} has"
+            raise InputError(f"gait {driver.name}", "", f"found a gait, {expected}")
+        return DrivenRobot.of(robot, driver, steering=steering)
+    robot = robot.without_network()
     driven = robot.driven
     problem = "" if len(driver.samples) else "has none, expected one at least"
     if driver.samples.shape[1:] != driven.shape:
@@ -72,8 +94,57 @@ def controlled_robot(scenario: Scenario) -> Robot:
 
     Its `first_signals`, the signals at t = 0, let the actuators start in the same state as with the
     network."""
-    by_network, actuation = Robot.of(scenario), scenario.actuation
-    setpoints = actuation.commands(by_network.starting_cables())
-    robot = by_network.without_network()
-    law = CableLaw.of(robot.structure.cables[robot.driven])
-    return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
+    return Robot.of(scenario).controlled
+
+
+def _piloted_robot(robot: Robot, parameters: PolicyParameters) -> DrivenRobot:
+    """A robot driven by its scenario's policy with these parameters, whose first signals act from
+    the start on. Raises InputError if the scenario has no policy, or one with other parameters."""
+    scenario, policy = robot.scenario, robot.scenario.policy
+    expected, step = len(scenario.policy_parameters), scenario.cpg.listing_step
+    if policy is None or len(parameters.values) != expected:
+        problem = f"found {len(parameters.values)}, scenario {scenario.name} has {expected}"
+        raise InputError(f"policy {parameters.name}", "parameters", problem)
+    controlled, structure = robot.controlled, robot.structure
+    cables, struts = robot.starting_cables(), structure.p_WN[structure.struts]
+    size = np.linalg.norm(np.diff(struts[0], axis=0)) if len(struts) else scenario.robot.size
+    robots = DrivenRobots(
+        actuation=scenario.actuation,
+        ends=structure.cable_ends[robot.driven],
+        cables=cables,
+        rest=scenario.actuation.commands(cables),
+        amplitude=np.array(usual_amplitude(scenario.cpg)),
+        lengths=structure.initial_lengths,
+        weight=np.array(robot.weight),
+        size=np.array(size),
+    )
+    period = step * round(scenario.simulation.control_period / step)
+    pilot = Pilot(policy=policy, parameters=parameters, robots=robots, period=period)
+    readings = Readings(*(np.array(values)[np.newaxis] for values in first_readings(controlled)))
+    samples = policy_signals([pilot], readings)
+    controlled = dataclasses.replace(controlled, first_signals=samples[0])
+    return DrivenRobot(robot=controlled, name=parameters.name, samples=samples, pilot=pilot)
+
+
+def policy_signals(pilots: Sequence[Pilot], readings: Readings) -> np.ndarray:
+    """Signals (N, m) in N that the policies of N robots give for their readings. Raises InputError
+    if a user's policy returns anything but finite numbers of this shape."""
+    signals = np.empty((len(pilots), len(pilots[0].robots.ends)))
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row, pilot in enumerate(pilots):
+        groups.setdefault(pilot.kind, []).append(row)
+    for rows in groups.values():
+        some = [pilots[row] for row in rows]
+        arrays = [pilot.robots[2:] for pilot in some]
+        together = DrivenRobots(*some[0].robots[:2], *_stacked(arrays))
+        values = np.array([pilot.parameters.values for pilot in some])
+        signals[rows] = some[0].policy.signals(together, readings.rows(rows), values)
+    return signals
+
+
+def _stacked(parts: Sequence[Any]) -> Any:
+    """Named tuple of arrays, nested ones included, that stacks the arrays of several robots."""
+    if not isinstance(parts[0], tuple):
+        return np.stack(parts)
+    fields = [_stacked(each) for each in zip(*parts, strict=True)]
+    return type(parts[0])._make(fields) if hasattr(parts[0], "_make") else fields

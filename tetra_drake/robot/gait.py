@@ -33,6 +33,9 @@ LARGEST_GAIN = 1.0
 Vector = npt.NDArray[np.float64]
 """Parameters of a gait, in the order of ParameterSpace.names."""
 
+Body = tuple[tuple[str, float | str], ...]
+"""Numbers of a robot: scenario keys, and values as texts with units, or as numbers without one."""
+
 TAU_A, TAU_B = -2, -1
 """Indices of the time constants in a parameter vector."""
 
@@ -58,9 +61,8 @@ class Gait:
     turn: float = 0.0
     """Steering, -1 to 1. Left oscillators get the input u0 (1 + turn), right ones u0 (1 - turn)."""
     gains: Gains = field(default_factory=Gains)
-    body: tuple[tuple[str, float | str], ...] = ()
-    """Numbers of the robot that evolved with the gait: scenario keys, and values as texts with
-    units, or as numbers that have none. See Scenario.evolve."""
+    body: Body = ()
+    """Numbers of the robot that evolved with the gait; see Scenario.evolve."""
     scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if it is unknown."""
     weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -137,7 +139,49 @@ def _four_digits(value: float | str) -> str:
     return f"{float(number):.4g}{blank}{unit}"
 
 
-def with_body(scenario: Scenario, gait: Gait) -> tuple[Scenario, Gait]:
+@dataclass(frozen=True)
+class PolicyParameters:
+    """Parameters of a policy in place of a gait, and of the body that evolved with it, if any: what
+    evolution searches for in a scenario with a policy."""
+
+    name: str
+    values: tuple[float, ...]
+    """Parameters in the order of Scenario.policy_parameters."""
+    body: Body = ()
+    """Numbers of the robot that evolved with the policy; see Gait.body."""
+    scenario: str = field(default="", compare=False)
+    """Name of the scenario that they were made for; "" if it is unknown."""
+
+    def __post_init__(self) -> None:
+        """Raises InputError for a number that is not finite."""
+        wrong = [value for value in self.values if not math.isfinite(value)]
+        if wrong:
+            problem = f"found {wrong[0]}, expected finite numbers"
+            raise InputError(f"policy {self.name}", "parameters", problem)
+
+    def __str__(self) -> str:
+        least, most = min(self.values), max(self.values)
+        count = f"{len(self.values)} parameters of a policy"
+        lines = [f"{self.name}: {count}, {least:.4g} to {most:.4g}"]
+        return "\n".join([*lines, *(f"{key} {_four_digits(value)}" for key, value in self.body)])
+
+    def __repr__(self) -> str:
+        return f"<PolicyParameters {self.name}>"
+
+    def to_json(self, scenario: Scenario) -> dict[str, Any]:
+        """Content of a file, for json.dumps(). The parameters must fit `scenario`, which gives
+        their names."""
+        parameters = dict(zip(scenario.policy_parameters, self.values, strict=True))
+        made_for = self.scenario or scenario.name
+        content = {"schema": 1, "name": self.name, "scenario": made_for, "parameters": parameters}
+        return content | ({"body": dict(self.body)} if self.body else {})
+
+
+AnyGait = Gait | PolicyParameters
+"""A gait, or the parameters of a policy in its place."""
+
+
+def with_body(scenario: Scenario, gait: AnyGait) -> tuple[Scenario, AnyGait]:
     """A scenario with the numbers of a gait's body, and the gait without them.
 
     Nothing changes for a gait that evolved without a body. Otherwise the scenario has no section
@@ -150,13 +194,21 @@ def with_body(scenario: Scenario, gait: Gait) -> tuple[Scenario, Gait]:
     return changed, dataclasses.replace(gait, body=())
 
 
+def network_gait(gait: AnyGait) -> Gait:
+    """The given gait. Raises InputError for parameters of a policy, which has no network."""
+    if isinstance(gait, Gait):
+        return gait
+    raise InputError(gait.name, "", "found parameters of a policy, expected a gait of a network")
+
+
 @dataclass(frozen=True)
 class ParameterSpace:
     """Parameter space of a scenario's gaits, for your own search algorithm.
 
     A vector has the weights, the feedback gains (if the scenario has feedback), the numbers of the
     body in SI (those that `evolve` of the scenario leaves free), and the time constants tau_A and
-    tau_B in s.
+    tau_B in s. In a scenario with a policy it has the policy's parameters and the numbers of the
+    body.
 
     >>> space = td.ParameterSpace.of("thesis")
     >>> vector = space.repair(0.5 * (space.low + space.high))
@@ -183,16 +235,19 @@ class ParameterSpace:
     """Steering of all gaits; see Gait.turn."""
     evolve: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """Bounds of the numbers of the body, also of fixed ones; see Scenario.evolve."""
+    of_policy: bool = False
+    """True if the parameters are of a policy."""
 
     @functools.cached_property
     def free_body(self) -> tuple[str, ...]:
         """Keys of the numbers of the body that are parameters: their bounds differ."""
-        return tuple(key for key, (low, high) in self.evolve.items() if low < high)
+        return tuple(_free(self.evolve))
 
     @property
     def body(self) -> slice:
         """Places of the body's numbers in a vector."""
-        return slice(len(self.names) - 2 - len(self.free_body), len(self.names) - 2)
+        end = len(self.names) - (0 if self.of_policy else 2)
+        return slice(end - len(self.free_body), end)
 
     @classmethod
     def of(cls, scenario: GivenScenario) -> Self:
@@ -203,46 +258,52 @@ class ParameterSpace:
         """
         scenario = given_scenario(scenario)
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
-        weight_names, pathways = weights.names, tuple(scenario.cpg.feedback)
-        shared = np.arange(len(weight_names))
-        if bounds.mirrored:
+        of_policy = scenario.policy is not None
+        weight_names = () if of_policy else weights.names
+        shared, pathways = np.arange(len(weight_names)), tuple(scenario.cpg.feedback)
+        if bounds.mirrored and not of_policy:
             shared = np.minimum(shared, weights.images)
         chosen, parameters = np.unique(shared, return_inverse=True)
-        names = [f"weight {weight_names[i]}" for i in chosen]
-        names += [f"gain {name}" for name in pathways]
-        body = {key: pair for key, pair in scenario.evolve.items() if pair[0] < pair[1]}
-        # Rows: low, high, floors. Columns: weight, gain, tau_A, tau_B.
-        rows = [
-            [bounds.weight_min, -LARGEST_GAIN, bounds.tau_a_min, bounds.tau_a_min],
-            [bounds.weight_max, LARGEST_GAIN, bounds.tau_a_max, bounds.tau_a_max],
-            [0.0, -math.inf, bounds.tau_a_min, bounds.tau_a_min],
-        ]
-        limits = np.repeat(rows, [len(chosen), len(pathways), 1, 1], axis=1)
-        limits[:, TAU_B] *= TAU_B_PER_TAU_A
-        columns = [[low, high, -math.inf] for low, high in body.values()]
-        low, high, floors = np.insert(
-            limits, [TAU_A] * len(body), np.reshape(columns, (-1, 3)).T, axis=1
-        )
+
+        # Least and greatest value, and floor.
+        free = {**scenario.policy_parameters, **_free(scenario.evolve)}
+        limits: dict[str, Sequence[float]]
+        limits = {key: (low, high, -math.inf) for key, (low, high) in free.items()}
+        if not of_policy:
+            of_weight = bounds.weight_min, bounds.weight_max, 0.0
+            of_gain = -LARGEST_GAIN, LARGEST_GAIN, -math.inf
+            of_tau = bounds.tau_a_min, bounds.tau_a_max, bounds.tau_a_min
+            limits = {
+                **{f"weight {weight_names[i]}": of_weight for i in chosen},
+                **{f"gain {name}": of_gain for name in pathways},
+                **limits,
+                **{"tau_A": of_tau, "tau_B": [TAU_B_PER_TAU_A * tau for tau in of_tau]},
+            }
+        low, high, floors = np.reshape([*limits.values()], (-1, 3)).T.copy()
         return cls(
-            names=(*names, *body, "tau_A", "tau_B"),
+            names=tuple(limits),
             low=low,
             high=high,
             floors=floors,
-            couples_tau_b=not bounds.independent_tau_b,
+            couples_tau_b=not (bounds.independent_tau_b or of_policy),
             weights=parameters,
             weight_names=weight_names,
             pathways=pathways,
             turn=bounds.turn,
             evolve=scenario.evolve,
+            of_policy=of_policy,
         )
 
-    def gait(self, vector: npt.ArrayLike, *, name: str) -> Gait:
+    def gait(self, vector: npt.ArrayLike, *, name: str) -> AnyGait:
         """Gait called `name` with the parameters of a vector (parameters,), in the order of
         `names`; the bounds are not checked. Raises InputError for a vector of another size, a
         number that is not finite, a weight below 0, or a time constant that is not above 0."""
         vector = self._numbers(vector)
+        body, values = self._body_of(vector), vector.tolist()
+        if self.of_policy:
+            return PolicyParameters(name, tuple(values[: self.body.start]), body)
         first_gain = self.body.start - len(self.pathways)
-        gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
+        gains = dict(zip(self.pathways, values[first_gain:], strict=False))
         return Gait(
             name=name,
             weights=tuple(vector[self.weights].tolist()),
@@ -250,12 +311,12 @@ class ParameterSpace:
             tau_b=float(vector[TAU_B]),
             turn=self.turn,
             gains=Gains(**gains),
-            body=self._body_of(vector),
+            body=body,
             weight_names=self.weight_names,
         )
 
-    def _body_of(self, vector: Vector) -> tuple[tuple[str, float | str], ...]:
-        """Keys of all numbers of the body, and their values as in Gait.body."""
+    def _body_of(self, vector: Vector) -> Body:
+        """Keys of all numbers of the body, and their values."""
         numbers = dict(zip(self.free_body, vector[self.body].tolist(), strict=True))
         values = {
             key: Quantity(numbers.get(key, low), low.unit)
@@ -265,17 +326,24 @@ class ParameterSpace:
         }
         return tuple(written(values).items())
 
-    def vector(self, gait: Gait) -> Vector:
+    def vector(self, gait: AnyGait) -> Vector:
         """Parameter vector of a gait, without its name, its turn and fixed numbers of its body.
         With mirrored weights, a left weight and its right image share a parameter, which the first
         of the two gives. Raises InputError if the gait has another number of weights, or lacks a
         number of the body."""
+        body = self._body_numbers(gait)
+        if isinstance(gait, PolicyParameters):
+            return self._numbers([*gait.values, *body])
         if len(gait.weights) != len(self.weights):
             problem = f"found {len(gait.weights)} weights, expected {len(self.weights)}"
             raise InputError("ParameterSpace", f"gait {gait.name}", problem)
         _, first = np.unique(self.weights, return_index=True)
         weights = np.array(gait.weights)[first]
         gains = [getattr(gait.gains, name) for name in self.pathways]
+        return np.concatenate([weights, gains, body, [gait.tau_a, gait.tau_b]])
+
+    def _body_numbers(self, gait: AnyGait) -> list[float]:
+        """Numbers in SI of the body of a gait that are parameters."""
         given, body = dict(gait.body), []
         for key in self.free_body:
             if key not in given:
@@ -284,11 +352,13 @@ class ParameterSpace:
             if isinstance(value, str):
                 value = given_quantity(value, unit, gait.name, key)
             body.append(value)
-        return np.concatenate([weights, gains, body, [gait.tau_a, gait.tau_b]])
+        return body
 
     def random(self, generator: np.random.Generator) -> Vector:
         """Random parameter vector, uniform between `low` and `high`. tau_B is not drawn: it is
         2 tau_A, even if a search may change it independently later."""
+        if self.of_policy:
+            return generator.uniform(self.low, self.high)
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
@@ -315,11 +385,16 @@ class ParameterSpace:
         return given.astype(np.float64)
 
 
+def _free(evolve: Mapping[str, Sequence[float]]) -> dict[str, Sequence[float]]:
+    """Bounds of the numbers of the body that are parameters: the bounds differ."""
+    return {key: pair for key, pair in evolve.items() if pair[0] < pair[1]}
+
+
 WALKING_SEED = 80
 """Seed of a random gait that walks forward on the thesis's scenario: the default gait."""
 
 
-def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
+def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> AnyGait:
     """Random gait, the same for the same seed: uniform between the scenario's bounds of gaits.
 
     The default bounds are from Table 5 of the thesis.
@@ -340,7 +415,7 @@ def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
     return space.gait(space.random(np.random.default_rng(seed)), name=f"random gait {seed}")
 
 
-def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
+def save_gait(gait: AnyGait, path: str | Path, scenario: Scenario) -> None:
     """Writes a gait file (JSON) at `path`. The gait must fit `scenario`, which gives the names of
     its weights. load_gait() reads exactly the same numbers."""
     write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
@@ -349,12 +424,19 @@ def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
 Weight = Annotated[float, Field(ge=0)]
 
 
-class GaitFile(Section):
+class _AnyGaitFile(Section):
+    """What files of gaits and of policy parameters have in common."""
+
+    name: str = ""
+    scenario: str = ""
+    body: dict[str, float | str] = Field(default={})
+    """Numbers of the body by scenario key, quantities as texts with units."""
+
+
+class GaitFile(_AnyGaitFile):
     """Content of a gait file as it was read, before it is checked against a scenario; see Gait."""
 
     version: Literal[1, 2] = Field(alias="schema")
-    name: str = ""
-    scenario: str = ""
     weights: dict[str, Weight] | list[Weight]
     """Weights by name (see Weights.names), in any order. In schema 1, as in the thesis, a list in
     the order of Weights.couplings."""
@@ -362,12 +444,18 @@ class GaitFile(Section):
     tau_b_s: float | None = Field(default=None, gt=0)
     turn: float = Field(default=0.0, ge=-1, le=1)
     gains: Gains = Gains()
-    body: dict[str, float | str] = Field(default={})
-    """Numbers of the body by scenario key, quantities as texts with units."""
 
 
-def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Gait:
-    """Reads a gait for the scenario's robot.
+class PolicyFile(_AnyGaitFile):
+    """Content of a file of policy parameters as it was read; see PolicyParameters."""
+
+    version: Literal[1] = Field(alias="schema")
+    parameters: dict[str, float]
+    """Parameters by name, in any order; see Scenario.policy_parameters."""
+
+
+def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> AnyGait:
+    """Reads a gait for the scenario's robot, or the parameters of the scenario's policy.
 
         >>> gait = td.load_gait("gait.json", td.load_scenario("quick"))
 
@@ -382,21 +470,38 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
     """
     raw = read_json(given_path(path, "load_gait", "path"), "gait file")
     raw = raw.get(key) if key and isinstance(raw, dict) else raw
-    file = GaitFile.from_tree(raw, path, key=key)
     scenario = given_scenario(scenario)
+    gait = (_policy_in if scenario.policy else _gait_in)(raw, scenario, path, key)
+    try:
+        with_body(scenario, gait)
+    except InputError as error:
+        place = f"{key}.body.{error.key}".strip(".")
+        raise InputError(path, place, error.problem) from error
+    return gait
+
+
+def _policy_in(raw: Any, scenario: Scenario, path: str | Path, key: str) -> PolicyParameters:
+    """Parameters for a scenario's policy from the parsed content of a file; see load_gait()."""
+    if isinstance(raw, dict) and "weights" in raw:
+        problem = f"is a gait, expected parameters: scenario {scenario.name} has a policy"
+        raise InputError(path, key, problem)
+    file = PolicyFile.from_tree(raw, path, key=key)
+    place = f"{key}.parameters".strip(".")
+    return PolicyParameters(
+        name=file.name or Path(path).stem,
+        values=tuple(_in_order(file.parameters, [*scenario.policy_parameters], path, place)),
+        body=tuple(file.body.items()),
+        scenario=file.scenario,
+    )
+
+
+def _gait_in(raw: Any, scenario: Scenario, path: str | Path, key: str) -> Gait:
+    """A gait for a scenario from the parsed content of a file; see load_gait()."""
+    file = GaitFile.from_tree(raw, path, key=key)
     own, weights = Weights.of(scenario), file.weights
     names = own.names
     if isinstance(weights, dict):
-        missing = [name for name in names if name not in weights]
-        unknown = [name for name in weights if name not in names]
-        problems = [f"lacks {len(missing)} names, such as '{missing[0]}'"] if missing else []
-        if unknown:
-            problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
-        if problems:
-            found = f"found {len(weights)}, expected the {len(names)} of the scenario"
-            problem = f"{found}; {' and '.join(problems)}"
-            raise InputError(path, f"{key}.weights".strip("."), problem)
-        weights = [weights[name] for name in names]
+        weights = _in_order(weights, names, path, f"{key}.weights".strip("."))
     gait = Gait(
         name=file.name or Path(path).stem,
         weights=tuple(weights),
@@ -409,28 +514,40 @@ def load_gait(path: str | Path, scenario: GivenScenario, *, key: str = "") -> Ga
         weight_names=names,
     )
     check_gait(gait, scenario, own, source=path, key=key)
-    try:
-        with_body(scenario, gait)
-    except InputError as error:
-        place = f"{key}.body.{error.key}".strip(".")
-        raise InputError(path, place, error.problem) from error
     return gait
+
+
+def _in_order(
+    given: dict[str, float], names: Sequence[str], source: object, key: str
+) -> list[float]:
+    """The values of `given` in the order of `names`. Raises InputError, naming source and key,
+    unless the names are the same."""
+    known = {*names}
+    missing = [name for name in names if name not in given]
+    unknown = [name for name in given if name not in known]
+    problems = [f"lacks {len(missing)} names, such as '{missing[0]}'"] if missing else []
+    if unknown:
+        problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
+    if problems:
+        found = f"found {len(given)}, expected the {len(names)} of the scenario"
+        raise InputError(source, key, f"{found}; {' and '.join(problems)}")
+    return [given[name] for name in names]
 
 
 class HasBestGait(Protocol):
     """Object with a best gait, such as a run."""
 
-    def best_gait(self) -> Gait: ...
+    def best_gait(self) -> AnyGait: ...
 
 
-GivenGait = Gait | HasBestGait | str | Path
-"""A gait, its file, or a run or its folder; a run means its best gait."""
+GivenGait = AnyGait | HasBestGait | str | Path
+"""A gait, parameters of a policy, their file, or a run or its folder; a run means its best gait."""
 
 
-def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
+def given_gait(gait: GivenGait, scenario: Scenario) -> AnyGait:
     """The gait that an argument means: a gait itself, one read from a file for `scenario`, or the
     best gait of a run or of its folder. Raises InputError for anything else."""
-    if isinstance(gait, Gait):
+    if isinstance(gait, AnyGait):
         return gait
     if isinstance(gait, (str, Path)):
         if os.path.isdir(gait):

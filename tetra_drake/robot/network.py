@@ -84,6 +84,11 @@ class Weights:
         return tuple(f"{j // 2 + 1}->{i // 2 + 1} {NEURONS[i % 2]}" for i, j in pairs)
 
 
+def usual_amplitude(cpg: CpgSection) -> float:
+    """Typical amplitude (N) of the signals of an oscillator network with these settings."""
+    return abs(cpg.gain) * AMPLITUDE * abs(cpg.external_input)
+
+
 def constant_steering(turn: float) -> SteeringSignal:
     """Steering function that gives the same turn, -1 to 1, at all times; a positive turn raises the
     input of left oscillators. Raises InputError unless the turn is a number; checked_turn() checks

@@ -81,9 +81,9 @@ class Readings(NamedTuple):
             v_WN=nodes[:, kinematics.V_WN : kinematics.V_WN + 3],
         )
 
-    def rows(self, which: int | slice) -> Self:
+    def rows(self, which: int | slice | list[int]) -> Self:
         """Readings of some of the N robots: of one (`which` is an index; without the first axis) or
-        of several (a slice). They are views: they change with these readings."""
+        of several. With an index or a slice they are views: they change with these readings."""
         return type(self)(*(values[which] for values in self))
 
     def copied(self) -> Self:

@@ -11,7 +11,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws import cable
-from tetra_drake.robot.network import AMPLITUDE
+from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.metrics import looks_for_distance
@@ -31,7 +31,7 @@ def gain_remark(robot: Robot) -> str:
     """Remark on a `cpg.gain` (N) whose signals change the length of no cable by 1% (LEAST_MOTION),
     or exceed the limits of the actuators. It is "" if the gain is sensible."""
     cpg, driven = robot.scenario.cpg, robot.structure.cables[robot.driven]
-    if not driven.size:
+    if not driven.size or robot.scenario.policy is not None:
         return ""
     signal, stretch = _usual_signal(robot)
     share = np.max(stretch / robot.structure.initial_lengths[robot.driven])
@@ -56,10 +56,11 @@ def stillness_remark(robot: Robot, metrics: Mapping[str, float]) -> str:
     if not is_to_move or not abs(distance) < STILL * robot.structure.length:
         return ""
     remarks = [f"the robot moves {units.shown(distance, 'm')}, less than a tenth of its length"]
-    _, stretch = _usual_signal(robot)
-    signals = f"signals with cpg.gain {units.shown(scenario.cpg.gain, 'N')}"
-    most = units.shown(stretch.max(initial=0.0), "m")
-    remarks.append(gain_remark(robot) or f"{signals} stretch cables by {most} at most")
+    if scenario.policy is None:
+        _, stretch = _usual_signal(robot)
+        signals = f"signals with cpg.gain {units.shown(scenario.cpg.gain, 'N')}"
+        most = units.shown(stretch.max(initial=0.0), "m")
+        remarks.append(gain_remark(robot) or f"{signals} stretch cables by {most} at most")
     if metrics["actuator_limited"] > BINDS:
         share = 100.0 * metrics["actuator_limited"]
         remarks.append(f"a limit of the actuators binds {share:.0f} % of the time")
@@ -70,7 +71,7 @@ def start_up_remark(robot: Robot) -> str:
     """Remark on a simulation that ends by the start-up time `cpg.start_up`, before which signals
     are zero, so no cable is ever actuated. It is "" otherwise."""
     start_up, duration = robot.scenario.cpg.start_up, robot.scenario.simulation.duration
-    if start_up < duration:
+    if start_up < duration or robot.scenario.policy is not None:
         return ""
     return f"within {duration:g} s no cable is actuated, as cpg.start_up is {start_up:g} s"
 
@@ -100,5 +101,5 @@ def _usual_signal(robot: Robot) -> tuple[float, np.ndarray]:
     """Typical amplitude (N) of a network's signals, and the elastic stretch (driven cables,) in m
     of each driven cable under a force of this size."""
     cpg, law = robot.scenario.cpg, cable.CableLaw.of(robot.structure.cables[robot.driven])
-    signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
+    signal = usual_amplitude(cpg)
     return signal, np.asarray(cable.elastic_stretch(signal, law))

@@ -120,6 +120,15 @@ class Robot:
         still = np.zeros(structure.signals)
         return Robot(self.scenario, structure, model, first_signals=still, has_network=False)
 
+    @functools.cached_property
+    def controlled(self) -> Robot:
+        """A copy of the robot without its network, for a controller or a policy. Its first signals
+        let the actuators start in the same state as with the network."""
+        actuation, robot = self.scenario.actuation, self.without_network()
+        setpoints = actuation.commands(self.starting_cables())
+        law = cable.CableLaw.of(robot.structure.cables[robot.driven])
+        return dataclasses.replace(robot, first_signals=actuation.signals(setpoints, law))
+
     @property
     def driven(self) -> np.ndarray:
         """Indices (driven cables,) of the cables that have actuators, in the order of the
@@ -286,10 +295,7 @@ class Phase:
 def _placed(scenario: Scenario) -> Structure:
     """The structure of a scenario's robot at the positions of its settings, before any search for
     equilibrium. It has no contact nodes if the scenario has no ground."""
-    blueprint = scenario.robot.blueprint()
-    if not scenario.terrain.is_ground:
-        blueprint = dataclasses.replace(blueprint, contacts=np.array([], dtype=np.int64))
-    return Structure.of(blueprint)
+    return Structure.of(scenario.blueprint())
 
 
 def _settled(scenario: Scenario, placed: Structure, model: Model) -> tuple[Structure, Model]:

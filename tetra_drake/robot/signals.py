@@ -18,13 +18,36 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.laws.feedback import Gains
 from tetra_drake.laws.oscillator import Network, make_neurons, network_output
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import AnyGait, Gait, PolicyParameters, network_gait
 from tetra_drake.robot.network import SteeringSignal, initial_neurons
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.policies import DrivenRobots, PolicyKind
 
 MARK_DECIMALS = 9
 """Decimals of the times (s) at which a step must end. A step between two times that differ in
 rounding would be too short."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Pilot:
+    """Policy that drives a robot: its parameters, and what it knows of the robot."""
+
+    policy: PolicyKind
+    parameters: PolicyParameters
+    robots: DrivenRobots
+    """Constants of the one robot, without the axis of robots."""
+    period: float
+    """Time (s) between actions, a multiple of `cpg.listing_step`."""
+
+    def acts_after(self, time: float) -> float:
+        """Time (s) of the next action after an action at `time` (s)."""
+        return round(self.period * (round(time / self.period) + 1), MARK_DECIMALS)
+
+    @functools.cached_property
+    def kind(self) -> tuple[str, str]:
+        """Settings, as JSON, of the policy and the actuators. Robots with equal ones can be steered
+        together."""
+        return self.policy.model_dump_json(), self.robots.actuation.model_dump_json()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,11 +64,15 @@ class DrivenRobot:
     """The gait whose network makes the signals; None if they are given."""
     steering: SteeringSignal | None = None
     """Function from time to the turn, -1 to 1, in place of the gait's turn; None for the gait's."""
+    pilot: Pilot | None = None
+    """The policy that sets the signals while the robot moves; None without one."""
 
     @classmethod
-    def of(cls, robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None) -> Self:
+    def of(cls, robot: Robot, gait: AnyGait, *, steering: SteeringSignal | None = None) -> Self:
         """A robot driven by the network of a gait. `steering`, a function from time (s) to the turn
-        (-1 to 1), replaces the gait's constant turn."""
+        (-1 to 1), replaces the gait's constant turn. Raises InputError for parameters of a policy;
+        see robot.command.driven_robot()."""
+        gait = network_gait(gait)
         none = np.zeros((0, robot.structure.signals))
         return cls(robot=robot, name=gait.name, samples=none, gait=gait, steering=steering)
 
@@ -180,7 +207,9 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
     return cpg.gain * np.vstack([output, output[-1:], output[-1:]])
 
 
-def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | None = None) -> None:
+def save_signals(
+    path: str | Path, robot: Robot, gait: AnyGait, *, rate: float | None = None
+) -> None:
     """Writes the signals of a gait without feedback to the CSV file `path`, with the columns
     time_s, signal_1 ... signal_m.
 
@@ -190,8 +219,8 @@ def save_signals(path: str | Path, robot: Robot, gait: Gait, *, rate: float | No
         rate: samples per second (Hz); one per `cpg.listing_step` by default.
 
     Raises:
-        InputError: if the gait has feedback, the rate is above its default, or the file cannot be
-            written.
+        InputError: if the gait is a policy's or has feedback, the rate is above its default, or
+            the file cannot be written.
     """
     scenario, cpg, units = robot.scenario, robot.scenario.cpg, robot.scenario.units
     duration = scenario.simulation.duration

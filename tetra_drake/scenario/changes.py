@@ -13,7 +13,7 @@ from tetra_drake.settings.section import Tree, joined, mapped, parts_of, tree_va
 REPLACED = ("objective", "require", "evolve", "robot.actuated")
 """Keys of mappings that a file replaces as a whole, instead of merging them."""
 
-REMOVABLE = ("disturbances",)
+REMOVABLE = ("disturbances", "policy")
 """Sections that an empty key removes, as in `disturbances:`."""
 
 
@@ -30,7 +30,7 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
     Raises InputError for an index that a list does not have. The rules are:
 
     - A mapping changes the keys that it names; the others stay. An empty key, as in `friction:`,
-      changes nothing; `disturbances:` removes the section.
+      changes nothing; `disturbances:` or `policy:` removes the section.
     - A mapping with a tag, such as `!Coulomb`, replaces the mapping of the base and all its keys.
       Without a tag it changes keys.
     - `objective`, `require`, `evolve` and `robot.actuated` are replaced as a whole. Only dotted

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import json
@@ -23,6 +24,7 @@ from tetra_drake.laws.contact import GroundSection
 from tetra_drake.laws.friction import Friction
 from tetra_drake.laws.oscillator import CpgSection
 from tetra_drake.laws.terrain import Flat, Terrain
+from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.common_sections import (
     BODY_SECTIONS,
@@ -37,6 +39,7 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoc
 from tetra_drake.scenario.events import Event, check_taken, up_to_each
 from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
+from tetra_drake.scenario.policies import Policy, PolicyBounds
 from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
@@ -87,6 +90,9 @@ class Scenario(Section):
     strut_contact: StrutContactKind = NoStrutContact()
     actuation: Actuation = Force()
     cpg: CpgSection
+    policy: Policy | None = Field(default=None, exclude_if=lambda policy: policy is None)
+    """A closed loop in place of the oscillator network; evolution searches its parameters. An empty
+    key removes the base's."""
     gait_bounds: GaitBounds
     evolve: Annotated[BodyBounds, Field(exclude_if=operator.not_)] = Field(default={})
     """Bounds of the numbers of the robot that evolve together with the gait, by scenario key, such
@@ -147,7 +153,7 @@ class Scenario(Section):
         is empty exactly if the scenarios are equal, apart from their names.
         """
         ours, theirs = self.values(), base.values()
-        kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs[key]]
+        kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs.get(key)]
         other_kinds = tuple(key.removesuffix(TAG) for key in kinds)
         found = []
         for key in dict.fromkeys([*ours, *theirs]):
@@ -215,6 +221,19 @@ class Scenario(Section):
     def draw_count(self) -> int:
         """Number of simulations per gait in evolution: one, or one per draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
+
+    @functools.cached_property
+    def policy_parameters(self) -> Mapping[str, PolicyBounds]:
+        """Names of the parameters of the scenario's policy, with their bounds in random policies;
+        empty without a policy."""
+        return {} if self.policy is None else self.policy.parameters(self.blueprint())
+
+    def blueprint(self) -> Blueprint:
+        """The blueprint of the robot, without contact nodes if there is no ground."""
+        blueprint = self.robot.blueprint()
+        if self.terrain.is_ground:
+            return blueprint
+        return dataclasses.replace(blueprint, contacts=blueprint.contacts[:0])
 
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
@@ -299,6 +318,14 @@ class Scenario(Section):
                     refuse(f"{key}.{name}", f"!{section.tag} {problem}")
 
         blueprint, bounds = self.robot.blueprint(), self.gait_bounds
+        periods = simulation.control_period / step
+        if self.policy and (periods < 0.5 or abs(periods - round(periods)) > 1e-6):
+            expected = f"expected a multiple of cpg.listing_step, {step} s, for a policy"
+            refuse("simulation.control_period", f"found {simulation.control_period} s, {expected}")
+        excluded = {"cpg.feedback": self.cpg.feedback, "gait_bounds.turn": bounds.turn}
+        for key, value in excluded.items():
+            if self.policy and value:
+                refuse(key, f"found {value}, expected none: a policy excludes it")
         is_drake = isinstance(self.engine, Drake)
         most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
         least_step = simulation.duration * blueprint.signals / most_signals

@@ -94,6 +94,7 @@ def members_of(node: Tree, schema: Tree) -> list[Tree]:
     ($defs) of the whole `schema`."""
     sections = {"": {}} | schema.get("$defs", {})
     members = node.get("anyOf", [node])
+    members = [inner for one in members for inner in one.get("anyOf", [one])]
     return [sections[one.get("$ref", "").rpartition("/")[2]] | one for one in members]
 
 

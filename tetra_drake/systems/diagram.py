@@ -14,7 +14,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.errors import InputError
 from tetra_drake.laws.cable import CableLaw
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import AnyGait, Gait, network_gait
 from tetra_drake.robot.network import SteeringSignal, initial_neurons
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signal_samples
@@ -35,7 +35,7 @@ from tetra_drake.systems import (
 
 def MakeTensegrityDiagram(
     robot: Robot,
-    gait: Gait | None,
+    gait: AnyGait | None,
     *,
     steering: SteeringSignal | None = None,
     controller: System | None = None,
@@ -76,10 +76,11 @@ def MakeTensegrityDiagram(
     SceneGraph shows struts, spheres and cables there during a simulation; pages and films are made
     from trajectories.
 
-    Raises InputError if there is neither a gait nor a controller, or a port of the controller has
-    another name or size.
+    Raises InputError if there is neither a gait of a network nor a controller, or a port of the
+    controller has another name or size.
     """
     scenario, structure = robot.scenario, robot.structure
+    gait = None if gait is None else network_gait(gait)
     builder = DiagramBuilder()
 
     plant, scene_graph = _AddPlant(builder, meshcat)

@@ -127,7 +127,7 @@ class LaneBatch(Batch):
         self.readings.time[place] = 0.0
         self._wall_times[place] = self._tried[place] = 0.0
         self._controlled[place] = robot.is_controlled
-        self._phases[place] = robot.robot.phases
+        self._follow(place, robot)
         return True
 
     def _put_constants(self, place: int, constants: loop.Constants) -> None:
@@ -148,7 +148,7 @@ class LaneBatch(Batch):
             thread.leave(place)
         self._status[place] = loop.IDLE
         self._prepared[place] = self.failures[place] = None
-        self._phases[place] = ()
+        self._follow(place, None)
         return float(self._wall_times[place])
 
     def copy(self, place: int, to: int) -> None:
@@ -165,18 +165,24 @@ class LaneBatch(Batch):
             table[to] = table[place]
         self._places.constants[to, self._first_height] = to * self._heights.shape[1]
         self._prepared[to], self.failures[to] = self._prepared[place], self.failures[place]
-        self._phases[to] = self._phases[place]
+        self._copy_instants(place, to)
 
-    def _advance(self, until: np.ndarray, signals: np.ndarray | None, briefly: bool) -> None:
-        places, log = self._places, self._log
-        log.until[:] = np.minimum(until, self._ends)
-        goes = (self._status == loop.DONE) & (self._times < log.until)
-        if signals is not None:
-            period = self._first.constants.period
-            holds = goes & self._controlled
-            changes = holds & (signals != places.signals).any(axis=1)
-            log.change_ends[changes] = (self._times[changes] + period).round(MARK_DECIMALS)
-            places.signals[holds], places.holds[holds] = signals[holds], 1
+    def _hold(self, until: np.ndarray, signals: np.ndarray) -> None:
+        places, period = self._places, self._first.constants.period
+        holds = self._before(until) & self._controlled
+        changes = holds & (signals != places.signals).any(axis=1)
+        self._log.change_ends[changes] = (self._times[changes] + period).round(MARK_DECIMALS)
+        places.signals[holds], places.holds[holds] = signals[holds], 1
+
+    def _before(self, until: np.ndarray) -> np.ndarray:
+        """True for each robot (N,) that pauses, and has neither ended nor reached its time (s) in
+        `until`."""
+        is_before = self._times < np.minimum(until, self._ends)
+        return np.asarray((self._status == loop.DONE) & is_before)
+
+    def _advance(self, until: np.ndarray, *, briefly: bool) -> None:
+        places, goes = self._places, self._before(until)
+        self._log.until[:] = np.minimum(until, self._ends)
         self._status[goes] = loop.RUNNING
         work = places.states[:, loop.TRIED] - self._tried
         self._tried += work

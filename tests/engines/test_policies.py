@@ -1,0 +1,196 @@
+"""Policies: their motion on the engines, and what evolution makes of their parameters."""
+
+import math
+import shutil
+
+import numpy as np
+import pytest
+from helpers.brief import BRIEF
+
+import tetra_drake as td
+from tetra_drake.engines.mujoco import installed
+from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.errors import InputError
+from tetra_drake.robot.command import Command
+from tetra_drake.robot.gait import ParameterSpace, PolicyParameters, load_gait, save_gait
+from tetra_drake.robot.network import usual_amplitude
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.policies import driven_names, imported_function
+
+DRAKE = "!Drake {accuracy: 1e-4, max_step: 2 ms}"
+ENGINES = ["!Compiled", DRAKE, "!Mujoco"] if installed() else ["!Compiled", DRAKE]
+COEFFICIENTS = (0.2, -0.4, 0.7, -0.6, 0.3, 0.5, -0.2, 0.4)
+
+
+def brief(name="prism", policy="!Linear {}", **changes):
+    changes = {key.replace("__", "."): value for key, value in changes.items()}
+    return load_scenario(name).with_changes(BRIEF | {"policy": policy} | changes)
+
+
+def test_the_rolling_policy_moves_the_rover_as_a_controller_of_its_formula_does():
+    scenario = brief("rover", "!Rolling {}", simulation__duration="1.5 s")
+    plain = scenario.with_changes({"policy": None})
+    simulation = Simulation(plain)
+    structure, rest = simulation.robot.structure, simulation.rest[0]
+    cables = structure.cables[simulation.robot.driven]
+    rod = structure.p_WN[structure.struts[0]]
+    half = 0.5 * float(np.linalg.norm(rod[1] - rod[0]))
+
+    def roll(time, readings):
+        middles = 0.5 * (readings.p_WN[cables["node_a"]] + readings.p_WN[cables["node_b"]])
+        x, _, z = ((middles - readings.p_WN.mean(axis=0)) / half).T
+        s = math.sin(math.pi * time)
+        terms = np.stack([np.ones_like(x), x, z, x * x, x * z, z * z, s * x, s * z], axis=-1)
+        return rest * (1.0 - np.clip((terms * COEFFICIENTS).sum(axis=-1), -0.5, 0.5))
+
+    expected = simulate(plain, controller=roll)
+    rolled = simulate(scenario, PolicyParameters("rolling", COEFFICIENTS))
+    assert rolled.metrics.to_json() == expected.metrics.to_json()
+    assert abs(rolled.metrics.distance) > 0.001
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["prism", "rover", "motors"])
+def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine):
+    """With forces, free lengths and tensions, also after a driven cable was cut."""
+    if (name, engine) in {("rover", DRAKE), ("motors", "!Mujoco")}:
+        pytest.skip("slow, and the others show it")
+    scenario = brief(name, engine=engine, friction="!Coulomb {stiffness: 0 N/m}")
+    cut = driven_names(scenario.robot.blueprint())[0]
+    scenario = scenario.with_changes({"events": [{"at": "0.21 s", "cut": [cut]}]})
+    robot = Simulation(scenario).robot
+    biases = np.linspace(-0.3, 0.6, robot.driven.size)
+    values = {key: 0.0 for key in scenario.policy_parameters}
+    values |= dict(zip([key for key in values if key.startswith("bias")], biases, strict=True))
+    driven = simulate(scenario, PolicyParameters("biases", tuple(values.values())), record=True)
+
+    cables = Robot.of(scenario).starting_cables()
+    signals = usual_amplitude(scenario.cpg) * biases
+    setpoints = scenario.actuation.commands(cables._replace(signal=signals))
+    command = Command("biases", 1.0, setpoints[np.newaxis])
+    played = simulate(scenario, command=command, record=True)
+    limit = 2e-4 if engine == DRAKE else 2e-5
+    for key, error in {"signal": 1e-9, "p_WN": limit}.items():
+        found, expected = driven.trajectory[key].values, played.trajectory[key].values
+        np.testing.assert_allclose(found, expected, rtol=0, atol=error)
+    assert np.ptp(driven.trajectory.p_WN.values, axis=0).max() > 1e-4
+
+
+def test_the_engines_agree_on_a_network():
+    """With signals that do not throw the prism about, before and after a cable is cut between two
+    actions."""
+    changes = {"simulation.duration": "1 s", "engine": "!Compiled {tolerance: 1e-6 m/s}"}
+    changes["events"] = [{"at": "0.893 s", "cut": ["side n2 n5"]}]
+    scenario = brief("prism", "!Network {hidden: 3, readings: [clock, lengths, w_WB]}")
+    compiled = scenario.with_numbers({"cpg.gain": 0.3 * scenario.cpg.gain}).with_changes(changes)
+    gait = td.seeded_gait(scenario, 3)
+    results = [
+        simulate(each, gait, record=True).trajectory.p_WN.values
+        for each in (compiled, compiled.with_changes({"engine": DRAKE}))
+    ]
+    np.testing.assert_allclose(*results, rtol=0, atol=2e-5)
+    assert np.abs(results[0][-1] - results[0][0]).max() > 1e-3
+
+
+def test_policies_side_by_side_move_as_alone():
+    scenario = brief(simulation__duration="0.2 s")
+    softer = scenario.with_numbers({"cpg.gain": 0.5 * scenario.cpg.gain})
+    gaits = [td.seeded_gait(scenario, seed) for seed in range(12)]
+    scenarios = [scenario, softer] * 6
+    together = simulate_many(scenarios, gaits, workers=1)
+    alone = [simulate(each, gait) for each, gait in zip(scenarios, gaits, strict=True)]
+    metrics = [result.metrics.to_json() for result in alone]
+    assert [result.metrics.to_json() for result in together] == metrics
+    assert len({result["distance"] for result in metrics}) == 12
+
+
+@pytest.mark.parametrize("body", [{}, {"robot.cables.side.stiffness": ["150 N/m", "250 N/m"]}])
+@pytest.mark.parametrize("optimizer", [None, "!CmaEs {population: 4, sample: 2}", "!RandomSearch"])
+def test_evolution_of_a_policy_can_be_resumed_and_replayed(tmp_path, optimizer, body):
+    changes = {} if optimizer is None else {"optimizer": optimizer}
+    scenario = brief(evolve=body, **changes)
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    run = td.evolve(scenario, whole, report=False, reevaluate=False)
+    shutil.copytree(whole, cut)
+    for file in [*cut.glob("trial_*/*s.jsonl")]:
+        lines = file.read_bytes().splitlines(keepends=True)
+        file.write_bytes(b"".join(lines[: len(lines) // 2]))
+    again = td.evolve(None, cut, resume=True, report=False, reevaluate=False)
+    for table in (run.evaluations, again.evaluations):
+        table["wall_time_s"] = 0.0
+    assert again.evaluations.equals(run.evaluations) and len(run.evaluations) == 6
+    best, file = run.best_gait(), whole / "trial_00" / "best_gait.json"
+    assert load_gait(file, scenario) == best
+    assert simulate(scenario, best).fitness == run.fittest()["fitness"]
+    assert dict(best.body).keys() == body.keys()
+    assert not body or file.with_name("best.yaml").exists()
+    vector = ParameterSpace.of(scenario).vector(best)
+    assert vector == pytest.approx(run.vector(0, int(run.fittest()["index"])))
+
+
+def test_the_export_of_a_policy_says_that_it_was_in_a_loop(tmp_path):
+    scenario = brief(simulation__sample_period="10 ms")
+    gait = td.seeded_gait(scenario, 1)
+    verdict = td.export(scenario, gait, tmp_path / "lab", rate=50.0)
+    assert "closed loop" in verdict
+    command = td.load_command(tmp_path / "lab" / "command.csv", scenario)
+    played = simulate(scenario, command=command).metrics.distance
+    assert played == pytest.approx(simulate(scenario, gait).metrics.distance, abs=1e-3)
+
+
+def short(readings, parameters, robots):
+    return parameters[:, :1]
+
+
+def undefined(readings, parameters, robots):
+    return np.where(readings.time[:, np.newaxis] > 0.05, np.nan, robots.rest)
+
+
+def own(readings, parameters, robots):
+    return robots.rest + parameters * readings.rates[:, :1]
+
+
+def test_a_policy_of_ones_own_is_found_by_its_import_path():
+    scenario = brief(policy=f"!Python {{function: '{__name__}:own', count: 1}}")
+    result = simulate(scenario, td.seeded_gait(scenario))
+    assert result.metrics.to_json() != simulate(scenario, PolicyParameters("", (0.0,))).metrics
+
+
+@pytest.mark.parametrize(
+    ("policy", "expected"),
+    [
+        ("!Python {function: 'nowhere:f', count: 1}", "policy.function: nowhere:f: cannot be"),
+        (f"!Python {{function: '{__name__}:ENGINES', count: 1}}", "expected a function"),
+        (f"!Python {{function: '{__name__}:short', count: 2}}", "short: returned an array"),
+        (f"!Python {{function: '{__name__}:undefined', count: 1}}", "undefined: returned a number"),
+        ("!Linear {readings: [lengths, smells]}", "smells"),
+        ("!Linear {readings: [lengths, lengths]}", "policy.readings: found"),
+        ("!Python {function: 'm:f', count: 1, bounds: [1, 0]}", "policy.bounds: found 1.0 and"),
+    ],
+)
+def test_a_wrong_policy_is_refused(policy, expected):
+    with pytest.raises(InputError) as error:
+        scenario = brief(policy=policy)
+        simulate(scenario, td.seeded_gait(scenario))
+    assert expected in str(error.value) and "\n" not in str(error.value)
+
+
+def test_what_does_not_go_with_a_policy_is_refused(tmp_path):
+    scenario, thesis = brief(), load_scenario("thesis")
+    gait, values = td.seeded_gait(thesis), td.seeded_gait(scenario)
+    for key, value in {"cpg.feedback": ["load"], "simulation.control_period": "0.7 ms"}.items():
+        with pytest.raises(InputError, match=key):
+            scenario.with_changes({key: value, "cpg.signals": "live"})
+    with pytest.raises(InputError, match="found a gait, expected parameters of a policy"):
+        simulate(scenario, gait)
+    with pytest.raises(InputError, match="scenario thesis has 0"):
+        simulate(thesis, values)
+    with pytest.raises(InputError, match="steering"):
+        simulate(scenario, values, steering=0.5)
+    save_gait(gait, tmp_path / "gait.json", thesis)
+    with pytest.raises(InputError, match="is a gait, expected parameters"):
+        load_gait(tmp_path / "gait.json", scenario)
+    assert ParameterSpace.of(scenario).vector(values).tolist() == list(values.values)
+    assert imported_function(f"{__name__}:own") is own
