@@ -1,5 +1,6 @@
 """Names of the package, with their modules: for type checkers, and for __getattr__()."""
 
+from tetra_drake.engines.planner import Planner as Planner
 from tetra_drake.engines.preparation import prepare as prepare
 from tetra_drake.engines.simulate import simulate as simulate
 from tetra_drake.engines.simulate import simulate_many as simulate_many

@@ -390,16 +390,15 @@ class Simulation:
         actuators keep the states that they have.
 
         Raises:
-            InputError: if the engine is another one, an index or the time is wrong, or the robot
-                has failed.
+            InputError: if the engine is another one, or the index or the time is wrong.
         """
         (place,) = self._places([place])
         steps = self._steps_until(np.array([readings.time]))[0]
-        if steps == 0 or self.failures[place]:
-            problem = f"robot {place} has failed, or the time is not after the start"
+        if steps == 0:
+            problem = f"found the time {readings.time} s, expected one after the start"
             raise InputError("Simulation", "assume", problem)
         with self._used("assume"):
-            if self._steps[place] == 0:
+            if self._steps[place] == 0 or self.failures[place]:
                 self._begin(place, self._driven(self._robots[place]))
             self._batch.assume(place, float(self._time_after(steps)), readings)
             self._steps[place] = steps
