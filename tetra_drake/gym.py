@@ -188,7 +188,7 @@ class _Episodes:
         """Puts all robots and their episodes into saved states; returns the observations."""
         check_type(_SOURCE, "states", states, States)
         if "episode.steps" not in states.tables:
-            problem = "found states of a simulation, expected those of an environment"
+            problem = "found states of a simulation, expected states of an environment"
             raise InputError(_SOURCE, "states", problem)
         readings = self.simulation.restore(states)
         for name in _OF_EPISODES:

@@ -90,8 +90,8 @@ class Planner:
                 share of the costs' standard deviation has a weight of 1/e.
             noise: standard deviation of the samples' knots, as a share of half the actions' range.
             limits: least and greatest action of each cable in SI units, (2, actions) or (2, 1). By
-                default those of signals with the usual amplitude of a network, within the limits of
-                the actuators.
+                default the actions for signals with the usual amplitude of a network, within the
+                limits of the actuators.
             control_period: time (s) between the model's actions; by default the scenario's.
             decision_period: time (s) between decisions, a multiple of the control period, which is
                 its default.
@@ -179,7 +179,7 @@ class Planner:
     def __call__(self, now: float, readings: Readings) -> np.ndarray:
         """The actions (actions,) at a time (s), for simulate(controller=...).
 
-        `readings` are those of one robot, without an axis of robots. A time before the latest one
+        `readings` are of one robot, without an axis of robots. A time before the latest one
         begins anew; see reset().
         """
         if now < self._latest:

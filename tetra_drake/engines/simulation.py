@@ -381,11 +381,11 @@ class Simulation:
                 self._batch.change(place, self._driven(robot))
 
     def assume(self, readings: Readings, *, place: int = 0) -> None:
-        """Puts a robot of the compiled engine into the motion of other readings, such as those of
-        another engine or of a real robot.
+        """Puts a robot of the compiled engine into the motion of given readings, for example of a
+        robot on another engine, or of a real one.
 
         The readings have no axis of robots, and a time that is a multiple of the control period.
-        Positions and velocities are those of the readings. The contact nodes that touch the ground
+        Positions and velocities are as in the readings. The contact nodes that touch the ground
         stick where they are, as at the start: the bending of their bristles is not known. The
         actuators keep the states that they have.
 
