@@ -219,7 +219,7 @@ class Planner:
             self.model.step(np.tile(actions, (self._samples, 1)), indices=[0])
 
     def _improved(self, plan: np.ndarray, state: States, now: float) -> np.ndarray:
-        """Weighted mean of noisy copies of a plan, of which the first has no noise."""
+        """Weighted mean of noisy copies of a plan; the first copy has no noise."""
         noise = self._random.normal(0.0, self._noise, (self._samples, *plan.shape))
         noise[0] = 0.0
         candidates = np.clip(plan + noise, -1.0, 1.0)
