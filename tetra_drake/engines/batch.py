@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
@@ -247,15 +248,12 @@ class Batch:
             table[places] = saved[f"readings.{name}"]
         self._restore(places, saved)
         self.has_history[places] = "history.kept" in saved
-        names = [
-            name for name in vars(Motion)["__dataclass_fields__"] if f"history.{name}" in saved
-        ]
-        for row, place in enumerate(places if names else ()):
-            kept = saved["history.kept"][row]
-            self._remember(
-                place,
-                Motion(**{name: saved[f"history.{name}"][row, :kept].copy() for name in names}),
-            )
+        fields = [field.name for field in dataclasses.fields(Motion)]
+        tables = {name: saved[f"history.{name}"] for name in fields if f"history.{name}" in saved}
+        for row, place in enumerate(places if tables else ()):
+            known = slice(saved["history.kept"][row])
+            motion = Motion(**{name: table[row, known].copy() for name, table in tables.items()})
+            self._remember(place, motion)
 
     def assume(self, place: int, time: float, readings: Readings) -> None:
         """Puts the robot in a place into the motion of other readings at a time (s). Its actuators
