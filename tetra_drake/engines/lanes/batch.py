@@ -179,7 +179,7 @@ class LaneBatch(Batch):
         start, row = prepared.start, self._places.states[place]
         clock, modes, *_, tally, state = views((*start[:7], start.step.state), row)
         state[:] = bodies_state(readings, robot.structure)
-        modes[:] = robot.modes_at(state)
+        modes[:] = 0.0  # what touches the ground touches down in the next step
         clock[loop.TIME], clock[loop.PLANNED] = time, start.clock[loop.PLANNED]
         clock[loop.TRIED], clock[loop.ACTIVE], tally.time[0] = 0.0, 1.0, time
         self._restore([place], self._save([place]))
