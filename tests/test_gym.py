@@ -182,3 +182,27 @@ def test_without_gymnasium_the_import_tells_what_to_install(monkeypatch, refused
     monkeypatch.delitem(sys.modules, "tetra_drake.gym")
     with refused("tetra_drake.gym", "", "tetra_drake[gym]"):
         importlib.import_module("tetra_drake.gym")
+
+
+def test_a_tree_search_branches_and_the_rewards_stay_the_fitness(short, refused):
+    one, other = TensegrityEnv(short), TensegrityEnv(short)
+    one.reset(seed=3)
+    actions = np.random.default_rng(1).uniform(-1, 1, (10, *one.action_space.shape))
+    rewards = [one.step(action)[1] for action in actions[:4]]
+    states = one.save()
+    ends = []
+    for env in (one, other):
+        seen = env.restore(states)
+        steps = [env.step(action) for action in actions[4:]]
+        ends.append((seen.tobytes(), [(step[0].tobytes(), *step[1:4]) for step in steps]))
+    assert ends[0] == ends[1] and ends[0][1][-1][3]
+    rewards += [step[1] for step in steps]
+    assert sum(rewards) == pytest.approx(other.result().fitness, rel=1e-9)
+    many = TensegrityVectorEnv(2, short)
+    many.reset(seed=1)
+    now = many.save()
+    first = many.step(np.tile(actions[0], (2, 1)))[0]
+    many.restore(now)
+    assert (many.step(np.tile(actions[0], (2, 1)))[0] == first).all()
+    with refused("tetra_drake.gym", "states", "of an environment"):
+        one.restore(one._episodes.simulation.save())

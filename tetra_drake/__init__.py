@@ -21,7 +21,9 @@ Functions, and the main attributes of their results:
     sweep               metrics of gaits on a grid of changed scenarios, an xarray.Dataset
     load_result         the result in a folder of the command `tetra-drake simulate`
     evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (pandas tables)
-    Simulation          robots in control periods: reset(), step(actions), state
+    Simulation          robots in control periods: reset(), step(actions), state; save(), restore()
+    Planner             controller that plans by sampled motions: simulate(controller=planner)
+    States              saved states of a simulation, also in files
     fit                 values of scenario keys that meet measurements: parameters, scenario
     MotionCapture, Rest measurements for fit(): motion over time; shape, tensions, frequencies
     robustness          how far gaits walk on disturbed robots

@@ -1,9 +1,11 @@
 """Names of the package, with their modules: for type checkers, and for __getattr__()."""
 
+from tetra_drake.engines.planner import Planner as Planner
 from tetra_drake.engines.preparation import prepare as prepare
 from tetra_drake.engines.simulate import simulate as simulate
 from tetra_drake.engines.simulate import simulate_many as simulate_many
 from tetra_drake.engines.simulation import Simulation as Simulation
+from tetra_drake.engines.states import States as States
 from tetra_drake.evolution.run import load_run as load_run
 from tetra_drake.experiment import evolve as evolve
 from tetra_drake.experiment import fit as fit

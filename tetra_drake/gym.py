@@ -30,18 +30,24 @@ The time between actions is `simulation.control_period`, or the argument `contro
 episode ends (terminated) if the robot fails, and (truncated) at `simulation.duration`. With
 `disturbances` in the scenario, each episode has a draw of its own.
 
+`env.unwrapped.save()` returns the state of the robot and of its episode, `restore(states)` puts it
+back, also into another environment of the same kind, and returns the observation. So a tree search
+can branch. The generator that draws disturbances in reset() is not restored, nor are wrappers.
+
 A copy of an environment, by pickle or deepcopy, is made anew from the same arguments: it does not
 have the state of the original, and begins with reset().
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from tetra_drake.engines.simulation import Simulation, checked_actions, is_list
+from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.results.result import SimulationResult, poses_of
 from tetra_drake.robot.network import usual_amplitude
@@ -69,6 +75,19 @@ WALK, ROLL = "tetra_drake/Walk-v0", "tetra_drake/Roll-v0"
 that rolls, by default on `roll`."""
 
 _SOURCE, _MASK, _RENDERED = "tetra_drake.gym", "reset_mask", "rgb_array"
+
+_OF_EPISODES = (
+    "start",
+    "steady",
+    "time",
+    "rate",
+    "rolled",
+    "offsets",
+    "rewarded",
+    "steps",
+    "going",
+)
+"""Attributes of _Episodes, without underscore, that are the state of the episodes."""
 
 
 class _Episodes:
@@ -158,6 +177,23 @@ class _Episodes:
         rewards = fitness - self._rewarded
         self._rewarded = fitness
         return self._observe(readings), rewards, terminated, truncated
+
+    def save(self) -> States:
+        """States of all robots and their episodes."""
+        states = self.simulation.save(history=True)
+        own = {f"episode.{name}": getattr(self, f"_{name}").copy() for name in _OF_EPISODES}
+        return dataclasses.replace(states, tables={**states.tables, **own})
+
+    def restore(self, states: States) -> np.ndarray:
+        """Puts all robots and their episodes into saved states; returns the observations."""
+        check_type(_SOURCE, "states", states, States)
+        if "episode.steps" not in states.tables:
+            problem = "found states of a simulation, expected states of an environment"
+            raise InputError(_SOURCE, "states", problem)
+        readings = self.simulation.restore(states)
+        for name in _OF_EPISODES:
+            getattr(self, f"_{name}")[:] = states.tables[f"episode.{name}"]
+        return self._observe(readings)
 
     def _fitness(self, readings: Readings, place: int) -> float:
         """Fitness of the robot with the index `place` up to now, without the metrics that are known
@@ -249,6 +285,15 @@ class TensegrityEnv(gymnasium.Env[np.ndarray, np.ndarray], EzPickle):
     def render(self) -> np.ndarray | None:
         """The picture (height, width, 3) of the robot now; None without a `render_mode`."""
         return self._episodes.pictures()[0] if self.render_mode else None
+
+    def save(self) -> States:
+        """State of the robot and its episode; see restore()."""
+        return self._episodes.save()
+
+    def restore(self, states: States) -> np.ndarray:
+        """Puts the robot and its episode into a saved state, and returns the observation. Raises
+        InputError for states of another scenario, or of a simulation."""
+        return self._episodes.restore(states)[0]
 
     def result(self) -> SimulationResult:
         """The result of the last episode, which must have reached `simulation.duration`; available
@@ -348,6 +393,17 @@ class TensegrityVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray], EzPickl
         info["_final_info"] = self._ended
         seen = self._episodes.reset(np.flatnonzero(self._ended), self._generators)
         return seen, rewards, terminated, truncated, info
+
+    def save(self) -> States:
+        """States of all robots and their episodes; see restore()."""
+        return self._episodes.save()
+
+    def restore(self, states: States) -> np.ndarray:
+        """Puts the robots and their episodes into saved states, and returns the observations.
+        Raises InputError for states of another scenario, or of a simulation."""
+        seen = self._episodes.restore(states)
+        self._ended = ~states.tables["episode.going"]
+        return seen
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Pictures (height, width, 3) of the robots now; None without a `render_mode`."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.command import policy_signals
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Phase, Robot
@@ -21,6 +23,9 @@ from tetra_drake.robot.structure import Structure
 if TYPE_CHECKING:
     import xarray
 
+
+Tables = Mapping[str, np.ndarray]
+"""Tables of numbers by name."""
 
 _SAME_TIME = 1e-9
 """Largest difference (s) of two times that are the same except for rounding."""
@@ -61,6 +66,8 @@ class Batch:
         self._events, self._actions = np.full((2, places), math.inf)
         """Times (s) of the next event, and of the next action of the policy, in each place;
         infinite if there is none."""
+        self.has_history = np.ones(places, dtype=bool)
+        """False for a robot whose motion so far is unknown, because it was restored without it."""
 
     def _begin_all(self, robots: Sequence[DrivenRobot]) -> None:
         """Puts robots in the first places, in their order. Raises InputError if one differs too
@@ -134,12 +141,8 @@ class Batch:
         self._phases[place] = () if robot is None else robot.robot.phases
         self._pilots[place] = pilot = None if robot is None else robot.pilot
         self._events[place] = _next_event(self._phases[place])
+        self.has_history[place] = True
         self._actions[place] = math.inf if pilot is None else pilot.acts_after(0.0)
-
-    def _copy_instants(self, place: int, to: int) -> None:
-        """Makes the same happen to the robot in place `to` as to the one in `place`."""
-        self._phases[to], self._pilots[to] = self._phases[place], self._pilots[place]
-        self._events[to], self._actions[to] = self._events[place], self._actions[place]
 
     def _pass_events(self) -> None:
         """Changes the robots that are at the time of an event."""
@@ -193,14 +196,85 @@ class Batch:
             raise failure
         if not self.ended(place):
             raise InputError("Batch", f"place {place}", "has no robot that has reached its end")
+        if not self.has_history[place]:
+            problem = f"robot {place} was restored without its motion before: save(history=True)"
+            raise InputError("Simulation", "result", problem)
         return self._result(place)
 
     def _result(self, place: int) -> SimulationResult:
         raise NotImplementedError
 
-    def copy(self, place: int, to: int) -> None:
-        """Replaces the robot in place `to` by a copy of the one in `place`. Both continue
-        independently."""
+    def change(self, place: int, driven: DrivenRobot) -> None:
+        """Lets the robot in a place go on as `driven`, which differs from it only by more events of
+        its scenario, from now on."""
+        phases, now = driven.robot.phases, self.readings.time[place] + _SAME_TIME
+        phases = phases[sum(phase.begins <= now for phase in phases) - 1 :]
+        self._become(place, phases[0].robot, phases[0].p_BC - self._phases[place][0].p_BC)
+        self._rename(place, driven)
+        self._phases[place], self._events[place] = phases, _next_event(phases)
+
+    def _rename(self, place: int, driven: DrivenRobot) -> None:
+        """Sets the robot at t = 0, for the result of the robot in a place."""
+        raise NotImplementedError
+
+    def save(self, places: Sequence[int], *, history: bool) -> dict[str, np.ndarray]:
+        """The states of controlled robots that pause, as tables; the first axis is `places`. With
+        `history` they have the motion so far."""
+        saved = self._save(places)
+        saved["phases_left"] = np.array([len(self._phases[place]) for place in places])
+        for name, table in self.readings._asdict().items():
+            saved[f"readings.{name}"] = table[places]
+        motions = [self.motion(place) for place in places] if history else []
+        if motions:
+            kept = saved["history.kept"] = np.array([len(motion.times) for motion in motions])
+            for name, first in vars(motions[0]).items():
+                if first is not None:
+                    table = np.zeros((len(places), kept.max(), *first.shape[1:]))
+                    for row, motion in enumerate(motions):
+                        table[row, : kept[row]] = getattr(motion, name)
+                    saved[f"history.{name}"] = table
+        return saved
+
+    def restore(self, places: Sequence[int], saved: Tables) -> None:
+        """Puts robots into states of save(). Places must have the same robots, which have not
+        failed."""
+        for place, left in zip(places, saved["phases_left"].tolist(), strict=True):
+            now = self._phases[place]
+            if len(now) != left:
+                phases = (now[0].robot.before or now[0].robot).phases[-left:]
+                self._become(place, phases[0].robot, np.zeros_like(phases[0].p_BC))
+                self._phases[place], self._events[place] = phases, _next_event(phases)
+        for name, table in self.readings._asdict().items():
+            table[places] = saved[f"readings.{name}"]
+        self._restore(places, saved)
+        self.has_history[places] = "history.kept" in saved
+        fields = [field.name for field in dataclasses.fields(Motion)]
+        tables = {name: saved[f"history.{name}"] for name in fields if f"history.{name}" in saved}
+        for row, place in enumerate(places if tables else ()):
+            known = slice(saved["history.kept"][row])
+            motion = Motion(**{name: table[row, known].copy() for name, table in tables.items()})
+            self._remember(place, motion)
+
+    def assume(self, place: int, time: float, readings: Readings) -> None:
+        """Puts the robot in a place into the motion of other readings at a time (s). Its actuators
+        keep their states. A contact node that touches the ground sticks. Raises InputError if the
+        engine cannot do it."""
+        raise InputError("Simulation", "assume", "needs a scenario on the engine compiled")
+
+    def motion(self, place: int) -> Motion:
+        """Recorded motion of the robot in a place, up to its present time."""
+        raise NotImplementedError
+
+    def _save(self, places: Sequence[int]) -> dict[str, np.ndarray]:
+        """The engine's own tables for save()."""
+        raise NotImplementedError
+
+    def _restore(self, places: Sequence[int], saved: Tables) -> None:
+        """Puts robots into the states of the engine's own tables, without their motions before."""
+        raise NotImplementedError
+
+    def _remember(self, place: int, motion: Motion) -> None:
+        """Gives a restored robot its motion before."""
         raise NotImplementedError
 
     def stop(self, place: int) -> float:
@@ -214,6 +288,8 @@ class LoneRobot(Protocol):
     another."""
 
     driven: DrivenRobot
+    first: DrivenRobot
+    """The driven robot at t = 0, before events."""
     wall_time: float
     """Wall time (s) that the simulation has taken."""
 
@@ -230,12 +306,21 @@ class LoneRobot(Protocol):
     def result(self) -> SimulationResult:
         """The result at the end of the simulation."""
 
-    def copied(self) -> Self:
-        """Copy of the simulation, which continues independently."""
-
     def become(self, robot: Robot, p_BC: np.ndarray) -> Self:
         """The simulation that continues with another robot in place of this one; see
         Batch._become()."""
+
+    def motion(self) -> Motion:
+        """The motion up to now, at the times of the samples."""
+
+    def numbers(self) -> dict[str, np.ndarray]:
+        """The state of the simulation, as arrays by name."""
+
+    def restore(self, numbers: Tables) -> None:
+        """Puts the simulation into a state of numbers(), without the motion before."""
+
+    def remember(self, motion: Motion) -> None:
+        """Gives a restored simulation its motion before."""
 
 
 class SerialBatch(Batch):
@@ -288,26 +373,38 @@ class SerialBatch(Batch):
                 self._reached[place] = until[place]
 
     def _become(self, place: int, robot: Robot, p_BC: np.ndarray) -> None:
-        before = self._robots[place]
-        assert before is not None
-        self._robots[place] = before.become(robot, p_BC)
+        self._robots[place] = self._robot_in(place).become(robot, p_BC)
+
+    def _rename(self, place: int, driven: DrivenRobot) -> None:
+        self._robot_in(place).first = driven
+
+    def _robot_in(self, place: int) -> LoneRobot:
+        robot = self._robots[place]
+        assert robot is not None
+        return robot
+
+    def motion(self, place: int) -> Motion:
+        return self._robot_in(place).motion()
+
+    def _save(self, places: Sequence[int]) -> dict[str, np.ndarray]:
+        rows = [self._robot_in(place).numbers() for place in places]
+        saved = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        return saved | {"reached": self._reached[places]}
+
+    def _restore(self, places: Sequence[int], saved: Tables) -> None:
+        for row, place in enumerate(places):
+            self._robot_in(place).restore({name: table[row] for name, table in saved.items()})
+        self._reached[places] = saved["reached"]
+
+    def _remember(self, place: int, motion: Motion) -> None:
+        self._robot_in(place).remember(motion)
 
     def ended(self, place: int) -> bool:
         is_over = self.failures[place] is not None or self._reached[place] >= self._ends[place]
         return bool(is_over) and self._robots[place] is not None
 
     def _result(self, place: int) -> SimulationResult:
-        robot = self._robots[place]
-        assert robot is not None
-        return robot.result()
-
-    def copy(self, place: int, to: int) -> None:
-        robot = self._robots[place]
-        self._robots[to] = None if robot is None else robot.copied()
-        self._copy_instants(place, to)
-        self.failures[to] = self.failures[place]
-        self._reached[to], self._ends[to] = self._reached[place], self._ends[place]
-        self.readings.put(to, self.readings.rows(place))
+        return self._robot_in(place).result()
 
     def stop(self, place: int) -> float:
         robot, self._robots[place] = self._robots[place], None

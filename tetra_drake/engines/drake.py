@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import dataclasses
 import weakref
+from collections.abc import Mapping
 from time import perf_counter
 
 import numpy as np
@@ -20,6 +21,7 @@ from scipy.sparse.linalg import eigsh
 
 from tetra_drake.engines.batch import LoneRobot, Viewer
 from tetra_drake.engines.engine import Engine
+from tetra_drake.engines.lanes.tables import numbers_of, views
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_at, frame_of
 from tetra_drake.engines.time_limit import check_time
@@ -28,6 +30,7 @@ from tetra_drake.kernels.packed import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS, Ground
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
+from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.equilibrium import (
     Unactuated,
     force_at_rest,
@@ -66,6 +69,8 @@ _FEW, _RATE_PER_SQUARE = 12, 14.0
 second one, both schemes take equally long for rows of 25 tetrahedra."""
 _FINEST, _COARSEST = 2e-5, 5e-3
 """Smallest and largest default of the target accuracy; see MakeSimulator()."""
+_WORK = ("steps", "derivative_evaluations", "jacobian_evaluations")
+"""Counts of the integrator's work; fields of IntegratorWork."""
 
 
 class DrakeEngine(Engine):
@@ -83,8 +88,7 @@ class _DiagramRobot(LoneRobot):
 
     def __init__(self, driven: DrivenRobot, *, record: bool, viewer: Viewer | None) -> None:
         self.driven, self._record, self._viewer = driven, record, viewer
-        self._first = driven
-        """The driven robot at t = 0, before events."""
+        self.first = driven
         robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
         engine = engine.model_copy(update={"scheme": engine.scheme or default_scheme(robot)})
         if driven.gait is not None:
@@ -152,37 +156,64 @@ class _DiagramRobot(LoneRobot):
             ground_forces=table("ground", "ground_forces", GROUND_FORCE_COLUMNS),
         )
 
-    def copied(self) -> _DiagramRobot:
-        robot = self.driven.robot
-        return self.become(robot, np.zeros((len(robot.structure.bodies), 3)))
-
     def become(self, robot: Robot, p_BC: np.ndarray) -> _DiagramRobot:
         driven = dataclasses.replace(self.driven, robot=robot)
-        copy = _DiagramRobot(driven, record=self._record, viewer=self._viewer)
-        copy._first, copy._speed_limit = self._first, self._speed_limit
-        copy._marks, copy._change_end = self._marks.copy(), self._change_end
-        copy._held, copy.wall_time = self._held, self.wall_time
-        copy._work.before = self._work.total()
-        copy._aimer.follow(self._aimer)
-        copy._sampler.follow(self._sampler)
-        write_tables(copy._observer.tally, self._observer.tally)
-        before, context = self._simulator.get_context(), copy._simulator.get_mutable_context()
-        own = context.get_parameters().Clone()  # such as the masses
-        context.SetTimeStateAndParametersFrom(before)
-        context.get_mutable_parameters().SetFrom(own)
-        numbers, bodies = before.get_continuous_state_vector().CopyToVector(), 13 * len(p_BC)
-        numbers[:bodies] = with_origins(numbers[:bodies], p_BC)
-        context.SetContinuousState(numbers)
-        copy._sampler.restart(numbers)
+        after = _DiagramRobot(driven, record=self._record, viewer=self._viewer)
+        after.first, after._speed_limit = self.first, self._speed_limit
+        after.wall_time, after._change_end = self.wall_time, self._change_end
+        numbers, bodies = self.numbers(), 13 * len(p_BC)
+        of_bodies = numbers["continuous"][:bodies]
+        of_bodies[:] = with_origins(of_bodies, p_BC)
+        after.restore(numbers)
+        after._marks = self._marks.copy()
+        after._sampler.follow(self._sampler)
+        return after
+
+    def motion(self) -> Motion:
+        return self._sampler.motion()
+
+    def numbers(self) -> dict[str, np.ndarray]:
+        context, work = self._simulator.get_context(), self._work.total()
+        groups = range(context.num_discrete_state_groups())
+        held = [context.get_discrete_state(group).value() for group in groups]
+        return {
+            "time": np.array(context.get_time()),
+            "continuous": context.get_continuous_state_vector().CopyToVector(),
+            "discrete": np.concatenate([np.zeros(0), *held]),
+            "held": self._held,
+            "work": np.array([getattr(work, name) for name in _WORK]),
+            "aim": self._aimer.numbers(),
+            "tally": numbers_of(self._observer.tally),
+        }
+
+    def remember(self, motion: Motion) -> None:
+        self._sampler.remember(motion)
+
+    def restore(self, numbers: Mapping[str, np.ndarray]) -> None:
+        context, tally = self._simulator.get_mutable_context(), self._observer.tally
+        time, state = float(numbers["time"]), numbers["continuous"]
+        context.SetTime(time)
+        context.SetContinuousState(state)
+        first = 0
+        for group in range(context.num_discrete_state_groups()):
+            end = first + context.get_discrete_state(group).size()
+            context.SetDiscreteState(group, numbers["discrete"][first:end])
+            first = end
+        write_tables(tally, views(tally, numbers["tally"]))
+        self._sampler.go_on(time, state.copy())
+        self._marks = [mark for mark in self.first.marks.tolist() if mark > time]
+        self._held = numbers["held"].copy()
+        work = dict(zip(_WORK, numbers["work"].tolist(), strict=True))
+        self._work.before = IntegratorWork(scheme="", accuracy=0.0, **work)
+        self._aimer.restore(numbers["aim"])
         parameters = InitializeParams()
         parameters.suppress_initialization_events = True
-        copy._simulator.Initialize(parameters)
-        return copy
+        self._simulator.Initialize(parameters)
 
     def result(self) -> SimulationResult:
         accuracy = self._simulator.get_integrator().get_target_accuracy()
         return make_result(
-            self._first,
+            self.first,
             self._sampler.motion(),
             totals=self._observer.tally,
             work=self._work.total(str(self._engine.scheme), accuracy),
@@ -214,7 +245,7 @@ class _DiagramRobot(LoneRobot):
             moment = np.array([now]), bodies[np.newaxis], each[np.newaxis], drives[np.newaxis]
             self._observer.add(*moment)
         if viewer is not None and viewer.wants(now):
-            viewer.show(frame_of(self._first.robot, self._diagram, context))
+            viewer.show(frame_of(self.first.robot, self._diagram, context))
 
 
 def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
@@ -352,12 +383,19 @@ class _StepAimer:
         self._longest = settings.max_step
         self._jacobian_is_old = False
 
-    def follow(self, other: _StepAimer) -> None:
-        """Copies the state of another aimer, so that this one continues from there."""
-        self._last_time, self._last_velocities = other._last_time, other._last_velocities
-        self._acceleration, self._longest = other._acceleration, other._longest
-        self._jacobian_is_old = other._jacobian_is_old
-        self._integrator.set_maximum_step_size(other._integrator.get_maximum_step_size())
+    def numbers(self) -> np.ndarray:
+        """The state of the aimer as one array, for restore()."""
+        longest = self._integrator.get_maximum_step_size()
+        own = [self._last_time, self._longest, float(self._jacobian_is_old), longest]
+        return np.concatenate([own, self._last_velocities, self._acceleration])
+
+    def restore(self, numbers: np.ndarray) -> None:
+        """Puts the aimer into a state of numbers()."""
+        self._last_time, self._longest, is_old, longest = numbers[:4].tolist()
+        self._jacobian_is_old = bool(is_old)
+        self._last_velocities, self._acceleration = np.split(numbers[4:].copy(), 2)
+        self._integrator.set_maximum_step_size(longest)
+        self._integrator.request_initial_step_size_target(longest)  # for Initialize()
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the length of the next step. Call it after each step, with the simulator's context

@@ -24,6 +24,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
+from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
@@ -31,6 +32,7 @@ import numpy as np
 
 from tetra_drake.engines.batch import LoneRobot, Viewer
 from tetra_drake.engines.engine import Engine
+from tetra_drake.engines.lanes.tables import numbers_of, views
 from tetra_drake.engines.mjcf import check_mjcf, integrator_of, is_pulled, make_mjcf
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
@@ -123,7 +125,8 @@ class _MujocoRobot(LoneRobot):
         long, and InputError if MuJoCo refuses the robot."""
         import mujoco
 
-        self.driven, self._record, self._robot = driven, record, driven.robot
+        self.first = self.driven = driven
+        self._record, self._robot = record, driven.robot
         robot = self._robot
         settings, self._step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
         self._steps = max(1, round(settings.duration / self._step))
@@ -174,7 +177,7 @@ class _MujocoRobot(LoneRobot):
         self._data = mujoco.MjData(self._model)
 
     def become(self, robot: Robot, p_BC: Array) -> _MujocoRobot:
-        after = self.copied()
+        after = self._copied()
         known = sum(len(motion.times) for motion in self._motions)
         passed = int(np.searchsorted(self._times, self._paused, side="right"))
         after._motions = [*self._motions, self._kept(slice(known, passed))]
@@ -196,7 +199,7 @@ class _MujocoRobot(LoneRobot):
         moved[:, 1 + p], moved[:, 1 + v] = after[:, 4 + p], after[:, 3 + v]
         return moved
 
-    def copied(self) -> _MujocoRobot:
+    def _copied(self) -> _MujocoRobot:
         copied = copy.copy(self)
         for name, value in vars(self).items():
             if isinstance(value, Array):
@@ -300,6 +303,8 @@ class _MujocoRobot(LoneRobot):
         numbers). MuJoCo's angular velocities are in the body's frame, the returned ones in the
         world's."""
         rows, end = len(states), 1 + self._model.nq
+        if not rows:
+            return np.empty((0, self._model.nq + self._model.nv))
         pose = states[:, 1:end].reshape(rows, -1, 7)
         velocity = states[:, end:].reshape(rows, -1, 6)
         scalar, vector, w_WB_B = pose[..., 3:4], pose[..., 4:], velocity[..., 3:]
@@ -356,11 +361,39 @@ class _MujocoRobot(LoneRobot):
             signals = self.driven.signals_at(times)
         return self._motion(times, self._states_kept[rows], signals, self._drives_kept[rows])
 
+    def motion(self) -> Motion:
+        known = sum(len(motion.times) for motion in self._motions)
+        passed = int(np.searchsorted(self._due, self._done, side="right"))
+        return Motion.joined([*self._motions, self._kept(slice(known, passed))])
+
+    def numbers(self) -> dict[str, Array]:
+        return {
+            "state": self._state,
+            "warm_start": self._data.qacc_warmstart.copy(),
+            "drives": self._drives,
+            "before": self._before,
+            "held": self._held,
+            "clock": np.array([self._done, self._paused, self._began]),
+            "tally": numbers_of(self._observer.tally),
+        }
+
+    def remember(self, motion: Motion) -> None:
+        self._motions = [motion]
+
+    def restore(self, numbers: Mapping[str, Array]) -> None:
+        self._state, self._drives = numbers["state"].copy(), numbers["drives"].copy()
+        self._before, self._held = numbers["before"].copy(), numbers["held"].copy()
+        done, self._paused, self._began = numbers["clock"].tolist()
+        self._done, self._is_held = int(done), True
+        self._data.qacc_warmstart[:] = numbers["warm_start"]
+        write_tables(self._observer.tally, views(self._observer.tally, numbers["tally"]))
+        self._motions = []
+
     def result(self) -> SimulationResult:
         known = sum(len(motion.times) for motion in self._motions)
         motions = [*self._motions, self._kept(slice(known, None))]
         return make_result(
-            self.driven,
+            self.first,
             Motion.joined(motions),
             totals=self._observer.tally,
             work=IntegratorWork(

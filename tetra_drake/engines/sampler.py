@@ -31,22 +31,27 @@ class Sampler:
         self._bodies = slice(diagram.GetOutputPort("state").size())
         self._context = diagram.CreateDefaultContext()
         self._samples: list[Motion] = []
+        self._next = 0
+        """Index of the next sample's time."""
         self._latest: tuple[float, np.ndarray] | None = None
         """Time (s) and continuous state at the end of the latest step."""
 
     def follow(self, other: Sampler) -> None:
-        """Copies the samples of another sampler, so that this one continues from there."""
-        self._samples, self._latest = other._samples.copy(), other._latest
+        """Copies the samples of another sampler."""
+        self._samples, self._next = other._samples.copy(), other._next
 
-    def restart(self, state: np.ndarray) -> None:
-        """Replaces the continuous state at the end of the latest step, as the frames of the bodies
-        were moved."""
-        if self._latest is not None:
-            self._latest = self._latest[0], state
+    def go_on(self, time: float, state: np.ndarray) -> None:
+        """Continues at a time (s) from a continuous state, without the samples before."""
+        self._samples, self._latest = [], (time, state)
+        self._next = int(np.searchsorted(self._times, time, side="right"))
+
+    def remember(self, motion: Motion) -> None:
+        """Puts a motion before the samples that follow."""
+        self._samples = [motion]
 
     def after_step(self, context: Context) -> None:
         """Takes the samples within the step that has just ended. `context` is the simulator's."""
-        due = self._times[len(self._samples) :]
+        due = self._times[self._next :]
         end = context.get_time()
         if due.size == 0 or due[0] > end + self._ahead:
             self._latest = None  # no sample needs this state
@@ -65,9 +70,12 @@ class Sampler:
             self._context.SetTime(time)
             self._context.SetContinuousState(state)
             self._samples.append(motion_at(self._diagram, self._context))
+            self._next += 1
 
     def motion(self) -> Motion:
         """The motion up to now, at the times of the samples."""
+        if not self._samples:  # it has not begun
+            return motion_at(self._diagram, self._context).rows(slice(0))
         return Motion.joined(self._samples)
 
 

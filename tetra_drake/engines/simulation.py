@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import hashlib
+import json
 import numbers
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +17,7 @@ import numpy.typing as npt
 
 from tetra_drake.engines.batch import Batch, Viewer, checked_numbers
 from tetra_drake.engines.engine import check_can_be_watched, engine_of
+from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.machine import threads_for
@@ -24,11 +27,18 @@ from tetra_drake.robot.readings import Readings, first_readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
-from tetra_drake.scenario.load import GivenScenario, given_scenario
+from tetra_drake.scenario.events import Event, check_taken
+from tetra_drake.scenario.load import GivenScenario, dump_scenario, given_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 MOST_ROBOTS = 100_000
 """Largest number of robots side by side."""
+
+Indices = Sequence[int] | np.ndarray | None
+"""Indices of robots; None for all."""
+
+_UNDISTURBED = json.dumps({"seed": None, "damage": []})
+"""Identity of a robot without disturbances and damage; see Simulation._robot_of()."""
 
 Controller = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of one robot to its actions (actions,)."""
@@ -97,7 +107,8 @@ class Simulation:
         """Time (s) between actions."""
         self.count = count
         """Number of robots."""
-        self._name, self._robots = name, [self.robot] * count
+        self._name, self._record = name, record
+        self._robots, self._identities = [self.robot] * count, [_UNDISTURBED] * count
         start = functools.partial(engine_of(scenario).start, places=count, threads=threads)
         self._new_batch = functools.partial(start, record=record, viewer=viewer)
         self._batch: Batch = self._new_batch([self._driven(self.robot)])
@@ -133,7 +144,7 @@ class Simulation:
         self,
         *,
         seed: int | Sequence[int] | None = None,
-        indices: Sequence[int] | np.ndarray | None = None,
+        indices: Indices = None,
     ) -> Readings:
         """Puts robots at their start, and returns the readings of all robots.
 
@@ -155,30 +166,25 @@ class Simulation:
             given = [check_whole("Simulation", "seed", each, least=0) for each in given]
 
         with self._used("reset", is_whole=self._is_whole or len(set(places)) == self.count):
-            robots = [self.robot] * len(places)
+            identities = [_UNDISTURBED] * len(places)
             if seed is not None and self.scenario.disturbances is not None:
                 numbers_of_robots = [0] * len(places) if is_list(seed) else places
                 seeds = zip(given, numbers_of_robots, strict=True)
-                draws = [draw_disturbances(self.scenario, each) for each in seeds]
-                robots = [controlled_robot(disturbed(self.scenario, draw)) for draw in draws]
+                identities = [json.dumps({"seed": each, "damage": []}) for each in seeds]
+            robots = [self._robot_of(identity) for identity in identities]
             if not self._is_whole:
                 self._batch = self._new_batch([self._driven(self.robot)])
             self._is_whole = False
-            for place, robot in zip(places, robots, strict=True):
-                cables = robot.starting_cables()
-                for values, its in zip(self._law, cables.law, strict=True):
-                    values[place] = its
-                self.rest[place] = robot.scenario.actuation.commands(cables)
+            for place, identity, robot in zip(places, identities, robots, strict=True):
+                self._put(place, identity, robot)
                 self._batch.stop(place)
-                self._robots[place], self._steps[place] = robot, 0
+                self._steps[place] = 0
                 first = self._first_readings if robot is self.robot else first_readings(robot)
                 self._batch.readings.put(place, first)
             self._is_whole = True
             return self.state
 
-    def step(
-        self, actions: npt.ArrayLike, *, indices: Sequence[int] | np.ndarray | None = None
-    ) -> Readings:
+    def step(self, actions: npt.ArrayLike, *, indices: Indices = None) -> Readings:
         """Simulates one control period, and returns the readings of all robots.
 
         The last period ends at `simulation.duration`.
@@ -212,10 +218,7 @@ class Simulation:
             for place in np.flatnonzero(goes & (self._steps == 0)).tolist():
                 first_signals = signals[place].copy()
                 robot = dataclasses.replace(self._robots[place], first_signals=first_signals)
-                if not self._batch.begin(place, self._driven(robot)):
-                    has = "other kinds of laws, or more heights of its terrain"
-                    problem = f"a disturbed robot has {has}"
-                    raise InputError(self.scenario.name, "disturbances", problem)
+                self._begin(place, self._driven(robot))
             self._is_whole = False
             self._batch.advance(np.where(goes, self._time_after(self._steps + 1), 0.0), signals)
             self._steps[goes] += 1
@@ -232,6 +235,170 @@ class Simulation:
             raise InputError("Simulation", "result", problem)
         with self._used("result"):
             return self._batch.result(place)
+
+    def save(self, places: Indices = None, *, history: bool = False) -> States:
+        """States of robots, from which they or others can go on; see restore() and States.
+
+            >>> simulation = td.Simulation(td.load_scenario("quick"))
+            >>> now = simulation.save()
+            >>> pull = simulation.rest + 3.0
+            >>> one = simulation.step(pull)
+            >>> other = simulation.restore(now)
+            >>> same = simulation.step(pull)
+
+        A state is all that a robot is: positions and velocities, stick points and contact modes,
+        states of the actuators, held signals, sums for metrics, its disturbances, damage and passed
+        events. The recorded motion and the wall time are not in it.
+
+        Args:
+            places: the robots, by their indices; all by default.
+            history: also saves the motion so far, which result() needs after restore().
+
+        Raises:
+            InputError: if an index is wrong, a robot has failed, or a motion is not known.
+        """
+        which = self._places(places)
+        check_type("Simulation", "history", history, bool)
+        with self._used("save"):
+            for place in which:
+                if failure := self.failures[place]:
+                    problem = f"robot {place} has failed, so it has no state: {failure}"
+                    raise InputError("Simulation", "save", problem)
+                if history and not self._batch.has_history[place]:
+                    problem = f"robot {place} was restored without its motion before"
+                    raise InputError("Simulation", "history", problem)
+                if self._steps[place] == 0:
+                    self._begin(place, self._driven(self._robots[place]))
+            tables = self._batch.save(which, history=history)
+            return States(
+                scenario=self.scenario.name,
+                identity=self._identity,
+                robots=tuple(self._identities[place] for place in which),
+                tables=tables | {"pause": self._time_after(self._steps[which])},
+                record=self._record if history else None,
+            )
+
+    def restore(self, states: States, places: Indices = None) -> Readings:
+        """Puts robots into saved states, and returns the readings of all robots.
+
+        On the compiled engine a restored robot goes on bit for bit as if it had not stopped, in any
+        place, also of another simulation of the same scenario. On the diagram its integrator begins
+        anew, so motions differ as after another rounding, by some micrometres at first. On MuJoCo
+        they are equal to 1e-9 m.
+
+        Args:
+            states: states of save(): one for each robot, or a single one for all.
+            places: the robots, by their indices; all by default.
+
+        Raises:
+            InputError: if the states are of another scenario, version or control period, if their
+                number or an index is wrong, or if they have a motion with other samples.
+        """
+        which = self._places(places)
+        check_type("Simulation", "states", states, States)
+        states.check_version("Simulation")
+        if states.identity != self._identity:
+            problem = f"found states of another scenario, {states.scenario}"
+            raise InputError("Simulation", "states", f"{problem}, expected {self.scenario.name}")
+        if states.record not in (None, self._record):
+            problem = f"have a motion of record={states.record}, expected {self._record}"
+            raise InputError("Simulation", "states", problem)
+        if len(states) not in (1, len(which)):
+            problem = f"found {len(states)} states, expected one, or one for each of {len(which)}"
+            raise InputError("Simulation", "states", problem)
+        count = len(which)
+        own = {
+            name: np.broadcast_to(table, (count, *table.shape[1:]))
+            for name, table in states.tables.items()
+        }
+        identities = states.robots * (count // len(states) if len(states) else 0)
+        steps = self._steps_until(own["pause"])
+        with self._used("restore"):
+            known = dict(zip(self._identities, self._robots, strict=True))
+            robots = {each: known.get(each) or self._robot_of(each) for each in {*identities}}
+            driven = {identity: self._driven(robot) for identity, robot in robots.items()}
+            self._is_whole = False
+            for place, identity in zip(which, identities, strict=True):
+                is_other = identity != self._identities[place]
+                if is_other:
+                    self._put(place, identity, robots[identity])
+                if is_other or self._steps[place] == 0 or self.failures[place]:
+                    self._begin(place, driven[identity])
+            self._batch.restore(which, own)
+            self._steps[which] = steps
+            self._is_whole = True
+            return self.state
+
+    def copy(self, place: int, *, to: Indices, history: bool = False) -> Readings:
+        """Puts robots into the state of robot number `place`, and returns the readings of all.
+
+            >>> simulation = td.Simulation(td.load_scenario("quick"), count=8)
+            >>> one = simulation.step(simulation.rest, indices=[0])
+            >>> readings = simulation.copy(0, to=range(1, 8))
+
+        Args:
+            place: index of the robot that is copied.
+            to: indices of the robots that become like it.
+            history: also copies the motion so far, which result() needs.
+
+        Raises:
+            InputError: if an index is wrong, or the robot has failed.
+        """
+        return self.restore(self.save([place], history=history), to)
+
+    def damage(self, place: int, *, cables: Sequence[str]) -> None:
+        """Cuts cables of a robot now, like an event of a scenario.
+
+            >>> simulation = td.Simulation(td.load_scenario("quick"))
+            >>> one = simulation.step(simulation.rest)
+            >>> simulation.damage(0, cables=["T1-T2 outer top"])
+
+        A cut cable has no tension, and its actuator turns freely. The damage is a part of the
+        robot's state; see save(). reset() repairs the robot.
+
+        Args:
+            place: index of the robot.
+            cables: names of the cables.
+
+        Raises:
+            InputError: if the robot has ended, or a name is wrong or the cable cut already.
+        """
+        (place,) = self._places([place])
+        check_type("Simulation", "cables", cables, list, tuple)
+        if self.ended[place]:
+            problem = f"robot {place} has failed, or reached the end; reset it"
+            raise InputError("Simulation", "damage", problem)
+        with self._used("damage"):
+            at = float(self._batch.readings.time[place])
+            robot = _damaged(self._robots[place], at, cables)
+            identity = json.loads(self._identities[place])
+            identity["damage"].append([at, list(cables)])
+            self._put(place, json.dumps(identity), robot)
+            if self._steps[place] > 0:
+                self._batch.change(place, self._driven(robot))
+
+    def assume(self, readings: Readings, *, place: int = 0) -> None:
+        """Puts a robot of the compiled engine into the motion of given readings, for example of a
+        robot on another engine, or of a real one.
+
+        The readings have no axis of robots, and a time that is a multiple of the control period.
+        Positions and velocities are as in the readings. The contact nodes that touch the ground
+        stick where they are, as at the start: the bending of their bristles is not known. The
+        actuators keep the states that they have.
+
+        Raises:
+            InputError: if the engine is another one, or the index or the time is wrong.
+        """
+        (place,) = self._places([place])
+        steps = self._steps_until(np.array([readings.time]))[0]
+        if steps == 0:
+            problem = f"found the time {readings.time} s, expected one after the start"
+            raise InputError("Simulation", "assume", problem)
+        with self._used("assume"):
+            if self._steps[place] == 0 or self.failures[place]:
+                self._begin(place, self._driven(self._robots[place]))
+            self._batch.assume(place, float(self._time_after(steps)), readings)
+            self._steps[place] = steps
 
     def __reduce__(self) -> NoReturn:
         problem = "cannot be copied or pickled: make another one from the same arguments"
@@ -257,6 +424,46 @@ class Simulation:
         samples = robot.first_signals[np.newaxis]
         return DrivenRobot(robot=robot, name=self._name, samples=samples)
 
+    @functools.cached_property
+    def _identity(self) -> str:
+        """Digest of the scenario."""
+        return hashlib.sha256(dump_scenario(self.scenario).encode()).hexdigest()
+
+    def _robot_of(self, identity: str) -> Robot:
+        """The robot with an identity: the seed of its disturbances and its damage, as JSON."""
+        if identity == _UNDISTURBED:
+            return self.robot
+        robot, own = self.robot, json.loads(identity)
+        if own["seed"] is not None:
+            draw = draw_disturbances(self.scenario, own["seed"])
+            robot = controlled_robot(disturbed(self.scenario, draw))
+        for at, cables in own["damage"]:
+            robot = _damaged(robot, at, cables)
+        return robot
+
+    def _put(self, place: int, identity: str, robot: Robot) -> None:
+        """Makes a robot the one of a place, before it begins there."""
+        cables = robot.starting_cables()
+        for values, its in zip(self._law, cables.law, strict=True):
+            values[place] = its
+        self.rest[place] = robot.scenario.actuation.commands(cables)
+        self._robots[place], self._identities[place] = robot, identity
+
+    def _begin(self, place: int, driven: DrivenRobot) -> None:
+        """Puts a robot at its start into the batch."""
+        if not self._batch.begin(place, driven):
+            problem = "a disturbed robot has other kinds of laws, or more heights of its terrain"
+            raise InputError(self.scenario.name, "disturbances", problem)
+
+    def _steps_until(self, times: np.ndarray) -> np.ndarray:
+        """Numbers of control periods (N,) up to times (N,) in s. Raises InputError if one does not
+        end there."""
+        steps = np.ceil(times / self.control_period - 1e-6).astype(int)
+        if not np.allclose(self._time_after(steps), times, rtol=0.0, atol=1e-8):
+            expected = f"expected multiples of the control period, {self.control_period:g} s"
+            raise InputError("Simulation", "states", f"found the times {times} s, {expected}")
+        return steps
+
     def _time_after(self, steps: np.ndarray) -> np.ndarray:
         """Time (N,) in s that robots have reached after a number of control periods (N,), at most
         the duration."""
@@ -264,7 +471,7 @@ class Simulation:
         times = (step * (self._listing_steps * steps)).round(MARK_DECIMALS)
         return np.where(times > duration - 0.5 * step, duration, times)
 
-    def _places(self, indices: Sequence[int] | np.ndarray | None) -> list[int]:
+    def _places(self, indices: Indices) -> list[int]:
         """The given indices of robots as a list, or all indices for None. Raises InputError for an
         index without a robot."""
         if indices is None:
@@ -276,6 +483,16 @@ class Simulation:
             problem = f"found {indices}, expected a list of integers from 0 to {self.count - 1}"
             raise InputError("Simulation", "indices", problem)
         return [int(place) for place in places]
+
+
+def _damaged(robot: Robot, at: float, cables: Sequence[str]) -> Robot:
+    """A robot whose cables are cut at a time (s). Raises InputError for a wrong name."""
+    events = [*robot.scenario.events, Event(at=at, cut=list(cables))]
+    try:
+        check_taken(events, robot.structure)
+    except InputError as error:
+        raise InputError("Simulation", "cables", error.problem) from error
+    return dataclasses.replace(robot, scenario=robot.scenario.with_sections(events=events))
 
 
 def is_list(values: object) -> TypeGuard[Sequence[Any]]:

@@ -12,7 +12,7 @@ from tetra_drake.kernels.packed import allocate
 from tetra_drake.laws import cable, contact, kinematics
 from tetra_drake.laws.forces import forces_of_motion
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.robot.structure import Structure, moved_nodes, with_origins
 
 
 class Readings(NamedTuple):
@@ -140,6 +140,16 @@ def readings_at(
         cable_forces=cables[0],
         ground_forces=ground[0] if ground_forces is None else ground_forces,
     )
+
+
+def bodies_state(readings: Readings, structure: Structure) -> np.ndarray:
+    """State [q; v] (13*n,) of the n bodies of one robot with these readings, from the orientations
+    of the bodies and the first node of each."""
+    first = structure.first_node[:-1]
+    poses = np.hstack([readings.q_WB, readings.p_WN[first]])
+    velocities = np.hstack([readings.w_WB, readings.v_WN[first]])
+    state = np.concatenate([poses.ravel(), velocities.ravel()])
+    return with_origins(state, -structure.p_BN[first])
 
 
 def pitch_rates(readings: Readings, structure: Structure) -> np.ndarray:

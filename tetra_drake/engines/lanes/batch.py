@@ -7,6 +7,7 @@ they take turns in the lanes.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 import os
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.batch import Batch, Viewer
+from tetra_drake.engines.batch import Batch, Tables, Viewer
 from tetra_drake.engines.engine import Engine
 from tetra_drake.engines.lanes import loop
 from tetra_drake.engines.lanes.places import LAST, NEXT, ROUND, Memory, Places, advance
@@ -35,7 +36,7 @@ from tetra_drake.results.result import IntegratorWork, SimulationResult, make_re
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.command import driven_robot
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.structure import with_origins
@@ -49,6 +50,9 @@ robots, because one table has the heights of all robots."""
 _SPARE_MARKS = 4
 """Number of marks (times at which a step must end) that a robot may have more than the first robot
 of the batch."""
+
+_NEVER = 1e300
+"""Time (s) of the next sample of a robot without samples. At an infinite one a motion ends."""
 
 _BODY_STEPS = 25_000
 """Bodies times iterations of the simulation loop in one call of the kernel, about 30 ms. Between
@@ -77,6 +81,7 @@ class LaneBatch(Batch):
         state, constants = numbered(first.start), numbered(first.constants)
         self._tally = int(state.tally.begins[0])
         self._first_height = int(constants.robot.ground.grid[FIRST])
+        self._latest = first
         self._sizes = first.sizes | {"marks": first.sizes["marks"] + _SPARE_MARKS}
         sizes = self._sizes | {
             "places": places,
@@ -96,7 +101,8 @@ class LaneBatch(Batch):
 
     def begin(self, place: int, robot: DrivenRobot) -> bool:
         first, log = self._first, self._log
-        prepared = first if robot is first.driven else first.like(robot)
+        same = [known for known in (first, self._latest) if known.driven is robot]
+        prepared = self._latest = same[0] if same else first.like(robot)
         fits = all(prepared.sizes[name] <= size for name, size in self._sizes.items())
         if not fits or prepared.kind != first.kind:
             return False
@@ -143,6 +149,43 @@ class LaneBatch(Batch):
         bodies = self._places.states[place, -13 * len(p_BC) :]  # step.state, the last numbers
         bodies[:] = with_origins(bodies, p_BC)
 
+    def _rename(self, place: int, driven: DrivenRobot) -> None:
+        prepared = self._prepared[place]
+        assert prepared is not None
+        self._prepared[place] = dataclasses.replace(prepared, driven=driven)
+
+    def _save(self, places: Sequence[int]) -> dict[str, np.ndarray]:
+        states = self._places.states[places]
+        states[:, loop.DUE] = _NEVER  # it depends on what is recorded
+        return {"states": states, "held": self._places.signals[places]}
+
+    def _restore(self, places: Sequence[int], saved: Tables) -> None:
+        log, states = self._log, self._places.states
+        states[places], self._places.signals[places] = saved["states"], saved["held"]
+        self._places.holds[places], log.change_ends[places] = 0, 0.0
+        self._tried[places] = states[places, loop.TRIED]
+        # A mark is passed as soon as a step has ended there.
+        log.passed[places] = (log.marks[places] <= states[places, loop.TIME, None]).sum(axis=1)
+
+    def _remember(self, place: int, motion: Motion) -> None:
+        kept = self._log.kept[place] = len(motion.times)
+        for name in ("states", "signals", "modes", "drives"):
+            getattr(self._log, name)[place, :kept] = getattr(motion, name)
+        self._places.states[place, loop.DUE] = self._log.times[place, kept]
+
+    def assume(self, place: int, time: float, readings: Readings) -> None:
+        robot, prepared = self._phases[place][0].robot, self._prepared[place]
+        assert prepared is not None
+        start, row = prepared.start, self._places.states[place]
+        clock, modes, *_, tally, state = views((*start[:7], start.step.state), row)
+        state[:] = bodies_state(readings, robot.structure)
+        modes[:] = 0.0  # what touches the ground touches down in the next step
+        clock[loop.TIME], clock[loop.PLANNED] = time, start.clock[loop.PLANNED]
+        clock[loop.TRIED], clock[loop.ACTIVE], tally.time[0] = 0.0, 1.0, time
+        self._restore([place], self._save([place]))
+        self.readings.put(place, readings._replace(time=time))
+        self.has_history[place] = False
+
     def stop(self, place: int) -> float:
         for thread in self._threads:
             thread.leave(place)
@@ -150,22 +193,6 @@ class LaneBatch(Batch):
         self._prepared[place] = self.failures[place] = None
         self._follow(place, None)
         return float(self._wall_times[place])
-
-    def copy(self, place: int, to: int) -> None:
-        if place == to:
-            return
-        self.stop(to)
-        logged = set(loop.Log._fields) - {"place"}
-        tables = [getattr(self._log, name) for name in logged]
-        tables += [self._places.states, self._places.constants]
-        tables += [self._places.signals, self._places.holds]
-        tables += [self._heights, self._ends, self._wall_times, self._tried, *self.readings]
-        tables.append(self._controlled)
-        for table in tables:
-            table[to] = table[place]
-        self._places.constants[to, self._first_height] = to * self._heights.shape[1]
-        self._prepared[to], self.failures[to] = self._prepared[place], self.failures[place]
-        self._copy_instants(place, to)
 
     def _hold(self, until: np.ndarray, signals: np.ndarray) -> None:
         places, period = self._places, self._first.constants.period

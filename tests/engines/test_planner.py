@@ -1,0 +1,93 @@
+"""The planner: a lifted mass whose best plan is known, delay, and wrong arguments."""
+
+import numpy as np
+import pytest
+from helpers.anchored import HUNG, scenario_of
+
+from tetra_drake.engines.planner import Planner
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.robot.command import Command
+from tetra_drake.robot.readings import Readings
+from tetra_drake.scenario.scenario import Scenario
+
+UP = {"p_WN": [0.0, 0.0, -1.0]}
+"""Cost: the higher the nodes, the better."""
+SMALL = {"samples": 32, "horizon": 0.1, "knots": 4, "control_period": 0.01, "workers": 1}
+SMALL |= {"limits": [[-1.0], [1.0]]}
+
+
+@pytest.fixture
+def hung() -> Scenario:
+    """0.1 s of a bar of 0.5 kg on a driven cable of 200 N/m, less than half of its oscillation. So
+    any force upward lifts it, and the best plan is the greatest force all the time."""
+    return scenario_of(HUNG | {"actuated": {"lift": ["line top a"]}}, 0.1, friction__stiffness=0.0)
+
+
+def height(scenario: Scenario, actions: float) -> float:
+    """Height of the mass at the end with the same action all the time."""
+    command = Command("held", 1.0, np.array([[actions]]))
+    return float(simulate(scenario, command=command, record=True).trajectory.p_WN[-1, 1, 2])
+
+
+@pytest.mark.parametrize("delayed", [False, True])
+def test_a_plan_comes_near_the_best_one_that_is_known(hung, engine, delayed):
+    plant = hung.with_changes({"engine": engine})
+    planner = Planner(hung, UP, delayed=delayed, **SMALL)
+    result = simulate(plant, controller=planner, control_period=0.01, record=True)
+    none, best = height(plant, 0.0), height(plant, 1.0)
+    reached = (float(result.trajectory.p_WN[-1, 1, 2]) - none) / (best - none)
+    assert (0.3 if delayed else 0.6) < reached <= 1.0 + 1e-6
+    first = result.trajectory.signal.sel(time=slice(0.0, 0.009)).values
+    assert np.abs(first).max() < 1e-9 if delayed else first.max() > 0.1
+    assert planner.decisions == 10 and planner.decisions_per_second > 0.0
+    assert 0.0 <= planner.deadlines_kept <= 1.0 and "10 decisions" in str(planner)
+    again = simulate(plant, controller=planner, control_period=0.01)
+    assert again.metrics.distance == result.metrics.distance and planner.decisions == 10
+
+
+def test_more_samples_find_a_cheaper_plan(hung):
+    state, found = Simulation(hung).state.rows(0), []
+    for samples in (4, 256):
+        planner = Planner(hung, UP, **SMALL | {"samples": samples, "noise": 0.1})
+        plans = [planner(0.01 * period, state._replace(time=0.01)) for period in range(8)]
+        found.append(float(plans[-1][0]))
+    assert -1.0 <= found[0] < found[1] <= 1.0
+
+
+def test_the_cost_sees_motions_at_the_true_time_and_readings_are_assumed_exactly(hung):
+    seen: list[Readings] = []
+    cost = lambda readings: (seen.append(readings), -readings.p_WN[..., 2].mean(axis=-1))[1]  # noqa: E731
+    plant = Simulation(hung.with_changes({"engine": "!Drake"}), control_period=0.01)
+    for _ in range(3):
+        readings = plant.step([[0.8]])
+    planner = Planner(hung, cost, **SMALL)
+    planner(float(readings.time[0]), readings.rows(0))
+    assert seen[-1].time[:, 0].tolist() == pytest.approx([0.03 + 0.01 * k for k in range(1, 11)])
+    planner.model.assume(readings.rows(0)._replace(time=0.02))
+    for ours, theirs in zip(planner.model.state[1:], readings[1:], strict=True):
+        np.testing.assert_allclose(ours[0], theirs[0], rtol=0.0, atol=1e-12)
+    moved = planner.model.step(np.full((32, 1), 0.8)).p_WN[0]
+    np.testing.assert_allclose(moved, plant.step([[0.8]]).p_WN[0], rtol=0.0, atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("options", "key", "fact"),
+    [
+        ({"horizon": 0.0}, "horizon", "found 0.0"),
+        ({"temperature": -1.0}, "temperature", "found -1.0"),
+        ({"samples": 1}, "samples", "found 1"),
+        ({"decision_period": 0.015}, "decision_period", "multiple of the control period"),
+        ({"limits": [[1.0], [-1.0]]}, "limits", "least"),
+        ({"cost": lambda readings: np.nan * readings.time}, "cost", "found nan"),
+        ({"cost": lambda readings: readings.p_WN}, "cost", "the shape (1, 32, 3, 3)"),
+        ({"cost": {"height": 1.0}}, "cost.height", "expected one of time"),
+        ({"cost": {"p_WN": [1.0, 2.0]}}, "cost.p_WN", "(3, 3)"),
+    ],
+)
+def test_wrong_arguments_are_told_in_a_line(hung, refused, options, key, fact):
+    given = SMALL | {"cost": UP} | options
+    with refused("Planner", key, fact):
+        Planner(hung, given.pop("cost"), **given)
+    with refused("Planner", "scenario", "no driven cables"):
+        Planner(scenario_of(HUNG), UP, **SMALL)

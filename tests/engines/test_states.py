@@ -1,0 +1,163 @@
+"""States that are saved, written and restored, and damage while a robot moves."""
+
+import pickle
+
+import numpy as np
+import pytest
+from helpers.actuations import WINCH
+from helpers.converged import shortly
+
+from tetra_drake.engines.simulation import Simulation
+from tetra_drake.engines.states import States
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.scenario import Scenario
+
+ERRORS = {"!Compiled": 0.0, "!Drake": 1e-4, "!Mujoco": 1e-9}
+"""Largest difference (m) of a restored robot: on the diagram the integrator begins anew."""
+PERIODS, SAVED, CUT = 20, 8, "T1-T2 outer bottom_left"
+
+
+@pytest.fixture
+def walk(engine: str) -> Scenario:
+    """0.4 s of two disturbed tetrahedra with winches on an engine; the front loses its load."""
+    changes = {"engine": engine, "robot.tetrahedra": 2, "friction.stiffness": "0 N/m"}
+    changes |= {"robot.payload": ["0 g", "3 g"], "events": [{"at": "0.11 s", "lose": ["T2"]}]}
+    changes |= WINCH | {"disturbances": {"draws": 1, "start": 0.01}}
+    return shortly(load_scenario("coulomb"), 0.4, **changes)
+
+
+def go(simulation: Simulation, periods: range, *, seed: int = 0) -> np.ndarray:
+    """The nodes after some control periods, with drawn actions that are the same for all robots."""
+    drawn = np.random.default_rng(seed).uniform(-0.004, 0.004, (PERIODS, simulation.rest.shape[1]))
+    for period in periods:
+        readings = simulation.step(simulation.rest[:1] + drawn[period] + 0.0 * simulation.rest)
+    return readings.p_WN
+
+
+@pytest.mark.parametrize("saved", [4, SAVED])  # before the event and after it
+def test_a_restored_robot_goes_on_in_any_place_as_if_it_had_not_stopped(walk, engine, saved):
+    one, other = (Simulation(walk, count=n, record=True, workers=1) for n in (1, 3))
+    one.reset(seed=[7])
+    go(one, range(saved))
+    states, early = one.save(history=True), one.save()
+    expected, result = go(one, range(saved, PERIODS)), one.result()
+    other.restore(states, [2])
+    assert other.save([2], history=True) == states
+    other.restore(early, [0, 1])
+    assert (other.state.p_WN == states.tables["readings.p_WN"]).all()
+    found = go(other, range(saved, PERIODS))
+    np.testing.assert_allclose(found, expected.repeat(3, axis=0), rtol=0.0, atol=ERRORS[engine])
+    again = other.result(2)
+    error = ERRORS[engine]
+    assert again.metrics.distance == pytest.approx(result.metrics.distance, abs=error)
+    np.testing.assert_allclose(again.trajectory.p_WN, result.trajectory.p_WN, rtol=0, atol=error)
+    if engine == "!Compiled":
+        assert again.metrics == result.metrics and again.trajectory.equals(result.trajectory)
+
+
+def test_a_robot_branches_and_a_copy_replays_it(walk, engine):
+    robots = Simulation(walk, count=2, workers=1)
+    robots.reset(seed=1)
+    go(robots, range(SAVED))
+    robots.copy(1, to=[0], history=True)
+    branch = robots.save()
+    left = go(robots, range(SAVED, PERIODS), seed=1)
+    robots.restore(branch)
+    right = go(robots, range(SAVED, PERIODS), seed=2)
+    robots.restore(branch[[1, 0]])
+    replayed = go(robots, range(SAVED, PERIODS), seed=1)
+    np.testing.assert_allclose(replayed, left, rtol=0.0, atol=ERRORS[engine])
+    assert np.abs(left - right).max() > 1e-3
+    robots.reset(seed=1)
+    assert np.abs(np.subtract(*go(robots, range(SAVED)))).max() > 1e-4
+
+
+def test_damage_is_an_events_cut_at_the_same_time_and_goes_with_the_state(walk, engine):
+    cut = {"at": f"{SAVED * walk.simulation.control_period} s", "cut": [CUT]}
+    told = walk.with_sections(events=[])
+    planned, free = told.with_changes({"events": [cut]}), Simulation(told, count=2, record=True)
+    expected = Simulation(planned, record=True)
+    go(expected, range(SAVED))
+    go(free, range(SAVED))
+    free.damage(1, cables=[CUT])
+    free.restore(free.save([1], history=True), [0])
+    nodes, error = go(expected, range(SAVED, PERIODS)), ERRORS[engine]
+    found = go(free, range(SAVED, PERIODS))
+    np.testing.assert_allclose(found, nodes.repeat(2, axis=0), rtol=0.0, atol=error)
+    assert (free.state.tensions[:, 0] == 0.0).all()
+    for place in (0, 1):
+        tension = free.result(place).trajectory.tension - expected.result().trajectory.tension
+        assert np.abs(tension).max() < 10.0 * error + 1e-12 or engine == "!Drake"
+    free.reset()
+    assert go(free, range(2)) is not None and (free.state.tensions[:, 0] > 0.0).all()
+
+
+@pytest.fixture
+def short() -> Scenario:
+    return shortly(load_scenario("quick"), 0.2)
+
+
+def test_states_are_values_and_a_damaged_file_is_refused(short, tmp_path, refused):
+    simulation, path, pages = Simulation(short, count=3), tmp_path / "states.npz", 0
+    go(simulation, range(2))
+    states = simulation.save(history=True)
+    assert states == simulation.save(history=True) == pickle.loads(pickle.dumps(states))
+    assert states[[0, 2]] == simulation.save([0, 2], history=True) != states
+    assert simulation.save() != states and states.time.tolist() == [0.04] * 3
+    states[:1].save_npz(path)
+    assert States.load(path) == states[0]
+    content, generator = path.read_bytes(), np.random.default_rng(0)
+    for _ in range(150):
+        damaged = bytearray(content)
+        damaged[generator.integers(len(content))] ^= 1 << generator.integers(8)
+        path.write_bytes(damaged)
+        try:
+            assert States.load(path) == states[0]
+        except ValueError as error:
+            assert str(error).startswith(f"{path}: ") and "\n" not in str(error)
+            pages += 1
+    assert pages > 100
+    states[0].save_npz(path)
+    with np.load(path) as file:
+        tables = dict(file)
+    np.savez(path, **tables | {"held": tables["held"] + 1.0})
+    with refused(path, "", "digest"):
+        States.load(path)
+
+
+WRONG = {
+    "states of another scenario, short": {"identity": "other", "scenario": "short"},
+    "states of tetra_drake 0.1": {"version": "0.1"},
+    "record=True": {"record": True},
+    "multiples of the control period": {"tables": "pause"},
+}
+
+
+@pytest.mark.parametrize("fact", WRONG)
+def test_states_of_another_robot_or_version_are_told_in_a_line(short, fact, refused):
+    simulation, other = Simulation(short), dict(WRONG[fact])
+    states = simulation.save()
+    if "tables" in other:
+        other["tables"] = {**states.tables, "pause": np.array([0.013])}
+    key = "version" if "version" in other else "states"
+    with refused("Simulation", key, fact):
+        simulation.restore(States(**{**vars(states), **other}))
+
+
+def test_what_a_state_cannot_do_is_told_in_a_line(short, refused):
+    simulation = Simulation(short, count=3)
+    go(simulation, range(2))
+    states = simulation.save()
+    simulation.restore(states)
+    with refused("Simulation", "states", "3 states", "each of 2"):
+        simulation.restore(states, [0, 1])
+    with refused("Simulation", "history", "robot 0"):
+        simulation.save(history=True)
+    with refused("Simulation", "cables", "unknown cable 'leg'"):
+        simulation.damage(0, cables=["leg"])
+    simulation.damage(0, cables=["T1-T2 outer top"])
+    with refused("Simulation", "cables", "expected it once"):
+        simulation.damage(0, cables=["T1-T2 outer top"])
+    go(simulation, range(2, 10))
+    with refused("Simulation", "result", "save(history=True)"):
+        simulation.result(1)
