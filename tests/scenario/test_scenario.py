@@ -176,12 +176,14 @@ def test_there_are_no_differences_exactly_between_equal_scenarios():
 
 BAD = [
     ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),
+    ("policy: Rolling", "policy", "did you mean '!Rolling'?"),
     ("robot: {cables: {free_length: 1 km}}", "robot.spacing", "balance"),
     ("robot: {spacing: &own [*own]}", "", "recursive"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
 ]
 BAD_FILES = [
     ("name: mine", "robot", "missing"),
+    ("unit: cm\nnodes: {a: [0, 0, 0]}", "", "is a structure, expected a scenario"),
     ("base: theses", "base", "'thesis'"),
     ("robot: [1\n", "", "YAML, line 2, column 1"),
     ("base: thesis\nrobot: {spacing: 2 in, spacing: 3 in}", "", "'spacing'"),
@@ -218,7 +220,9 @@ BAD_EVENTS: list[tuple[object, str, str]] = [
     ([CUT | {"cut": ["T1-T2 outer topp"]}], "[0].cut[0]", "did you mean 'T1-T2 outer top'?"),
     ([CUT, CUT], "[1].cut[0]", "which events[0].cut[0] takes away; expected it once"),
     ([{"at": "1 s", "lose": ["T3", "T1"]}], "[0].lose[1]", "unknown point mass 'T1'"),
+    ([{"at": "1 s", "lose": "T3"}], "[0].lose", "found 'T3', expected a list, [T3]"),
     ([{"at": "1 s", "change": {"friction": 0.2}}], "[0].change", "'friction' is no number of"),
+    ([{"at": "1 s", "change": {"friction.static": 0.2}}], "[0].change.friction.kinetic", "as well"),
     ([{"at": "1 s", "change": {"robot.density": 2}}], "[0].change", "no number of ground or"),
     ([{"at": "1 s", "change": {"ground.stiffness": 2}}], "[0].change.ground.stiffness", "unit"),
     ([{"at": "1 s", "change": {"friction.kinetic": 0.9}}], "[0].change.friction.kinetic", "0.9"),
@@ -240,6 +244,8 @@ def test_a_loss_leaves_every_body_some_mass(refused):
     tree["cables"] = {"line": HUNG["cables"]["line"] | {"pairs": [["top", "a"], ["a", "top2"]]}}
     with refused("scenario anchored", "events[0].lose", "top2", "mass"):
         scenario_of(tree).with_changes({"events": events})
+    with refused("scenario anchored", "events[0].lose[0]", "give it robot.masses"):
+        scenario_of(HUNG).with_changes({"events": events})
 
 
 def test_cables_are_drawn_among_those_that_are_whole(refused):

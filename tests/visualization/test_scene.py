@@ -77,7 +77,7 @@ def test_a_sample_places_bodies_and_cables_and_colours_feet(meshcat):
     walk = make_walk().isel(time=[50])  # T1 is lifted, T2 stands
     robot = make_row()
     scene.add_robot(meshcat, robot.structure)
-    scene.place_robot(meshcat, robot.structure, walk, per_newton=1e-4)
+    scene.place_robot(meshcat, robot, walk, per_newton=1e-4)
     page = meshcat.StaticHtml()
     moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands(page, "set_transform")}
     for path, cable in zip(scene.cable_paths(robot.structure), robot.structure.cables, strict=True):
@@ -92,3 +92,13 @@ def test_a_sample_places_bodies_and_cables_and_colours_feet(meshcat):
     lifted, stands = (colours[f"/robot/{body}/node {body} bottom_left"] for body in ("T1", "T2"))
     assert lifted != stands
     assert stands[:3] == pytest.approx(hex2color(scene.COLOURS["stance"]))
+
+
+def test_a_cut_cable_is_not_seen():
+    walk, cut = make_walk(bodies=3), {"at": "1 s", "cut": ["T1-T2 outer top"]}
+    robot = make_row(3, {"events": [cut]})
+    radii = scene.cable_radii(robot, walk, 1e-4)
+    thin = radii < 1e-6
+    cable = robot.structure.cable_names.index(*cut["cut"])
+    assert thin[:, cable].tolist() == (walk.time.values >= 1.0).tolist()
+    assert np.flatnonzero(thin.any(axis=0)).tolist() == [cable]

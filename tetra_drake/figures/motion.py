@@ -83,7 +83,7 @@ def relative_distances(result: SimulationResult, *, time: Span | None = None) ->
 def before_and_after(
     initial: SimulationResult, best: SimulationResult, *, time: Span | None = None
 ) -> Drawn:
-    """Distance walked over time, before and after evolution: the best gait of the best trial's
+    """Distance over time, before and after evolution: the best gait of the best trial's
     initial population, and the best gait of this trial."""
     unit = best.scenario.units
     page = page_of(height_in=3.8)

@@ -70,7 +70,9 @@ def check_taken(events: Sequence[Event], blueprint: Blueprint) -> None:
         for key, name, known in named:
             if name not in known:
                 what = "cable" if known is cables else "point mass"
-                refuse(key, f"found unknown {what} '{name}'; {hint(name, known)}")
+                none = "the robot has none; give it robot.masses or robot.payload"
+                advice = hint(name, known) if known else none
+                refuse(key, f"found unknown {what} '{name}'; {advice}")
             earlier = taken.setdefault((known is cables, known[name]), key)
             if earlier != key:
                 refuse(key, f"found '{name}', which {earlier} takes away; expected it once")

@@ -92,7 +92,10 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     """Loads the scenario of a file, with the values that it takes from its base, and so on. `seen`
     are the files that are based on this one. Raises InputError if it is based on one of them."""
     keys = [*keys_of(Scenario), "base"]
-    given = read_mapping(file, "scenario file", keys=keys)
+    given = read_mapping(file, "scenario file", keys=[*keys, "nodes"])
+    if "nodes" in given:
+        expected = "`base: prism` and `robot: !Structure {file: ...}`, which names this file"
+        raise InputError(file, "", f"is a structure, expected a scenario: a file with {expected}")
     if file.resolve() in seen:
         raise InputError(file, "base", "the scenario is based on itself")
 

@@ -369,7 +369,8 @@ class Scenario(Section):
             try:
                 self.after(events)
             except InputError as error:
-                refuse(f"{place}.change.{error.key}", error.problem)
+                more = "" if error.key in event.change else "; change it as well"
+                refuse(f"{place}.change.{error.key}", error.problem + more)
         return self
 
     def _check_time(self, key: str, time: float) -> None:

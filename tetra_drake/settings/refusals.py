@@ -140,8 +140,10 @@ def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str
         return getattr(cause, "key", ""), getattr(cause, "problem", str(cause))
     if kind == "missing":
         return str(error["loc"][-1]), "is missing; give it"
+    if kind == "list_type":
+        return "", f"{found}, expected a list" + (f", [{value}]" if isinstance(value, str) else "")
     if kind.startswith("union_tag"):
-        return "", f"{found}; {hint(found, [member['title'] for member in members])}"
+        return "", f"{found}; {hint(found, [one['title'] for one in members if 'title' in one])}"
     expected = re.sub(".* should (be|have) ", "", error["msg"]).replace(" after validation", "")
     expected = re.sub("(a valid dict|Extra inputs).*", "a mapping of keys", expected)
     unit = next((member["unit"] for member in members if "unit" in member), "")

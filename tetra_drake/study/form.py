@@ -33,7 +33,7 @@ def form_find(scenario: GivenScenario, prestress: Mapping[str, str]) -> Scenario
 
     Args:
         scenario: a scenario with a structure, its name or file, or a run. The nodes' coordinates
-            are the wanted shape.
+            are the wanted shape; give them with seven digits.
         prestress: tension, such as "9 N", by group of cables. One group is enough if there is one
             such state of self-stress.
 
@@ -80,6 +80,7 @@ def _tensions(structure: Structure, groups: list[str], wanted: Mapping[str, floa
     count = found.shape[1]
     if not count:
         problem = "has no state of self-stress with equal tensions in each group of cables"
+        problem += ", to 1e-6; rounded coordinates may hide one"
         raise InputError(_SOURCE, "scenario", problem)
     shares, _, rank, _ = np.linalg.lstsq(found[given], numbers, rcond=TOLERANCE)
     if rank < count:

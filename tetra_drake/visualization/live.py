@@ -66,7 +66,7 @@ class LiveView:
         now = float(frame["time"].values[0])
         if self._started is not None:
             time.sleep(max(0.0, self._started + now - time.monotonic()))
-        place_robot(self._meshcat, self._robot.structure, frame, per_newton=self._per_newton)
+        place_robot(self._meshcat, self._robot, frame, per_newton=self._per_newton)
         if self._started is None:
             while self._meshcat.GetNumActiveConnections() == 0:
                 time.sleep(_POLLING_PERIOD)

@@ -219,7 +219,7 @@ def film_of(robot: Robot, frames: xarray.Dataset, *, rolls: bool) -> dict[str, A
         "length": {"size": units.length, "name": units.length_name},
         "dark": units.squares * units.square,
         "poses": _steps(poses),
-        "radii": _steps(cable_radii(structure, frames, per_newton)),
+        "radii": _steps(cable_radii(robot, frames, per_newton)),
         "touches": _steps(frames["in_contact"].values * RESOLUTION),
         "arrows": _steps(force * units.square / force_of_square),
         "traces": _steps(followed_nodes(frames["p_WN"].values, structure)[:, :2]),

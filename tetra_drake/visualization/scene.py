@@ -98,16 +98,17 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
 
 
 def place_robot(
-    meshcat: Meshcat, structure: Structure, frame: xarray.Dataset, *, per_newton: float
+    meshcat: Meshcat, robot: Robot, frame: xarray.Dataset, *, per_newton: float
 ) -> None:
     """Moves bodies and cables to their poses in `frame`, one sample of a trajectory (`time` has
     length 1). Nodes on the ground get their colour. `per_newton` is the drawn radius of a cable per
     newton of tension (m/N)."""
+    structure = robot.structure
     for body, name in enumerate(structure.bodies):
         turn = Quaternion(frame["q_WB"].values[0, body])
         position = frame["p_WB"].values[0, body]
         meshcat.SetTransform(f"/robot/{name}", RigidTransform(turn, position))
-    p_WN, radii = frame["p_WN"].values[0], cable_radii(structure, frame, per_newton)[0]
+    p_WN, radii = frame["p_WN"].values[0], cable_radii(robot, frame, per_newton)[0]
     ends = p_WN[structure.segments.ends]
     for (p_WA, p_WB), path, radius in zip(ends, cable_paths(structure), radii, strict=True):
         matrix = np.eye(4)
@@ -164,12 +165,16 @@ def radius_per_newton(structure: Structure, tension: float) -> float:
     return THICKEST * least_drawn_radius(structure) / max(tension, 1e-9)
 
 
-def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float) -> np.ndarray:
+def cable_radii(robot: Robot, frames: xarray.Dataset, per_newton: float) -> np.ndarray:
     """Drawn radii of the straight pieces of cables (frames, pieces) in m: proportional to tension,
-    between a least and a greatest radius."""
+    between a least and a greatest radius. Cables that an event has cut are not seen."""
+    structure = robot.structure
     strut = least_drawn_radius(structure)
     least, most = THINNEST * strut, 1.3 * THICKEST * strut
     radii: np.ndarray = (per_newton * frames["tension"].values).clip(least, most)
+    for phase in robot.phases[1:]:  # a radius of 0 would leave a cable without a direction
+        intact = phase.robot.structure.cables["intact"].clip(1e-6)
+        radii[frames["time"].values >= phase.begins] *= intact
     return radii[:, structure.segments.cable]
 
 
