@@ -547,7 +547,6 @@ def _predict(
     command: CommandFile | None = None,
     draws: Count = 200,
     seed: Seed = 0,
-    workers: Count | None = None,
     out: Folder | None = None,
 ) -> None:
     """Predict quantities with intervals, from the tolerances of a robot's numbers.
@@ -563,7 +562,6 @@ def _predict(
             distance and speed)
         draws: number of draws (default: %(default)s)
         seed: random seed of the draws (default: %(default)s)
-        workers: number of threads (default: one per core)
         out: write the page predict.html, tables, figure and scenario into this folder
 
     Example: tetra-drake predict simplex.yaml --quantities 'frequency 1' 'n3 z' --out predicted
@@ -581,17 +579,8 @@ def _predict(
         groups = dict.fromkeys(scenario.robot.blueprint().cable_groups)
         at_rest = [*(f"frequency {mode}" for mode in (1, 2, 3)), *(f"tension {g}" for g in groups)]
         quantities = at_rest if gait is None and command is None else ["distance", "speed"]
-    found = predict(
-        scenario,
-        quantities,
-        gait=gait,
-        command=played,
-        draws=draws,
-        seed=seed,
-        workers=workers,
-        out=out,
-    )
-    print(found)
+    driver: dict[str, Any] = {"gait": gait, "command": played}
+    print(predict(scenario, quantities, **driver, draws=draws, seed=seed, out=out))
     if out:
         print(f"to see the predictions, open in a browser: {out / 'predict.html'}")
 

@@ -6,10 +6,11 @@ Draws of a prediction take other numbers within the tolerances. A fit weighs its
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, NamedTuple, Protocol
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
@@ -18,7 +19,7 @@ from tetra_drake.scenario.common_sections import different_keys, separate
 from tetra_drake.settings.quantities import Keyed, Quantity
 from tetra_drake.settings.refusals import Tree, hint, joined, refuse
 from tetra_drake.settings.section import Section, tree_value, value_at
-from tetra_drake.settings.units import NUMBER, PATTERN, PLUS_MINUS, quantity_to_si
+from tetra_drake.settings.units import PATTERN, PLUS_MINUS, quantity_to_si
 
 _SHORT = rf"\s*{PLUS_MINUS}?\s*(.+?)((?:\s+(?:normal|uniform|each))*)\s*"
 """Regular expression of a tolerance as one text, such as "± 2 % uniform each"."""
@@ -59,24 +60,19 @@ class Tolerance(Section):
         """Standard deviation of the error of a number (a Quantity, or a float without unit), in SI.
         Only a number that `is_signed`, such as a coordinate, may be smaller than its tolerance.
         Raises ValueError if the size does not fit the number."""
-        unit = number.unit if isinstance(number, Quantity) else ""
-        expected = "a share, such as 2 %" + (f", or a quantity in {unit}" if unit else ", or 0.05")
-        match = re.fullmatch(rf"({NUMBER})\s*(%?)", self.size)
-        is_share = match is not None and bool(match[2])
-        if match is None and not unit:
-            raise ValueError(f"found '{self.size}', expected {expected}")
-        size = quantity_to_si(self.size, unit) if match is None else float(match[1])
-        if unit and match and size and not is_share:
-            raise ValueError(f"found {self.size} without a unit, expected {expected}")
-        if size < 0.0:
+        unit = getattr(number, "unit", "")
+        text = self.size.removesuffix("%")
+        is_share = text != self.size
+        try:
+            size = quantity_to_si(text, unit) if unit and not is_share else float(text)
+        except ValueError as error:
+            raise ValueError(f"{error}, or a share, such as 2 %") from error
+        if not 0.0 <= size < math.inf:
             raise ValueError(f"found {self.size}, expected 0 or more")
-        if is_share:
-            if size and not number:
-                raise ValueError(f"found {self.size} of 0, expected a quantity in {unit or '1'}")
-            size *= abs(number) / 100.0
-        if number and size >= abs(number) and (is_share or not is_signed):
-            what = number if unit else f"{number:g}"
-            raise ValueError(f"found {self.size} of {what}, expected less than the number")
+        is_some, size = size > 0.0, size * abs(number) / 100.0 if is_share else size
+        if is_some and size >= abs(number) and (is_share or (number and not is_signed)):
+            found = f"found {self.size} of {number if unit else float(number)}"
+            raise ValueError(f"{found}, expected a tolerance smaller than the number")
         return size / math.sqrt(3.0) if self.law == "uniform" else size
 
 
@@ -97,15 +93,6 @@ Tolerances = Annotated[
 """Tolerances by dotted key. Keys joined by commas have one error in common."""
 
 
-class HasTolerances(Protocol):
-    """Section with the field `tolerances`."""
-
-    @property
-    def tolerances(self) -> Mapping[str, Tolerance]: ...
-
-    def model_dump(self) -> Tree: ...
-
-
 class Variate(NamedTuple):
     """An independent error with mean 0 and variance 1, and the numbers that it moves."""
 
@@ -117,11 +104,11 @@ class Variate(NamedTuple):
 
     def errors(self, shares: np.ndarray) -> np.ndarray:
         """Errors whose cumulative probabilities are `shares`."""
-        from scipy.stats import norm
+        from scipy.special import ndtri
 
         if self.law == "uniform":
             return math.sqrt(3.0) * (2.0 * shares - 1.0)
-        return np.asarray(norm.ppf(shares))
+        return np.asarray(ndtri(shares))
 
 
 def variates_of(tree: Tree, tolerances: Mapping[str, Tolerance]) -> list[Variate]:
@@ -132,75 +119,69 @@ def variates_of(tree: Tree, tolerances: Mapping[str, Tolerance]) -> list[Variate
         try:
             parts = [part for one in separate(key) for part in _parts(tree, one, tolerance)]
         except ValueError as error:
-            refuse(f"tolerances.{key}", getattr(error, "problem", str(error)))
+            refuse(f"tolerances.{key}", str(error))
         if not tolerance.each:
-            common = {one: size for part, own in parts if not own for one, size in part.items()}
-            parts = [(common, False), *((part, own) for part, own in parts if own)]
-        moving = [part for part, _ in parts if any(part.values())]
-        found += [Variate(key, tolerance.law, part) for part in moving]
+            own = [part for part in parts if len(part) == 1 and str(*part).endswith("]")]
+            common = [part for part in parts if part not in own]
+            parts = [dict(itertools.chain(*(part.items() for part in common))), *own]
+        found += [Variate(key, tolerance.law, part) for part in parts if any(part.values())]
     return found
 
 
-def _parts(tree: Tree, key: str, tolerance: Tolerance) -> list[tuple[dict[str, float], bool]]:
+def _parts(tree: Tree, key: str, tolerance: Tolerance) -> list[dict[str, float]]:
     """Changes of numbers by one standard deviation, by key, for each member of a key: a strut, a
-    cable or a number. With each is True if it always has an error of its own."""
+    cable or a number. Raises ValueError for a key or a size that fits no number."""
     if match := _LENGTH.fullmatch(key):
-        return [(part, False) for part in _of_struts(tree, match[1], match[2], tolerance)]
+        return _of_struts(tree, match[1], match[2], tolerance)
     value = value_at(tree, key)
     match = _PER_CABLE.fullmatch(key)
-    if match and tolerance.each and isinstance(value, float):
-        share = tolerance.deviation(value) / value if value else 0.0
-        pairs = range(len(value_at(tree, f"{match[1]}.pairs")))
-        return [({f"{match[1]}.factors.{match[2]}[{i}]": share}, False) for i in pairs]
+    if match and tolerance.each and value:
+        share, pairs = tolerance.deviation(value) / value, value_at(tree, f"{match[1]}.pairs")
+        return [{f"{match[1]}.factors.{match[2]}[{i}]": share} for i in range(len(pairs))]
     numbers = dict(_numbers(value, key))
     if not numbers:
-        known = dict(_numbers(tree, ""))
-        raise ValueError(f"'{key}' is no number of the robot or scenario; {hint(key, known)}")
-    if len({getattr(number, "unit", "") for number, _ in numbers.values()}) > 1:
+        hinted = hint(key, dict(_numbers(tree, "")))
+        raise ValueError(f"'{key}' is no number of the robot or scenario; {hinted}")
+    if len({getattr(number, "unit", "") for number in numbers.values()}) > 1:
         raise ValueError("found numbers with several units, expected a key of numbers of one unit")
     return [
-        ({name: tolerance.deviation(number, is_signed=in_list)}, in_list)
-        for name, (number, in_list) in numbers.items()
+        {name: tolerance.deviation(number, is_signed=name.endswith("]"))}
+        for name, number in numbers.items()
     ]
 
 
-def _numbers(value: Any, key: str, in_list: bool = False) -> Iterator[tuple[str, Any]]:
-    """Keys of the numbers in a value, each with the number and whether it is an item of a list."""
+def _numbers(value: Any, key: str) -> Iterator[tuple[str, float]]:
+    """Keys and numbers in a value, whose key is `key`."""
     if isinstance(value, float):
-        yield key, (value, in_list or key.endswith("]"))
+        yield key, value
     for name, item in value.items() if isinstance(value, dict) else ():
-        yield from _numbers(item, joined(key, name), in_list)
+        yield from _numbers(item, joined(key, name))
     for place, item in enumerate(value) if isinstance(value, list) else ():
-        yield from _numbers(item, f"{key}[{place}]", True)
+        yield from _numbers(item, f"{key}[{place}]")
 
 
-def _of_struts(
-    tree: Tree, robot: str, group: str, tolerance: Tolerance
-) -> Iterator[dict[str, float]]:
+def _of_struts(tree: Tree, robot: str, group: str, tolerance: Tolerance) -> list[dict[str, float]]:
     """Changes of the coordinates of both ends of each strut of a group that lengthen the strut by
-    one standard deviation. `robot` is what stands before keys of the robot in the tree."""
-    bars = value_at(tree, f"{robot}struts") or {}
-    if group not in bars:
-        raise ValueError(f"'{group}' is no group of struts; {hint(group, bars)}")
+    one standard deviation. `robot` stands before the keys of the robot in the tree."""
+    bars = value_at(tree, f"{robot}struts")
     ends = [node for bar in bars.values() for pair in bar["pairs"] for node in pair]
-    for pair in bars[group]["pairs"]:
-        if shared := [node for node in pair if ends.count(node) > 1]:
-            expected = "expected struts that share no node, or tolerances of nodes"
-            raise ValueError(f"found '{shared[0]}' on several struts, {expected}")
+    parts = []
+    for pair in bars[group]["pairs"] if group in bars else ():
+        if max(map(ends.count, pair)) > 1:
+            raise ValueError(f"found struts that share {' or '.join(pair)}, expected the key nodes")
         start, end = (np.array(value_at(tree, f"{robot}nodes.{node}")) for node in pair)
         length = float(np.linalg.norm(end - start))
         half = 0.5 * tolerance.deviation(Quantity(length, "m")) * (end - start) / length
-        signed = {pair[0]: -half, pair[1]: half}
-        yield {
-            f"{robot}nodes.{node}[{axis}]": change
-            for node, shift in signed.items()
-            for axis, change in enumerate(shift.tolist())
-        }
+        both = zip(pair, (-half, half), strict=True)
+        parts.append({f"{robot}nodes.{n}[{axis}]": x[axis] for n, x in both for axis in range(3)})
+    if not parts:
+        raise ValueError(f"'{group}' is no group of struts; {hint(group, bars)}")
+    return parts
 
 
 def split_tolerances(tree: Any) -> Any:
-    """Content of a section of a file in which tolerances that stand in texts, such as `509 mm ± 1
-    mm`, are in the section `tolerances`."""
+    """Content of a section of a file whose tolerances in texts, such as `509 mm ± 1 mm`, are moved
+    into the section `tolerances`."""
     found: dict[str, str] = {}
 
     def without(value: Any, key: str) -> Any:
@@ -223,7 +204,7 @@ def split_tolerances(tree: Any) -> Any:
     )
 
 
-def check_tolerances(section: HasTolerances) -> Any:
+def check_tolerances(section: Any) -> Any:
     """Refuses tolerances that do not fit the numbers of a section, and returns the section."""
     if section.tolerances:
         variates_of(section.model_dump(), section.tolerances)

@@ -24,7 +24,6 @@ from tetra_drake.figures.style import (
     folded,
     legend_below,
     line_style,
-    name_panel,
     page_of,
     page_width,
     save_findings,
@@ -32,6 +31,7 @@ from tetra_drake.figures.style import (
 )
 from tetra_drake.files import given_path
 from tetra_drake.formatting import TextTable, fixed, rounded
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.gait import GivenGait, given_gait, with_body
 from tetra_drake.robot.robot import Robot
@@ -56,13 +56,15 @@ together."""
 STILL = 1e-9
 """Spread, relative to the size of a quantity, that is a rounding error."""
 PAGE, FIGURE = "predict.html", "predictions.figure"
+ABOUT = """Each interval holds 90 % of the draws. The share of a tolerance in the variance of a
+quantity is from a linear regression over the draws; the rest is curvature and what tolerances do
+together.""".replace("\n", " ")
 
-_NAMES = 0.2  # largest width of the names, as a share of the page's width
+_NAMES = 0.3  # largest width of the names, as a share of the page's width
 
-AXES = "x", "y", "z"
-OF_NODES = {"load": "N", "anchor_x": "N", "anchor_y": "N", "anchor_z": "N"}
-OF_CABLES = {"tension": "N", "length": "m", "free_length": "m", "force_density": "N/m"}
-FREQUENCY = "frequency"
+OF_REST = {"load": "N", "tension": "N", "force_density": "N/m", "frequency": "Hz"}
+OF_REST |= {"length": "m", "free_length": "m"} | {f"anchor_{axis}": "N" for axis in "xyz"}
+"""Units of quantities at rest, by first words. Others are coordinates."""
 
 Measure = str | Callable[[Any], float]
 """Name of a quantity, or a function of an EquilibriumStudy or a SimulationResult."""
@@ -92,7 +94,7 @@ class Predictions:
 
     @property
     def about(self) -> str:
-        """How the predictions were made, in a sentence or two."""
+        """How the predictions were made, in a sentence."""
         tolerances = self.scenario.all_tolerances
         assumed = sum(each.source == "assumed" for each in tolerances.values())
         return (
@@ -103,42 +105,33 @@ class Predictions:
 
     @property
     def notes(self) -> list[str]:
-        """Draws that have no result with their most frequent reason, and quantities that are not in
-        every draw."""
-        failures = Counter(self.draws["failure"][self.draws["failure"] != ""])
-        failed, count = failures.total(), len(self.draws)
-        notes = []
-        if failed:
-            reason = failures.most_common(1)[0][0]
-            notes.append(f"{failed} of {count} draws have no result and are left out: {reason}")
-        for name, row in self.quantities.iterrows():
-            if lacking := count - failed - int(row["draws"]):
-                notes.append(f"{lacking} of {count} draws have no {name}")
+        """How many draws lack a quantity, with a reason, and whether shares are missing."""
+        count, reasons = len(self.draws), [text for text in self.draws["failure"] if text]
+        failed = f"{len(reasons)} of {count} draws have no result and are left out"
+        notes = [f"{failed}, the first because: {reasons[0]}"] if reasons else []
+        lacking = count - len(reasons) - self.quantities["draws"]
+        notes += [f"{n} of {count} draws have no {name}" for name, n in lacking.items() if n]
         if self.shares.isna().all(axis=None):
             notes.append("the shares need more draws, or quantities that vary")
         return notes
 
     @property
     def table(self) -> TextTable:
-        """Table of the medians and intervals, beside the values without tolerances."""
+        """Table of the medians and intervals, beside the values without errors."""
         rows = [
             [str(name), interval_text(row), rounded(row["nominal"], 4), row["unit"] or "1"]
             for name, row in self.quantities.iterrows()
         ]
-        headings = ["quantity", "median, 90 % interval", "nominal", "unit"]
-        return TextTable(headings, rows, text_columns=(0, 3))
+        return TextTable(["quantity", "median, 90 % interval", "nominal", "unit"], rows, (0, 3))
 
     @property
     def table_of_shares(self) -> TextTable:
-        """Table of the shares of each tolerance in the variance of the quantities."""
-        tolerances = self.scenario.all_tolerances
-        rows = []
-        for key, shares in self.shares.T.iterrows():
-            known = tolerances.get(str(key))
-            size = f"± {known.size} {known.law}" if known else ""
-            rows.append([str(key), size, *(fixed(100.0 * share, 0) for share in shares)])
-        headings = ["share of the variance (%)", "tolerance", *map(str, self.shares.index)]
-        return TextTable(headings, rows, text_columns=(0, 1))
+        """Table of the shares of the tolerances in the variance of each quantity."""
+        rows = [
+            [str(key), *(fixed(100.0 * share, 0) for share in shares)]
+            for key, shares in self.shares.T.iterrows()
+        ]
+        return TextTable(["share of the variance (%)", *map(str, self.shares.index)], rows)
 
 
 def interval_text(row: pandas.Series) -> str:
@@ -214,28 +207,28 @@ def predict(
     if not variates:
         expected = "expected the tolerance of a number, such as robot.masses: 2 %"
         raise InputError(f"scenario {scenario.name}", "tolerances", f"found none, {expected}")
-    nominal = _values_of(_outcomes([scenario], measures, driver, workers)[0], measures)
-
+    (nominal,) = _values([scenario], measures, driver, workers)
+    if isinstance(nominal, Exception):
+        raise nominal
     errors = errors_of(variates, seed, draws)
-    drawn = _drawn(scenario, variates, errors)
-    ready = [each for each in drawn if isinstance(each, Scenario)]
-    outcomes = iter(_outcomes(ready, measures, driver, workers))
-    found = [next(outcomes) if isinstance(each, Scenario) else each for each in drawn]
-    failures, numbers = [], np.full((draws, len(measures)), math.nan)
-    for row, each in zip(numbers, found, strict=True):
-        try:
-            row[:] = _values_of(each, measures)
-            failures.append("")
-        except (InputError, SimulationFailure) as error:
-            failures.append(str(error))
+    found = _values(_drawn(scenario, variates, errors), measures, driver, workers)
+    nothing, names = [math.nan] * len(measures), list(measures)
+    failures = [str(each) if isinstance(each, Exception) else "" for each in found]
+    table = pandas.DataFrame(
+        [nothing if isinstance(each, Exception) else each for each in found], columns=names
+    )
+    columns: dict[str, Any] = {}
+    for name, share in {"median": 0.5, "low": LOW, "high": HIGH}.items():
+        place = (draws * share - 0.5) / max(1, draws - 1)  # draws are in the middle of their ranges
+        columns[name] = table.quantile(min(1.0, max(0.0, place)))
+    columns |= {"unit": [_unit(each) for each in measures.values()], "draws": table.count()}
+    shares = [shares_of(variates, errors, table[name].to_numpy()) for name in names]
     predictions = Predictions(
         scenario=scenario,
         seed=seed,
-        quantities=_table(measures, nominal, numbers),
-        shares=pandas.DataFrame(
-            [shares_of(variates, errors, column) for column in numbers.T], index=list(measures)
-        ),
-        draws=pandas.DataFrame(numbers, columns=list(measures)).assign(failure=failures),
+        quantities=pandas.DataFrame({"nominal": nominal, **columns}, index=names),
+        shares=pandas.DataFrame(shares, index=names),
+        draws=table.assign(failure=failures),
         wall_time=time.perf_counter() - began,
     )
     if folder is not None:
@@ -268,136 +261,95 @@ def _drawn(
         {key: ones for key, ones in alike.items() if value_at(bare.model_dump(), key) is None}
     )
     tree, drawn = bare.model_dump(), list[Scenario | InputError]()
-    is_held = bool(tree["robot"].get("anchors"))
-    nodes = {} if is_held else tree["robot"].get("nodes", {})
-    heights = {f"robot.nodes.{node}[2]": place[2] for node, place in nodes.items()}
-    for draw in errors:
-        numbers = {key: value_at(tree, key) for key in keys}
-        for variate, error in zip(variates, draw.tolist(), strict=True):
-            for key, deviation in variate.deviations.items():
-                changed = numbers[key] + error * deviation
-                unit = getattr(numbers[key], "unit", None)
-                numbers[key] = Quantity(changed, unit) if unit else changed
-        if falls := [value_at(tree, key) - numbers[key] for key in keys if key in heights]:
-            up = max(0.0, *falls)  # the ground refuses nodes below it
-            numbers |= {key: Quantity(numbers.get(key, z) + up, "m") for key, z in heights.items()}
+    nodes = {} if tree["robot"].get("anchors") else tree["robot"].get("nodes", {})
+    heights = [f"robot.nodes.{node}[2]" for node in nodes]
+    numbers = {key: value_at(tree, key) for key in [*keys, *heights]}
+    is_height = np.array([key in heights for key in numbers])
+    moves = [[each.deviations.get(key, 0.0) for key in numbers] for each in variates]
+    for shift in errors @ np.array(moves):
+        shift[is_height] -= shift[is_height].min(initial=0.0)  # the ground refuses nodes below it
+        changes: dict[str, float] = {}
+        for (key, x), by in zip(numbers.items(), shift.tolist(), strict=True):
+            changes[key] = Quantity(x + by, x.unit) if isinstance(x, Quantity) else x + by
         try:
-            drawn.append(bare.with_changes(numbers))
+            drawn.append(bare.with_changes(changes))
         except InputError as error:
             drawn.append(error)
     return drawn
 
 
-def _outcomes(
-    scenarios: Sequence[Scenario],
+def _values(
+    scenarios: Sequence[Scenario | InputError],
     measures: Mapping[str, Measure],
     driver: Driver | None,
     workers: int | None,
-) -> list[_Outcomes | InputError]:
-    """Equilibrium and motion of each scenario, as far as the measures need them."""
-    is_still = any(not _is_of_motion(each, driver) for each in measures.values())
-    found: list[_Outcomes | InputError] = []
+) -> list[list[float] | Exception]:
+    """Values of the measures for each scenario, NaN if not finite; or why there are none."""
+    is_still = driver is None or not all(callable(m) or m in METRICS for m in measures.values())
+    known: list[Robot | EquilibriumStudy | InputError] = []
     for each in scenarios:
         try:
+            if isinstance(each, InputError):
+                raise each
             robot = Robot.of(each, at_rest=driver is None)
-            found.append(_Outcomes(each, study_equilibrium(robot) if is_still else None))
+            known.append(study_equilibrium(robot) if is_still else robot)
         except InputError as error:
-            found.append(error)
+            known.append(error)
+    outcomes: Mapping[int, Outcome] = {}
     if driver is not None:
-        able = [each for each in found if isinstance(each, _Outcomes)]
-        record = any(callable(each) for each in measures.values())
-        moving, drivers = [each.scenario for each in able], [driver] * len(able)
-        moved = simulate_many(moving, drivers, record=record, workers=workers)
-        for one, outcome in zip(able, moved, strict=True):
-            one.motion = outcome
+        able = {i: s for i, s in enumerate(scenarios) if not isinstance(known[i], InputError)}
+        record = any(map(callable, measures.values()))
+        moving = [each for each in able.values() if isinstance(each, Scenario)]
+        moved = simulate_many(moving, [driver] * len(able), record=record, workers=workers)
+        outcomes = dict(zip(able, moved, strict=True))
+    found: list[list[float] | Exception] = []
+    for place, one in enumerate(known):
+        try:
+            values = [_value(one, outcomes.get(place), each) for each in measures.values()]
+            found.append([value if math.isfinite(value) else math.nan for value in values])
+        except (InputError, SimulationFailure) as error:
+            found.append(error)
     return found
 
 
-def _is_of_motion(measure: Measure, driver: Driver | None) -> bool:
-    return measure in METRICS if isinstance(measure, str) else driver is not None
+def _value(
+    known: Robot | EquilibriumStudy | InputError, outcome: Outcome | None, measure: Measure
+) -> float:
+    """Value of a measure in SI. Raises InputError for an unknown name, and the error or the failure
+    where there is no result."""
+    for one in (known, outcome):
+        if isinstance(one, Exception):
+            raise one
+    if not isinstance(measure, str):
+        return float(measure(outcome or known))
+    if isinstance(outcome, SimulationResult) and measure in METRICS:
+        return float(getattr(outcome.metrics, measure))
+    values = values_at_rest(known) if isinstance(known, EquilibriumStudy) else {}
+    if measure.startswith("frequency "):
+        return values.get(measure, math.nan)
+    if measure not in values:
+        what = "needs a gait or a command" if measure in METRICS else "is unknown"
+        raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, values)}")
+    return values[measure]
 
 
-def _values_of(outcomes: _Outcomes | InputError, measures: Mapping[str, Measure]) -> list[float]:
-    """Values of the measures; NaN for what is not finite. Raises InputError or SimulationFailure if
-    there is no result."""
-    if isinstance(outcomes, InputError):
-        raise outcomes
-    values = [outcomes.value(each) for each in measures.values()]
-    return [value if math.isfinite(value) else math.nan for value in values]
-
-
-@dataclass
-class _Outcomes:
-    """Equilibrium and motion of one draw, as far as they are needed."""
-
-    scenario: Scenario
-    study: EquilibriumStudy | None
-    motion: Outcome | None = None
-
-    def value(self, measure: Measure) -> float:
-        """Value of a measure in SI. Raises InputError for an unknown name, and the failure of a
-        simulation."""
-        if isinstance(self.motion, SimulationFailure):
-            raise self.motion
-        if not isinstance(measure, str):
-            return float(measure(self.motion or self.study))
-        if measure not in METRICS:
-            assert self.study is not None
-            return value_at_rest(self.study, measure)
-        if self.motion is None:
-            problem = "is a metric of a motion, expected a gait or a command with it"
-            raise InputError("predict", f"quantities.{measure}", problem)
-        return float(getattr(self.motion.metrics, measure))
-
-
-def value_at_rest(study: EquilibriumStudy, name: str) -> float:
-    """Value of a quantity at rest in SI, such as "n3 z", "frequency 1", "tension side n0 n3", or
-    "tension side" for the mean of a group. NaN for a frequency that the robot lacks. Raises
-    InputError for an unknown name."""
-    node, _, axis = name.rpartition(" ")
-    column, _, row = name.partition(" ")
-    if column == FREQUENCY and row.isdecimal() and int(row) > 0:
-        frequencies = study.frequencies
-        return float(frequencies[int(row) - 1]) if int(row) <= len(frequencies) else math.nan
-    if axis in AXES and node in study.nodes.index:
-        return float(study.nodes.loc[node, axis])
-    if column in OF_NODES and row in study.nodes.index:
-        return float(study.nodes.loc[row, column])
-    if column in OF_CABLES and row in study.cables.index:
-        return float(study.cables.loc[row, column])
-    groups = study.cables["group"]
-    if column in OF_CABLES and row in groups.to_numpy():
-        return float(study.cables[column][groups == row].mean())
-    known = [
-        *METRICS,
-        f"{FREQUENCY} 1",
-        *(f"{one} {axis}" for one in study.nodes.index for axis in AXES),
-    ]
-    known += [f"{one} {node}" for one in OF_NODES for node in study.nodes.index]
-    rows = [*groups.unique(), *study.cables.index]
-    known += [f"{one} {cable}" for one in OF_CABLES for cable in rows]
-    raise InputError("predict", f"quantities.{name}", f"is unknown; {hint(name, known)}")
+def values_at_rest(study: EquilibriumStudy) -> dict[str, float]:
+    """Numbers of a robot at rest in SI by name, such as "n3 z", "frequency 1", "tension side n0 n3"
+    and "tension side" for the mean of the group."""
+    nodes, cables = study.nodes.drop(columns="body"), study.cables
+    groups = cables.groupby("group").mean()
+    tables = nodes.drop(columns=list("xyz")), cables.drop(columns="group"), groups
+    values = {f"{node} {axis}": nodes.loc[node, axis] for node in nodes.index for axis in "xyz"}
+    for table in tables:
+        values |= {f"{name} {row}": table.loc[row, name] for name in table for row in table.index}
+    return values | {f"frequency {i}": x for i, x in enumerate(study.frequencies, start=1)}
 
 
 def _unit(measure: Measure) -> str:
     """SI unit of a measure; "" for a number without unit, and for a function."""
     if not isinstance(measure, str):
         return ""
-    column = measure.partition(" ")[0]
-    units = UNITS | OF_NODES | OF_CABLES | {FREQUENCY: "Hz"}
-    return units.get(column, "m")
-
-
-def _table(
-    measures: Mapping[str, Measure], nominal: Sequence[float], numbers: np.ndarray
-) -> pandas.DataFrame:
-    """Predictions.quantities, from the values without errors and in the draws (draws, measures)."""
-    columns = pandas.DataFrame(numbers, columns=list(measures))
-    table = pandas.DataFrame({"nominal": nominal}, index=list(measures))
-    for name, share in (("median", 0.5), ("low", LOW), ("high", HIGH)):
-        table[name] = columns.quantile(share)
-    units = [_unit(each) for each in measures.values()]
-    return table.assign(unit=units, draws=columns.count())
+    return (UNITS | OF_REST).get(measure.partition(" ")[0], "m")
 
 
 def shares_of(
@@ -440,26 +392,17 @@ def save_predictions(predictions: Predictions, folder: Path) -> list[str]:
         "version": __version__,
         "seed": predictions.seed,
         "draws": len(predictions.draws),
-        "failed": int((predictions.draws["failure"] != "").sum()),
-        "tolerances": {
-            key: each.model_dump() for key, each in predictions.scenario.all_tolerances.items()
-        },
-        "quantities": json_rows(tables["predictions"].set_index("quantity")),
+        "quantities": json_rows(predictions.quantities),
         "notes": predictions.notes,
         "wall_time_s": predictions.wall_time,
     }
     figure = predictions_figure(predictions)
     written = save_findings(figure, folder, FIGURE, tables=tables, summary=summary)
-    shares = (
-        "Each interval holds 90 % of the draws. The share of a tolerance in the variance of a "
-        "quantity is from a linear regression over the draws; the rest is curvature and what "
-        "tolerances do together."
-    )
     pages = write_page(
         folder,
         PAGE,
         title=f"Predictions of {predictions.scenario.name}",
-        about=f"{predictions.about} {shares}",
+        about=f"{predictions.about} {ABOUT}",
         table=predictions.table,
         notes=predictions.notes,
         figure=FIGURE,
@@ -479,37 +422,24 @@ def predictions_figure(predictions: Predictions) -> Drawn:
     each tolerance in the variance.
     """
     table, shares = predictions.quantities.iloc[::-1], predictions.shares.iloc[::-1]
-    places, width = np.arange(len(table)), _NAMES * page_width()
+    names = [f"{name}: {interval_text(row)} {row['unit']}" for name, row in table.iterrows()]
     page = page_of(height_in=0.5 * len(table) + 1.6)
-    left, right = page.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+    left, right = page.subplots(1, 2, sharey=True)
     size = np.maximum(table["nominal"].abs(), table["high"] - table["low"])
     scale = 100.0 / size.where(size > 0.0, 1.0)
-    ends = {end: (table[end] - table["nominal"]) * scale for end in ("low", "median", "high")}
+    low, middle, high = (
+        (table[end] - table["nominal"]) * scale for end in ("low", "median", "high")
+    )
+    places, begin, styles = range(len(table)), np.zeros(len(table)), {}
     left.axvline(0.0, color="black", linewidth=0.8)
-    left.hlines(places, ends["low"], ends["high"], color=OKABE_ITO["sky_blue"], linewidth=5.0)
-    left.plot(ends["median"], places, "o", color=OKABE_ITO["blue"])
-    for place, (_, row) in zip(places, table.iterrows(), strict=True):
-        text = f"{interval_text(row)} {row['unit']}".rstrip()
-        left.annotate(
-            text,
-            (0.02, place),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, 5),
-            textcoords="offset points",
-            fontsize="small",
-        )
-    name_panel(left, "median and 90 % interval")
-    left.set(xlabel="difference from nominal (%)", ylim=(-0.6, len(table) - 0.2))
-    left.set_yticks(places, [folded(str(name), width) for name in table.index])
-    begin, styles = np.zeros(len(table)), {}
-    for series, key in enumerate(shares):
-        color = "0.8" if key == REST else line_style(series)["color"]
-        part = 100.0 * shares[key].fillna(0.0).to_numpy()
-        right.barh(places, part, left=begin, height=0.5, color=color)
-        begin, styles[str(key)] = begin + part, {"color": color, "linewidth": 5.0}
-    name_panel(right, "share of the variance")
-    right.set(xlabel="share (%)", xlim=(0.0, 100.0))
-    for panel in (left, right):
-        panel.grid(visible=False, axis="y")
+    left.hlines(places, low, high, color=OKABE_ITO["sky_blue"], linewidth=5.0)
+    left.plot(middle, places, "o", color=OKABE_ITO["blue"])
+    left.set(xlabel="median and 90 % interval: difference from nominal (%)")
+    left.set_yticks(places, [folded(name, _NAMES * page_width()) for name in names])
+    for series, (key, column) in enumerate(shares.items()):
+        color, part = line_style(series)["color"], 100.0 * column.fillna(0.0).to_numpy()
+        right.barh(places, part, left=begin, height=0.5, color="0.8" if key == REST else color)
+        begin, styles[str(key)] = begin + part, {"color": right.patches[-1].get_facecolor()}
+    right.set(xlabel="share of the variance (%)", xlim=(0.0, 100.0))
     legend_below(page, styles)
     return titled(page, f"Predictions of {predictions.scenario.name}")
