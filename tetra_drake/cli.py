@@ -564,7 +564,7 @@ def _predict(
         seed: random seed of the draws (default: %(default)s)
         out: write the page predict.html, tables, figure and scenario into this folder
 
-    Example: tetra-drake predict simplex.yaml --quantities 'frequency 1' 'n3 z' --out predicted
+    Example: tetra-drake predict my.yaml --quantities 'n3 z' --out out
     """
     from tetra_drake.prototype.command_file import load_command
     from tetra_drake.scenario.load import load_scenario

@@ -199,9 +199,9 @@ def split_tolerances(tree: Any) -> Any:
         return tree
     kept = {name: tree[name] for name in ("tolerances", "robot") if name in tree}
     tree = without({name: item for name, item in tree.items() if name not in kept}, "") | kept
-    return (
-        tree | {"tolerances": (tree_value(tree.get("tolerances")) or {}) | found} if found else tree
-    )
+    given = tree_value(tree.get("tolerances") or {})
+    is_mapping = isinstance(given, dict)  # anything else is refused later
+    return tree | {"tolerances": given | found} if found and is_mapping else tree
 
 
 def check_tolerances(section: Any) -> Any:

@@ -24,6 +24,7 @@ from tetra_drake.figures.style import (
     folded,
     legend_below,
     line_style,
+    name_panel,
     page_of,
     page_width,
     save_findings,
@@ -434,12 +435,14 @@ def predictions_figure(predictions: Predictions) -> Drawn:
     left.axvline(0.0, color="black", linewidth=0.8)
     left.hlines(places, low, high, color=OKABE_ITO["sky_blue"], linewidth=5.0)
     left.plot(middle, places, "o", color=OKABE_ITO["blue"])
-    left.set(xlabel="median and 90 % interval: difference from nominal (%)")
+    left.set(xlabel="difference from nominal (%)")
     left.set_yticks(places, [folded(name, _NAMES * page_width()) for name in names])
     for series, (key, column) in enumerate(shares.items()):
         color, part = line_style(series)["color"], 100.0 * column.fillna(0.0).to_numpy()
         right.barh(places, part, left=begin, height=0.5, color="0.8" if key == REST else color)
         begin, styles[str(key)] = begin + part, {"color": right.patches[-1].get_facecolor()}
-    right.set(xlabel="share of the variance (%)", xlim=(0.0, 100.0))
+    name_panel(left, "median and 90 % interval")
+    name_panel(right, "share of the variance")
+    right.set(xlabel="share (%)", xlim=(0.0, 100.0))
     legend_below(page, styles)
     return titled(page, f"Predictions of {predictions.scenario.name}")
