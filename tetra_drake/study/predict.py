@@ -212,29 +212,40 @@ def predict(
     if isinstance(nominal, Exception):
         raise nominal
     errors = errors_of(variates, seed, draws)
-    found = _values(_drawn(scenario, variates, errors), measures, driver, workers)
-    nothing, names = [math.nan] * len(measures), list(measures)
+    found = _values(drawn_scenarios(scenario, variates, errors), measures, driver, workers)
+    nothing = [math.nan] * len(measures)
     failures = [str(each) if isinstance(each, Exception) else "" for each in found]
-    table = pandas.DataFrame(
-        [nothing if isinstance(each, Exception) else each for each in found], columns=names
-    )
-    columns: dict[str, Any] = {}
-    for name, share in {"median": 0.5, "low": LOW, "high": HIGH}.items():
-        place = (draws * share - 0.5) / max(1, draws - 1)  # draws are in the middle of their ranges
-        columns[name] = table.quantile(min(1.0, max(0.0, place)))
-    columns |= {"unit": [_unit(each) for each in measures.values()], "draws": table.count()}
-    shares = [shares_of(variates, errors, table[name].to_numpy()) for name in names]
+    rows = [nothing if isinstance(each, Exception) else each for each in found]
+    table = pandas.DataFrame(rows, columns=list(measures))
+    results, shares = intervals(variates, errors, table)
+    results.insert(0, "nominal", nominal)
+    results.insert(4, "unit", [_unit(each) for each in measures.values()])
     predictions = Predictions(
         scenario=scenario,
         seed=seed,
-        quantities=pandas.DataFrame({"nominal": nominal, **columns}, index=names),
-        shares=pandas.DataFrame(shares, index=names),
+        quantities=results,
+        shares=shares,
         draws=table.assign(failure=failures),
         wall_time=time.perf_counter() - began,
     )
     if folder is not None:
         save_predictions(predictions, folder)
     return predictions
+
+
+def intervals(
+    variates: Sequence[Variate], errors: np.ndarray, table: pandas.DataFrame
+) -> tuple[pandas.DataFrame, pandas.DataFrame]:
+    """Median, low and high of the 90 % interval and number of draws of each quantity, and the share
+    of each tolerance in its variance, from a table with a row per draw and a column per quantity.
+    `errors` (draws, variates) are the errors of the draws."""
+    columns = {}
+    for name, share in {"median": 0.5, "low": LOW, "high": HIGH}.items():
+        place = (len(table) * share - 0.5) / max(1, len(table) - 1)  # middles of equal ranges
+        columns[name] = table.quantile(min(1.0, max(0.0, place)))
+    shares = [shares_of(variates, errors, column.to_numpy()) for _, column in table.items()]
+    quantities = pandas.DataFrame(columns).assign(draws=table.count())
+    return quantities, pandas.DataFrame(shares, index=table.columns)
 
 
 def errors_of(variates: Sequence[Variate], seed: int, draws: int) -> np.ndarray:
@@ -248,7 +259,7 @@ def errors_of(variates: Sequence[Variate], seed: int, draws: int) -> np.ndarray:
     return np.column_stack(columns)
 
 
-def _drawn(
+def drawn_scenarios(
     scenario: Scenario, variates: Sequence[Variate], errors: np.ndarray
 ) -> list[Scenario | InputError]:
     """The scenario with the errors (draws, variates) of each draw; an error where the scenario does
