@@ -25,6 +25,7 @@ Functions, and the main attributes of their results:
     Planner             controller that plans by sampled motions: simulate(controller=planner)
     States              saved states of a simulation, also in files
     fit                 values of scenario keys that meet measurements: parameters, scenario
+    predict             medians and intervals of any quantity, from tolerances of a robot's numbers
     MotionCapture, Rest measurements for fit(): motion over time; shape, tensions, frequencies
     robustness          how far gaits walk on disturbed robots
     spread              ranges of a gait's metrics for starts moved by 1 nm to 1e-7 m

@@ -21,6 +21,7 @@ from tetra_drake.study.equilibrium import study_equilibrium as study_equilibrium
 from tetra_drake.study.form import form_find as form_find
 from tetra_drake.study.measurements import MotionCapture as MotionCapture
 from tetra_drake.study.measurements import Rest as Rest
+from tetra_drake.study.predict import predict as predict
 from tetra_drake.study.robustness import robustness as robustness
 from tetra_drake.study.spread import spread as spread
 from tetra_drake.study.sweep import sweep as sweep

@@ -84,6 +84,7 @@ def make_parser() -> Parser:
         _robustness,
         _compare,
         _fit,
+        _predict,
         _cpg,
         _structure,
         _schema,
@@ -114,6 +115,7 @@ FrameRate = Annotated[float, Option(metavar="X", type=partial(number, least=0.01
 PlaybackSpeed = Annotated[float, Option(metavar="X", type=partial(number, least=0.001, most=1000))]
 View = Annotated[str, Option(choices=("free", "side", "front", "top"))]
 Cluster = Annotated[str, Option(metavar="ADDRESS", nargs="?", const="")]
+Quantities = Annotated[list[str], Option(metavar="QUANTITY", nargs="+")]
 Labels = Annotated[list[str], Option(metavar="NAME", nargs="+")]
 RunFolder = Annotated[Folder, Option(metavar="RUN")]
 GaitOrRun = Annotated[Path, Option(metavar="GAIT|RUN", type=Path)]
@@ -535,6 +537,52 @@ def _fit(
         raise KeyboardInterrupt("(nothing is lost; the same command goes on)") from None
     print(f"{found}\nwrote scenario.yaml, tables, figure, README.md and fit.html to {out}/")
     print(f"to see the fit, open in a browser: {out / 'fit.html'}")
+
+
+def _predict(
+    source: StructureName,
+    *,
+    quantities: Quantities | None = None,
+    gait: GaitPath | None = None,
+    command: CommandFile | None = None,
+    draws: Count = 200,
+    seed: Seed = 0,
+    out: Folder | None = None,
+) -> None:
+    """Predict quantities with intervals, from the tolerances of a robot's numbers.
+
+    Draws robots whose numbers differ within the `tolerances` of the file. Prints the median and the
+    90 percent interval of each quantity, and which tolerance makes how much of its variance. Names
+    of quantities: 'frequency 1', 'n3 z' (a node at rest), 'tension side n0 n3' or 'tension side'
+    (mean of a group; also length, force_density), and with a gait or a command any metric, such as
+    speed.
+
+    Args:
+        quantities: (default: three frequencies and mean tensions; with a gait or a command,
+            distance and speed)
+        draws: number of draws (default: %(default)s)
+        seed: random seed of the draws (default: %(default)s)
+        out: write the page predict.html, tables, figure and scenario into this folder
+
+    Example: tetra-drake predict my.yaml --quantities 'n3 z' --out out
+    """
+    from tetra_drake.prototype.command_file import load_command
+    from tetra_drake.scenario.load import load_scenario
+    from tetra_drake.scenario.structure_files import names_scenario
+    from tetra_drake.study.equilibrium import robot_of_file
+    from tetra_drake.study.predict import predict
+
+    is_scenario = names_scenario(source)
+    scenario = load_scenario(source) if is_scenario else robot_of_file(source).scenario
+    played = None if command is None else load_command(command, scenario)
+    if quantities is None:
+        groups = dict.fromkeys(scenario.robot.blueprint().cable_groups)
+        at_rest = [*(f"frequency {mode}" for mode in (1, 2, 3)), *(f"tension {g}" for g in groups)]
+        quantities = at_rest if gait is None and command is None else ["distance", "speed"]
+    driver: dict[str, Any] = {"gait": gait, "command": played}
+    print(predict(scenario, quantities, **driver, draws=draws, seed=seed, out=out))
+    if out:
+        print(f"to see the predictions, open in a browser: {out / 'predict.html'}")
 
 
 def _cpg(

@@ -1,8 +1,13 @@
 """Predictions for measured robots: the page's claims."""
 
+import hashlib
+
 import measured
 import numpy as np
+import pandas
 import pytest
+
+LOADS = ("0.60", "2.08")
 
 
 def test_the_simplex_is_as_high_as_measured_up_to_a_load_of_1_kn():
@@ -43,3 +48,28 @@ def test_the_spine_rests_where_the_authors_statics_wants_it():
 def test_the_jumper_rises_as_on_the_page():
     rise, clearance = measured.jump(share=0.2, damping=2.0)
     assert rise == pytest.approx(0.34, abs=0.01) and clearance > 0.06
+
+
+def test_the_hash_of_the_blind_predictions_is_on_the_page():
+    page = (measured.HERE / "README.md").read_text(encoding="utf-8")
+    assert hashlib.sha256((measured.HERE / "blind.csv").read_bytes()).hexdigest() in page
+    table = pandas.read_csv(measured.HERE / "blind.csv")
+    assert (table["low"] < table["median"]).all() and (table["median"] < table["high"]).all()
+    assert table["structure"].nunique() == 6 and table["assumed"].notna().all()
+
+
+def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
+    case = measured.cases()["simplex_loads"]
+    middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
+    straight, bowed = case.predict(
+        [(case.scenario(), middle | {"bow of the tubes": bow}) for bow in (0.0, 3e-3)]
+    )
+    lower = {load: straight[f"H at {load} kN"] - bowed[f"H at {load} kN"] for load in LOADS}
+    assert lower["0.60"] < 0.5 and lower["2.08"] > 2.0
+
+
+def test_totals_count_the_intervals_that_hold_the_measured_value():
+    rows = pandas.DataFrame({"kind": ["shape", "shape"], "median": [1.0, 2.2], "low": [0.9, 2.1]})
+    rows = rows.assign(high=[1.1, 2.3], measured=[1.0, 2.0])
+    lines = measured.totals_table(rows, "kind").rows
+    assert lines[0] == ["shape", "2", "5.0", "1 of 2 (50 %)"] and lines[1][0] == "all"

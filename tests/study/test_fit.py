@@ -353,6 +353,23 @@ def test_what_is_no_list_of_measurements_and_unknown_names_are_refused(refused):
             fit_values(hung(), [Rest(**{kind: {name: 0.1}})], ALONE)
 
 
+def test_a_tolerance_is_a_prior_and_comes_out_where_the_data_tell_nothing():
+    tolerances = {FREE_LENGTH: "2 mm", "robot.cables.line.damping": "1 N*s/m uniform"}
+    scenario = hung().with_changes({"robot.cables.line.damping": "3 N*s/m"})
+    scenario = scenario.with_changes({"tolerances": tolerances})
+    (case, *_) = pulled_down(200.0, 0.401)
+    case = case.model_copy(update={"position_uncertainty": 1e-3})
+    bounds = {FREE_LENGTH: (0.3, 0.5), DAMPING: (0.0, 6.0)}
+    table = fit_values(scenario, [case], bounds).parameters
+    # The height is linear in the free length: the mean is weighed by inverse variances.
+    weights = np.array([1e-3, 2e-3]) ** -2.0
+    assert table["value"][FREE_LENGTH] == pytest.approx(weights @ [0.401, 0.4] / weights.sum())
+    half = table["high"] - table["value"]
+    assert half[FREE_LENGTH] == pytest.approx(1.96 / math.sqrt(weights.sum()), rel=1e-4)
+    assert table["value"][DAMPING] == pytest.approx(3.0)
+    assert half[DAMPING] == pytest.approx(1.96 / math.sqrt(3.0), rel=1e-4)
+
+
 SLIDING = SIDE | {"friction.kinetic": (0.1, 0.26)}
 
 

@@ -42,16 +42,16 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
         return Draw({})
     factors = {}
     for joined, spread in settings.spreads.items():
-        factors[joined] = 1.0 + _stream(seed, *separate(joined)).uniform(-spread, spread)
-    moves = _stream(seed, "start").uniform(-1.0, 1.0, (scenario.robot.body_count, 3))
+        factors[joined] = 1.0 + stream(seed, *separate(joined)).uniform(-spread, spread)
+    moves = stream(seed, "start").uniform(-1.0, 1.0, (scenario.robot.body_count, 3))
     moves[:, 2] = np.abs(moves[:, 2])  # not into the ground
     events: tuple[Event, ...] = ()
     if (cuts := settings.cuts) is not None:
         names = scenario.whole_cables
-        chosen = sorted(_stream(seed, "cuts").choice(len(names), cuts.count, replace=False))
+        chosen = sorted(stream(seed, "cuts").choice(len(names), cuts.count, replace=False))
         events = (Event(at=cuts.at, cut=[names[number] for number in chosen]),)
     reach = settings.start * scenario.robot.size
-    terrain_seed = int(_stream(seed, "terrain").integers(2**31))
+    terrain_seed = int(stream(seed, "terrain").integers(2**31))
     return Draw(
         factors=factors,
         moves=reach * moves if reach else None,
@@ -60,9 +60,9 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     )
 
 
-def _stream(seed: Sequence[int], *names: str) -> np.random.Generator:
-    """Random generator for the disturbance of the scenario keys `names`, or "start", "terrain" or
-    "cuts". Its numbers do not depend on which other disturbances there are."""
+def stream(seed: Sequence[int], *names: str) -> np.random.Generator:
+    """Random generator for the disturbance or the tolerance of the scenario keys `names`, or for
+    "start", "terrain" or "cuts". Its numbers do not depend on what else is random."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,6 +32,7 @@ from tetra_drake.scenario.structure_graph import (
     struts_by_name,
     with_joints,
 )
+from tetra_drake.scenario.tolerances import Tolerances, check_tolerances, split_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
     Density,
@@ -44,7 +46,15 @@ from tetra_drake.settings.quantities import (
     Time,
 )
 from tetra_drake.settings.refusals import described, hint, refuse
-from tetra_drake.settings.section import Kinds, Section, Tree, Varied, mapped, tree_value
+from tetra_drake.settings.section import (
+    Kinds,
+    Section,
+    Tree,
+    Varied,
+    mapped,
+    parts_of,
+    tree_value,
+)
 from tetra_drake.settings.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
@@ -135,22 +145,37 @@ class CableGroup(CableConstants):
     """Length without tension. A group has a free length or a tension."""
     tension: ForceQuantity | None = Field(default=None, ge=0)
     """Tension at the given coordinates of the nodes."""
+    factors: Keyed[
+        Literal["stiffness", "damping", "free_length", "tension"],
+        list[Annotated[float, Field(gt=0)]],
+    ] = Field(default={}, exclude_if=operator.not_)
+    """Factors of a number for each cable, in the order of `pairs`, such as `stiffness: [1, 0.98,
+    1.01]`, where the cables of the group are not quite alike."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:
         if (self.free_length is None) == (self.tension is None):
             found = "neither" if self.tension is None else "both"
             refuse("free_length", f"found {found}, expected one of free_length and tension")
+        for name, factors in self.factors.items():
+            if len(factors) != len(self.pairs) or getattr(self, name) is None:
+                found = f"found {len(factors)} factors of {name}"
+                refuse(f"factors.{name}", f"{found}, expected {len(self.pairs)} of a given number")
         return self
 
-    def law(self, distance: float) -> dict[str, float]:
+    def law(self, distance: float, place: int) -> dict[str, float]:
         """Constants (SI) of a cable's force law, by the names of laws.cable.CableLaw. `distance`
-        (m) is the distance of its nodes in the file; it gives the free length for a `tension`."""
-        free_length = self.free_length
+        (m) is the distance of its nodes in the file; it gives the free length for a `tension`.
+        `place` is the cable's index in `pairs`."""
+        own: dict[str, float] = {
+            name: values[place] * getattr(self, name) for name, values in self.factors.items()
+        }
+        group = self.model_copy(update=own) if own else self
+        free_length = group.free_length
         if free_length is None:
-            law = CableLaw(**self.constants(stiffness=self.stiffness, free_length=distance))
-            free_length = distance - elastic_stretch(self.tension or 0.0, law)
-        return self.constants(stiffness=self.stiffness, free_length=free_length)
+            law = CableLaw(**group.constants(stiffness=group.stiffness, free_length=distance))
+            free_length = distance - elastic_stretch(group.tension or 0.0, law)
+        return group.constants(stiffness=group.stiffness, free_length=free_length)
 
 
 class BallJoint(Section):
@@ -260,6 +285,12 @@ class StructureFile(Section):
     ignored: list[str] | None = None
     """Settings of an imported file that have no effect, because the scenario has its own friction,
     ground and actuators. They are noted when the file is read."""
+    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
+    """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %`,
+    `struts.bar.length: 1 mm` or `nodes: 1 mm`; or in the text of a number, such as `200 N/m ± 2
+    %`. They do not change the robot; td.predict and td.fit use them."""
+
+    _split = pydantic.model_validator(mode="before")(split_tolerances)
 
     @property
     def body_count(self) -> int:
@@ -349,7 +380,8 @@ class StructureFile(Section):
             path = cable.nodes[::-1] if is_backward else cable.nodes
             places = [np.array(self.nodes[node]) for node in path]
             pieces = [np.linalg.norm(end - start) for start, end in itertools.pairwise(places)]
-            laws.append(self.cables[cable.group].law(float(sum(pieces))))
+            place_in_group = parts_of(cable.key)[-1]
+            laws.append(self.cables[cable.group].law(float(sum(pieces)), int(place_in_group)))
             paths.append([number[node] for node in path])
         ends = [[path[0], path[-1]] for path in paths]
         return {
@@ -491,7 +523,7 @@ class StructureFile(Section):
         self._check_joined(blueprint)
         blueprint.check()
         self._check_actuated(blueprint.cable_names)
-        return self
+        return check_tolerances(self)
 
     def _check_names(self) -> None:
         """Refuses nodes and struts that do not exist."""

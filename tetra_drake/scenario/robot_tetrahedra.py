@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.scenario.tolerances import Tolerances, check_tolerances, split_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
     Density,
@@ -114,6 +116,11 @@ class Tetrahedra(Section):
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
     """Groups of a junction's cables that share an oscillator, the same for every junction."""
+    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
+    """Tolerances of numbers of the robot by key, such as `cables.outer_stiffness: 2 %`."""
+
+    _split = model_validator(mode="before")(split_tolerances)
+    _check_known = model_validator(mode="after")(check_tolerances)
 
     @property
     def body_count(self) -> int:

@@ -33,6 +33,7 @@ from tetra_drake.scenario.common_sections import (
     EvolutionSection,
     GaitBounds,
     SimulationSection,
+    different_keys,
     separate,
 )
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, EngineKind, Mujoco
@@ -42,6 +43,12 @@ from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.policies import Policy, PolicyBounds
 from tetra_drake.scenario.robot_structure import RobotKind, cable_numbers
 from tetra_drake.scenario.structure_files import with_structure
+from tetra_drake.scenario.tolerances import (
+    Tolerance,
+    Tolerances,
+    check_tolerances,
+    split_tolerances,
+)
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 from tetra_drake.settings.quantities import by_name
 from tetra_drake.settings.refusals import TAG, described, hint, refuse
@@ -109,6 +116,10 @@ class Scenario(Section):
     of its base."""
     events: list[Event] = Field(default=[], exclude_if=operator.not_)
     """Changes of robot or ground during the simulation, such as a cable that breaks."""
+    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
+    """Tolerances of numbers by scenario key, such as `ground.stiffness: 20 % uniform`, besides the
+    robot's; or in the text of a number, such as `20 kN/m ± 20 %`. They do not change a simulation;
+    td.predict and td.fit use them."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()
@@ -191,6 +202,16 @@ class Scenario(Section):
     def oscillators(self) -> int:
         """Number of oscillators."""
         return len(self.robot.blueprint().oscillators)
+
+    @property
+    def all_tolerances(self) -> Mapping[str, Tolerance]:
+        """Tolerances of the robot and of the scenario, by scenario key. Raises InputError if a
+        number has two."""
+        of_robot = {
+            ", ".join(f"robot.{one}" for one in separate(key)): tolerance
+            for key, tolerance in self.robot.tolerances.items()
+        }
+        return different_keys(of_robot | self.tolerances, source=f"scenario {self.name}")
 
     @property
     def engine_name(self) -> str:
@@ -297,6 +318,9 @@ class Scenario(Section):
         `require`."""
         tree = self.model_dump(exclude={"disturbances", "objective", "require"})
         return {key: value for key, value in flattened(tree).items() if isinstance(value, float)}
+
+    _split = model_validator(mode="before")(split_tolerances)
+    _check_known = model_validator(mode="after")(check_tolerances)
 
     @model_validator(mode="after")
     def _check_combinations(self) -> Self:

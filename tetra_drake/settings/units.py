@@ -136,11 +136,13 @@ _SMALL = {
 LARGEST = 1e15
 """Largest size of a number in SI units. Products of several such numbers do not overflow."""
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
 _FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
-PATTERN = rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*"
+PATTERN = rf"\s*({NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*"
 """Regular expression of a quantity: groups of its number, a "1 /" before its unit, and its unit."""
+PLUS_MINUS = r"(?:±|\+/-)"
+"""Regular expression of what stands between a quantity and its tolerance."""
 
 
 @functools.lru_cache(maxsize=1000)  # a base is read again for each file

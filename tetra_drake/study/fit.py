@@ -25,13 +25,14 @@ from tetra_drake.figures.style import (
     save_findings,
     titled,
 )
-from tetra_drake.files import read_bytes, write_whole
-from tetra_drake.formatting import Say, TextTable, fixed, listed, render, rounded, silent
+from tetra_drake.files import read_bytes
+from tetra_drake.formatting import Say, TextTable, fixed, listed, rounded, silent
 from tetra_drake.optimizers.cma_es import Box, Search
 from tetra_drake.scenario.load import SCENARIO, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.study.fit_problem import STEP, Bounds, FitProblem, parameter_of
 from tetra_drake.study.measurements import FitFile, Measurement, files_of
+from tetra_drake.study.page import write_page
 
 LONGER, ROUGH = 10.0, 0.2
 """Test of smooth predictions: factor of a longer step, and difference of the derivatives with both
@@ -56,7 +57,7 @@ LIKELY = 3.0
 STRONG = 0.95
 """Correlation above which a warning names two parameters."""
 
-README, PAGE = "README.md", "fit.html"
+PAGE = "fit.html"
 
 MANY = 100
 """Number of points in a panel of the figure from which on they are drawn small."""
@@ -81,8 +82,8 @@ class Fit:
     """The scenario with the fitted values."""
     parameters: pandas.DataFrame
     """A row per key in SI: value, its 95 % interval low and high (NaN if unknown), start, bounds
-    least and most, unit, whether the data determine it, and whether predictions are smooth in it.
-    """
+    least and most, unit, prior (standard deviation of its tolerance, infinite without one), whether
+    the data and the tolerance determine it, and whether predictions are smooth in it."""
     correlations: pandas.DataFrame = field(repr=False)
     """Correlations of the parameters, by keys."""
     residuals: pandas.DataFrame = field(repr=False)
@@ -171,9 +172,10 @@ def fit_values(
         for number, each in enumerate(given.measurements, start=1)
     ]
     numbers = sum(len(each.numbers) for each in measured)
-    if numbers < len(fitted):
+    if numbers < sum(math.isinf(each.prior) for each in fitted):
         found = f"found {len(fitted)} keys and {numbers} measured numbers"
-        raise InputError(source, "parameters", f"{found}, expected at least a number for each key")
+        expected = "expected at least a number, or a tolerance, for each key"
+        raise InputError(source, "parameters", f"{found}, {expected}")
     digest = hashlib.sha256(f"{__version__} {scenario.values()}".encode())
     for measurement in given.measurements:
         files = files_of(measurement)
@@ -183,7 +185,7 @@ def fit_values(
             digest.update(key.encode() + read_bytes(path, key))
 
     problem = FitProblem(scenario, fitted, measured, digest.hexdigest(), folder, say)
-    start = np.array([parameter.start / parameter.scale for parameter in fitted])
+    start = problem.start
     if not np.isfinite(problem.residuals(start)).all():
         what = "is not simulated, or lacks equilibrium or frequencies, with the start values"
         raise InputError(scenario.name, "", what)
@@ -236,7 +238,8 @@ def _result(problem: FitProblem, start: np.ndarray, x: np.ndarray, wall_time: fl
     table = table.assign(determined=determined, smooth=smooth)
     correlations = pandas.DataFrame(correlation, index=given.index, columns=given.index)
     explained = misfit <= 1.0 + LIKELY * math.sqrt(2.0 / max(1, last.size - x.size))
-    predicted = [problem.values + problem.uncertainty * each for each in (first, last)]
+    weighted = [each[: problem.values.size] for each in (first, last)]  # without tolerances
+    predicted = [problem.values + problem.uncertainty * each for each in weighted]
     return Fit(
         scenario=problem.scenario_at(x),
         parameters=table,
@@ -333,23 +336,23 @@ def save_fit(fit: Fit, folder: Path) -> list[str]:
         f"the stated uncertainty: {fit.start_misfit:.3g} with the start values, "
         f"{fit.misfit:.3g} fitted; 1 is a model that is right. Intervals are of 95 %, "
         "from the derivatives at the fitted values. Where the misfit exceeds 1, they are wider "
-        "by its root."
+        "by its root. The tolerance of a value counts as a measurement of it."
     )
     unknown = UNKNOWN.replace("\n", " ") if fit.parameters["low"].isna().any() else ""
-    paragraphs = [
-        f"# Fit of {fit.scenario.name}",
-        about,
-        fit.table.markdown(),
-        "\n".join(f"- {note}" for note in fit.notes),
-        unknown,
-        "![residuals](residuals.figure.svg)",
-        correlations.markdown(),
-        f"[{SCENARIO}]({SCENARIO}) has the fitted values.\n",
-    ]
-    write_whole(folder / README, "\n\n".join(filter(None, paragraphs)))
-    shown = {"fit": fit, "about": about, "unknown": unknown, "correlations": correlations}
-    write_whole(folder / PAGE, render("study/fit.html.jinja", **shown, scenario=SCENARIO))
-    return [PAGE, README, SCENARIO, *written]
+    pages = write_page(
+        folder,
+        PAGE,
+        title=f"Fit of {fit.scenario.name}",
+        about=about,
+        table=fit.table,
+        notes=fit.notes,
+        unknown=unknown,
+        figure="residuals.figure",
+        caption="predictions minus measurements",
+        second=correlations,
+        content="has the fitted values",
+    )
+    return [*pages, SCENARIO, *written]
 
 
 @figure_function

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +18,9 @@ from tetra_drake.files import read_bytes, write_whole
 from tetra_drake.formatting import Say
 from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.tolerances import variates_of
 from tetra_drake.settings.quantities import Quantity
-from tetra_drake.settings.section import value_at
+from tetra_drake.settings.section import Tree, value_at
 from tetra_drake.settings.units import given_quantity
 from tetra_drake.study.measurements import Measured
 from tetra_drake.study.sweep import with_joined_changes
@@ -47,6 +49,8 @@ class Parameter(NamedTuple):
     start: float
     least: float
     most: float
+    prior: float = math.inf
+    """Standard deviation about the start by the scenario's tolerances; infinite without one."""
 
     @property
     def scale(self) -> float:
@@ -86,7 +90,8 @@ def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -
     if not least <= start <= most:
         problem = f"found bounds {least:g} to {most:g} {unit}".rstrip()
         raise InputError(source, place, f"{problem}, expected them around the start, {start:g}")
-    parameter = Parameter(key, unit, float(start), least, most)
+    prior = _prior(scenario, values, separate(key))
+    parameter = Parameter(key, unit, float(start), least, most, prior)
     try:
         for bound in (least, most):  # a scenario may have limits of its own
             with_joined_changes(scenario, {key: parameter.value(bound)})
@@ -96,13 +101,24 @@ def parameter_of(scenario: Scenario, key: str, bounds: Bounds, source: object) -
     return parameter
 
 
+def _prior(scenario: Scenario, values: Tree, keys: Sequence[str]) -> float:
+    """Standard deviation of the number at `keys`, which all get the same value, by the tolerances
+    of the scenario; infinite if they have no tolerance in common. `values` is the scenario's
+    content."""
+    variates = variates_of(values, scenario.all_tolerances)
+    moves = [{each.deviations.get(key, 0.0) for key in keys} for each in variates]
+    squares = [move.pop() ** 2 for move in moves if len(move) == 1]
+    return math.sqrt(sum(squares)) or math.inf
+
+
 @dataclass(eq=False)
 class FitProblem:
     """Weighted residuals of a fit, and their derivatives by dimensionless parameters.
 
     A point `x` is an array (n,) of the parameters, each divided by its Parameter.scale. A weighted
-    residual is (predicted - measured) / uncertainty. All scenarios of an iteration are simulated in
-    parallel.
+    residual is (predicted - measured) / uncertainty. A tolerance counts as a measurement of its
+    parameter: its residual, (value - start) / standard deviation, comes after the others. All
+    scenarios of an iteration are simulated in parallel.
     """
 
     scenario: Scenario
@@ -124,6 +140,9 @@ class FitProblem:
         self.uncertainty = self.numbers["uncertainty"].to_numpy(dtype=float)
         # An evaluation has the predicted numbers of each measurement, then the clock's offset.
         self._clocks = np.cumsum([len(table) + 1 for table in tables]) - 1
+        self.start = np.array([each.start for each in self.parameters]) / self.scale
+        weights = self.scale / np.array([each.prior for each in self.parameters])
+        self.tolerances = np.diag(weights)[weights > 0.0]
         self._known: dict[str, np.ndarray] = {}
         self._kept = self.folder and self.folder / KEPT_EVALUATIONS
 
@@ -140,9 +159,8 @@ class FitProblem:
         return with_joined_changes(self.scenario, changes)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
-        """Weighted residuals (numbers,) at the point `x`: (predicted - measured) / uncertainty for
-        each measured number. The neighbours of the point, which the derivatives need, are simulated
-        at the same time."""
+        """Weighted residuals (numbers,) at the point `x`, also of the tolerances. The
+        neighbours of the point, which the derivatives need, are simulated at the same time."""
         before = self.evaluations
         self._evaluate([x, *self._neighbours(x, STEP)])
         residuals = self.residuals_at(x)
@@ -154,7 +172,7 @@ class FitProblem:
         """Weighted residuals (numbers,) at a point that was evaluated before; simulates nothing."""
         predicted = np.delete(self._known[self._name(x)], self._clocks)
         residuals: np.ndarray = (predicted - self.values) / self.uncertainty
-        return residuals
+        return np.append(residuals, self.tolerances @ (x - self.start))
 
     def clock_offsets(self, x: np.ndarray) -> dict[str, float]:
         """Time (s) by which the clock of each measurement is ahead of the simulated time, by the

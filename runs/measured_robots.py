@@ -1,0 +1,249 @@
+"""Simplex, spine and jumper of the page of measured robots: their shapes, forces, frequencies and
+jumps, without a fitted constant."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.command import Command
+from tetra_drake.robot.equilibrium import Unactuated
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.struts import axial_forces
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.study.equilibrium import study_equilibrium
+from tetra_drake.study.fit import Fit, fit_values
+from tetra_drake.study.measurements import Rest
+
+HERE = Path(__file__).parent / "measured"
+
+SOFTNESS = 0.717e-3 / 1.5e3
+"""Lengthening (m) of the simplex's struts per self-stress (N), as published; nearly linear."""
+SELF_STRESSES = {1.5: 2.54, 2.5: 3.04}
+"""Measured first frequency (Hz) of the simplex by its self-stress (kN)."""
+TUBE, GRAVITY = 2.63, 9.81
+"""Mass (kg) of a strut of the simplex, and acceleration of gravity (m/s²)."""
+VIBRATING = {"n0": 45.7, "n1": 45.7, "n2": 45.7, "n3": 50.3, "n4": 50.3, "n5": 50.3}
+"""Weights (N) at the nodes of the simplex in the tests of its frequency, half a strut included."""
+
+UPPER = ("n3", "n4", "n5")
+"""Upper nodes of the simplex, which are loaded."""
+HEIGHT_UNCERTAINTY = 2e-4
+"""Standard deviation (m) of a measured height."""
+
+SADDLE = ("horizontal_bottom", "horizontal_top", "saddle_bottom", "saddle_top")
+"""Cables of the spine, in the order of its measurements."""
+CENTRE = 0.0291
+"""Distance (m) of the spine's node c behind the origin of its pose."""
+FLOOR = 0.3
+"""Height (m) of the origin of the spine's poses in spine.yaml."""
+
+UNWOUND, RELEASED = 0.5816, 0.75
+"""Free lengths (m) of the jumper's actuators before it is wound up, and after the release."""
+WIND, HOLD = 5.5, 6.0
+"""Times (s) at which the jumper is wound up, and released."""
+SPRING_DAMPINGS = (2.0, 0.5)
+"""Damping of the jumper's springs in N s/m: NTRT's, and a quarter of it."""
+JUMPS = {0.2: "0.28 to 0.36", 0.3: "0.45 to 0.52", 0.4: "0.61 to 0.98", 0.46: "1.06 to 1.14"}
+"""Measured rise (m) of the jumper's centre by the share of UNWOUND that is wound up."""
+
+
+def in_the_air(name: str) -> Scenario:
+    """Scenario of a structure of HERE without ground."""
+    changes = {
+        "name": name,
+        "robot": f"!Structure {{file: {HERE / name}.yaml}}",
+        "terrain": "!Nothing {}",
+        "strut_contact": "!Nothing {}",
+    }
+    return load_scenario("prism").with_changes(changes)
+
+
+def structure_of(scenario: Scenario) -> StructureFile:
+    """Structure of a scenario that has one."""
+    structure = scenario.robot
+    assert isinstance(structure, StructureFile)
+    return structure
+
+
+def at_rest(robot: Robot) -> dict[str, np.ndarray]:
+    """Positions of the nodes at rest, in m."""
+    p_WN = node_positions(robot.structure, robot.structure.initial_state)
+    return dict(zip(robot.structure.node_names, p_WN, strict=True))
+
+
+# The simplex
+
+
+def lengthened(scenario: Scenario, lengthening: float) -> Scenario:
+    """A simplex with its struts lengthened, in m."""
+    structure = structure_of(scenario)
+    changes: dict[str, object] = {}
+    for a, b in structure.struts["tube"].pairs:
+        start, end = np.array(structure.nodes[a]), np.array(structure.nodes[b])
+        shift = 0.5 * lengthening * (end - start) / np.linalg.norm(end - start)
+        for node, place in ((a, start - shift), (b, end + shift)):
+            changes[f"robot.nodes.{node}"] = [f"{x!r} m" for x in place.tolist()]
+    return scenario.with_changes(changes)
+
+
+def compression(robot: Robot) -> float:
+    """Mean compression (N) of the struts of a simplex at rest."""
+    forces = axial_forces(robot.structure, Unactuated(robot.model), robot.equilibrium.state)
+    return float(-forces.mean())
+
+
+def stressed(
+    bare: Scenario, self_stress: float, *, first: float = 0.0, within: float = 0.1
+) -> tuple[Scenario, float]:
+    """A simplex whose struts bear a self-stress (N, to `within`) at rest, the effect of weight
+    included, and how much longer they are for that, in m; the search begins at `first`."""
+    lengthening, found = first, 0.0
+    if first:
+        found = compression(Robot.of(lengthened(bare, first)))
+    while abs(self_stress - found) > within:
+        lengthening += SOFTNESS * (self_stress - found)
+        scenario = lengthened(bare, lengthening)
+        found = compression(Robot.of(scenario))
+    return scenario, lengthening
+
+
+def simplex(self_stress: float) -> Scenario:
+    """The simplex with a self-stress (kN) in its struts."""
+    return stressed(in_the_air("simplex"), 1e3 * self_stress)[0]
+
+
+def simplex_under_load() -> pandas.DataFrame:
+    """Heights (mm) of the upper nodes and forces (kN) of the simplex by the load (kN) per upper
+    node: predicted and measured means, with the measured least and greatest."""
+    measured = pandas.read_csv(HERE / "simplex_loading.csv")
+    stressed = simplex(1.5)
+    measured["kind"] = measured["element"].str[:-1].where(measured["quantity"] != "height", "H")
+    rows = []
+    for _, of_step in measured[measured["quantity"] != "angle"].groupby("step"):
+        load = max(0.0, of_step["x"].mean())
+        force = ["0 N", "0 N", f"{-1e3 * load} N"]
+        loads = {f"robot.loads.{node}": force for node in UPPER}
+        robot = Robot.of(stressed.with_changes(loads))
+        study = study_equilibrium(robot)
+        tension = study.cables.groupby("group")["tension"].mean() / 1e3
+        predicted = {
+            "H": 1e3 * np.mean([at_rest(robot)[node][2] for node in UPPER]),
+            "CB": tension["bottom"],
+            "CT": tension["top"],
+            "CV": tension["vertical"],
+        }
+        row = {"load": load}
+        for kind, value in predicted.items():
+            values = of_step[of_step["kind"] == kind]["value"]
+            row |= {kind: value, f"{kind} measured": values.mean()}
+            row |= {f"{kind} least": values.min(), f"{kind} greatest": values.max()}
+        rows.append(row)
+    return pandas.DataFrame(rows)
+
+
+def simplex_heights(most_load: float = 1.01) -> list[Rest]:
+    """Measured mean heights of the upper nodes, up to a load (kN) per node, for a fit."""
+    measured = pandas.read_csv(HERE / "simplex_loading.csv")
+    heights = measured[measured["quantity"] == "height"]
+    cases = []
+    for _, of_step in heights.groupby("step"):
+        load = max(0.0, of_step["x"].mean())
+        if load > most_load:
+            continue
+        force = ["0 N", "0 N", f"{-1e3 * load} N"]
+        height = of_step["value"].mean() / 1e3
+        cases.append(
+            Rest(
+                changes={f"robot.loads.{node}": force for node in UPPER},
+                positions={f"{node} z": height for node in UPPER},
+                position_uncertainty=HEIGHT_UNCERTAINTY,
+            )
+        )
+    return cases
+
+
+def fitted_free_lengths(*groups: str) -> Fit:
+    """Free lengths of groups of the simplex's cables, fitted to its measured heights."""
+    bounds = {f"robot.cables.{group}.free_length": ("2035 mm", "2050 mm") for group in groups}
+    return fit_values(simplex(1.5), simplex_heights(), bounds)
+
+
+def vibrating(scenario: Scenario) -> Scenario:
+    """A simplex with the masses of the tests of its frequency."""
+    structure = structure_of(scenario)
+    tube = structure.struts["tube"]
+    density = TUBE / (math.pi * (tube.diameter / 2) ** 2 * structure.size)
+    changes = {"robot.struts.tube.density": f"{density!r} kg/m^3"}
+    for node, weight in VIBRATING.items():
+        changes[f"robot.masses.{node}"] = f"{weight / GRAVITY - TUBE / 2!r} kg"
+    return scenario.with_changes(changes)
+
+
+def simplex_frequency(self_stress: float) -> float:
+    """First natural frequency (Hz) of the simplex. The self-stress is in kN."""
+    return float(study_equilibrium(vibrating(simplex(self_stress))).frequencies[0])
+
+
+# The spine
+
+
+def pose(scenario: Scenario) -> list[float]:
+    """Pose of the spine's vertebra at rest: x and y in m, and the angle in rad."""
+    nodes = at_rest(Robot.of(scenario))
+    along = nodes["f"] - nodes["c"]
+    origin = nodes["c"] + CENTRE * along / np.linalg.norm(along)
+    return [origin[0], origin[2] - FLOOR, math.atan2(along[2], along[0])]
+
+
+def spine_poses() -> pandas.DataFrame:
+    """Poses of the spine's vertebra for each measured set of cable lengths: predicted ones, wanted
+    ones by the authors' statics, and ones that their camera measured; in m and rad."""
+    table, scenario = pandas.read_csv(HERE / "spine_poses.csv"), in_the_air("spine")
+    poses = []
+    for lengths in table[["l1_m", "l2_m", "l3_m", "l4_m"]].to_numpy().tolist():
+        named = zip(SADDLE, lengths, strict=True)
+        changes = {f"robot.cables.{cable}.free_length": f"{x!r} m" for cable, x in named}
+        poses.append(pose(scenario.with_changes(changes)))
+    table[["predicted_x_m", "predicted_y_m", "predicted_rad"]] = poses
+    return table
+
+
+# The jumper
+
+
+def jump(*, share: float, damping: float) -> tuple[float, float]:
+    """Rise (m) of the jumper's centre, and the least distance (m) of two rods' axes.
+
+    The actuators are wound up slowly by a share of UNWOUND and let go at once. The damping of the
+    springs is in N s/m.
+    """
+    scenario = load_scenario(str(HERE / "jump.yaml"))
+    scenario = scenario.with_changes({"robot.cables.spring.damping": f"{damping} N*s/m"})
+    command = wound_up(scenario, share)
+    result = simulate(scenario, command=command, record=True)
+    return rise_of(result), result.metrics.clearance
+
+
+def wound_up(scenario: Scenario, share: float) -> Command:
+    """Command that winds the actuators up by a share of UNWOUND and releases them."""
+    times = np.arange(0.0, scenario.simulation.duration, 0.01)
+    wound = UNWOUND * (1.0 - share * np.minimum(times / WIND, 1.0))
+    free_length = np.where(times < HOLD, wound, RELEASED)
+    return Command("wound up and released", 0.01, np.tile(free_length[:, np.newaxis], 3))
+
+
+def rise_of(result: SimulationResult) -> float:
+    """Rise (m) of the jumper's centre after the release."""
+    assert result.trajectory is not None
+    height = result.trajectory.p_WB.sel(axis="z").mean("body")
+    rise = height.sel(time=slice(HOLD, None)).max() - height.sel(time=HOLD, method="nearest")
+    return float(rise)

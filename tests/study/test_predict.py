@@ -1,0 +1,135 @@
+"""Predictions with intervals, against what tolerances give by hand."""
+
+import json
+import math
+
+import numpy as np
+import pandas
+import pytest
+from helpers.anchored import HUNG, scenario_of
+
+import tetra_drake as td
+from tetra_drake.cli import main
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.study.predict import predict
+
+STIFFNESS, MASS = "robot.cables.line.stiffness", "robot.masses.b"
+WIDTH_90, BAR_MASS = 1.6449, math.pi * 0.004**2 * 0.2 * 1200.0
+
+
+def hung(**tolerances) -> Scenario:
+    """A bar with a mass at each end on one spring, with tolerances of the robot's numbers."""
+    return scenario_of(HUNG | {"tolerances": tolerances})
+
+
+def bounce(robot: StructureFile) -> float:
+    mass = sum(robot.masses.values()) + BAR_MASS
+    return math.sqrt(robot.cables["line"].stiffness / mass) / (2.0 * math.pi)
+
+
+def test_a_mass_on_a_spring_has_the_interval_and_the_shares_of_its_formula():
+    frequencies = [f"frequency {mode}" for mode in range(1, 6)]
+    both = hung(**{"cables.line.stiffness": "2 %", "masses.b": "4 % uniform"})
+    found = predict(both, frequencies, draws=150)
+    is_bounce = np.isclose(found.quantities["nominal"], bounce(both.robot), rtol=1e-6)
+    (mode,) = found.quantities.index[is_bounce]
+    mass = sum(both.robot.masses.values()) + BAR_MASS
+    parts = np.array([0.01, 0.02 / math.sqrt(3.0) * 0.3 / mass]) ** 2  # half of relative errors
+    shares = found.shares.loc[mode]
+    assert shares[STIFFNESS] == pytest.approx(parts[0] / parts.sum(), abs=5e-3)
+    assert shares[MASS] == pytest.approx(parts[1] / parts.sum(), abs=5e-3)
+    assert shares["rest"] < 1e-3
+    alone = predict(hung(**{"cables.line.stiffness": "2 %"}), [mode], draws=150)
+    median, low, high = alone.quantities.loc[mode, ["median", "low", "high"]]
+    assert median == pytest.approx(bounce(both.robot), rel=1e-3)
+    assert (high - low) / (2.0 * WIDTH_90 * median) == pytest.approx(0.01, rel=0.02)
+
+
+def test_numbers_of_one_key_vary_together_or_each_alone_and_struts_get_longer():
+    pair = ["tension side n0 n3", "tension side n1 n4"]
+    prism, key = load_scenario("prism"), "cables.side.stiffness"
+    known = [prism.with_changes({"robot.tolerances": {key: size}}) for size in ("2 %", "2 % each")]
+    together, alone = (predict(each, pair, draws=20).draws for each in known)
+    assert together[pair[0]].to_list() == pytest.approx(together[pair[1]].to_list(), rel=1e-6)
+    assert not np.allclose(alone[pair[0]], alone[pair[1]], rtol=1e-4)
+
+    def length(study):
+        a, b = study.robot.scenario.robot.struts["bar"].pairs[0]
+        return np.linalg.norm(np.subtract(*study.nodes.loc[[a, b], ["x", "y", "z"]].to_numpy()))
+
+    scenario = prism.with_changes({"robot.tolerances": {"struts.bar.length": "1 mm uniform"}})
+    row = predict(scenario, {"length": length}, draws=40).quantities.iloc[0]
+    assert [row["low"], row["high"]] == pytest.approx(
+        row["nominal"] + np.array([-9e-4, 9e-4]), abs=2e-5
+    )
+
+
+def test_a_tolerance_in_a_text_is_one_of_the_section_and_is_kept():
+    given = {"robot.cables.side.stiffness": "110 N/m ± 2 % uniform"}
+    given |= {"ground.stiffness": "9 kN/m +/- 1 kN/m"}
+    scenario = load_scenario("prism").with_changes(given)
+    assert scenario.robot.tolerances["cables.side.stiffness"].law == "uniform"
+    assert scenario.robot.cables["side"].stiffness == 110.0
+    assert [*scenario.all_tolerances] == ["robot.cables.side.stiffness", "ground.stiffness"]
+    text = dump_scenario(scenario)
+    assert Scenario.from_tree(parse_yaml(text, "x"), "x") == scenario
+    assert "tolerances" not in dump_scenario(load_scenario("prism"))
+
+
+def test_draws_without_result_are_counted_and_the_same_seed_gives_the_same(tmp_path, capsys):
+    scenario = load_scenario("prism").with_changes(
+        {"robot.tolerances": {"cables.side.stiffness": "90 %"}}
+    )
+    first, again = (predict(scenario, ["n3 z"], draws=12, seed=1) for _ in range(2))
+    pandas.testing.assert_frame_equal(first.draws, again.draws)
+    failed = int((first.draws["failure"] != "").sum())
+    assert 0 < failed < 12 and first.quantities["draws"].to_list() == [12 - failed]
+    assert any(note.startswith(f"{failed} of 12 draws have no result") for note in first.notes)
+    file = tmp_path / "my.yaml"
+    file.write_text("base: prism\ntolerances: {robot.cables.side.stiffness: 2 %}\n")
+    assert main(["predict", str(file), "--draws", "9", "--out", str(tmp_path / "out")]) == 0
+    assert "tension side" in capsys.readouterr().out
+    table = pandas.read_csv(tmp_path / "out/predictions.csv", index_col="quantity")
+    assert table.loc["tension side", "low"] < table.loc["tension side", "high"]
+    assert json.loads((tmp_path / "out/summary.json").read_text())["draws"] == 9
+    assert "tension side" in (tmp_path / "out/predict.html").read_text()
+
+
+def test_draws_are_simulated_with_a_gait():
+    changes = {"tolerances": {"ground.stiffness": "20 %"}, "simulation.duration": "2 s"}
+    scenario = load_scenario("prism").with_changes(changes)
+    measures = {"way": "distance", "own": lambda result: result.metrics.distance}
+    draws = predict(scenario, measures, gait=td.seeded_gait(scenario, 1), draws=8).draws
+    assert draws["way"].nunique() == 8 and draws["way"].equals(draws["own"])
+
+
+@pytest.mark.parametrize(
+    ("key", "given", "problem"),
+    [
+        ("struts.bar.length", "100 %", "smaller than the number"),
+        ("struts.bar.length", "1 m", "smaller than the number"),
+        ("cables.line.stiffness", "-2 %", "0 or more"),
+        ("cables.line.stiffness", 5, "N/m"),
+        ("cables.line.stiff", "2 %", "did you mean 'cables.line.stiffness'"),
+        ("cables.line", "2 %", "several units"),
+        ("nodes", "2 % of", "converts to m"),
+    ],
+)
+def test_a_tolerance_that_fits_no_number_is_refused(key, given, problem, refused):
+    with refused("scenario anchored", f"robot.tolerances.{key}", problem):
+        hung().with_changes({"robot.tolerances": {key: given}})
+
+
+def test_no_tolerance_no_draw_and_no_such_quantity_are_refused(refused):
+    with refused("scenario anchored", "tolerances", "found none"):
+        predict(hung(), ["frequency 1"])
+    known = hung(**{"masses": "2 % each"})
+    for key, arguments in {"draws": {"draws": 0}, "quantities": {"quantities": []}}.items():
+        with refused("predict", key):
+            predict(known, **({"quantities": ["frequency 1"]} | arguments))
+    for name in ("tension lines", "speed"):
+        with refused("predict", f"quantities.{name}"):
+            predict(known, [name])
