@@ -343,8 +343,8 @@ predictions are in [blind.csv](blind.csv). Its SHA-256 is `{hash}`.
 ### Hexagonal prism
 
 Six carbon tubes and eighteen strings, free. There are nine modes below 14 Hz, and the next is above
-20 Hz. Modes 1 to 7 follow infinitesimal mechanisms. Their stiffness comes from the tension, which is
-from the authors' theory; modes 8 and 9 stretch the strings.
+20 Hz. Modes 1 to 7 follow infinitesimal mechanisms. Their stiffness comes from the tension, which
+is from the authors' theory. Modes 8 and 9 stretch the strings.
 
 {blind_prism}
 
