@@ -15,7 +15,7 @@ import pandas
 
 from tetra_drake import __version__
 from tetra_drake.engines.engine import engine_of
-from tetra_drake.engines.simulate import Outcome, simulate_many
+from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.figures.style import (
     OKABE_ITO,
@@ -172,10 +172,10 @@ def predict(
         scenario: a scenario, its name or file, or a run.
         quantities: names; or measures by names of your choice. A measure is a name, or a function
             to a number from the SimulationResult of a draw if there is a gait or a command, with
-            its trajectory; else from its EquilibriumStudy. Names: a metric, such as "speed", of a
-            gait or command; "n3 z", a coordinate at rest; "frequency 1"; and a column of the tables
-            of study_equilibrium() with a node, a cable or a group of cables, which gives the mean:
-            "tension side", "length side n0 n3", "load n0".
+            its trajectory; else from its EquilibriumStudy. Names with a gait or a command: metrics,
+            such as "speed". Names at rest: "n3 z", a coordinate; "frequency 1"; and a column of the
+            tables of study_equilibrium() with a node, a cable or a group of cables, which gives the
+            mean: "tension side", "length side n0 n3", "load n0".
         gait: a gait, its file, or a run (its best gait). All draws are simulated side by side.
         command: a command for the actuators in place of a gait.
         draws: number of draws.
@@ -297,52 +297,50 @@ def _values(
     workers: int | None,
 ) -> list[list[float] | Exception]:
     """Values of the measures for each scenario, NaN if not finite; or why there are none."""
-    is_still = driver is None or not all(callable(m) or m in METRICS for m in measures.values())
-    known: list[Robot | EquilibriumStudy | InputError] = []
+    found: list[Any] = []
     for each in scenarios:
         try:
             if isinstance(each, InputError):
                 raise each
             robot = Robot.of(each, at_rest=driver is None)
-            known.append(study_equilibrium(robot) if is_still else robot)
+            found.append(study_equilibrium(robot) if driver is None else each)
         except InputError as error:
-            known.append(error)
-    outcomes: Mapping[int, Outcome] = {}
-    if driver is not None:
-        able = {i: s for i, s in enumerate(scenarios) if not isinstance(known[i], InputError)}
-        record = any(map(callable, measures.values()))
-        moving = [each for each in able.values() if isinstance(each, Scenario)]
-        moved = simulate_many(moving, [driver] * len(able), record=record, workers=workers)
-        outcomes = dict(zip(able, moved, strict=True))
-    found: list[list[float] | Exception] = []
-    for place, one in enumerate(known):
-        try:
-            values = [_value(one, outcomes.get(place), each) for each in measures.values()]
-            found.append([value if math.isfinite(value) else math.nan for value in values])
-        except (InputError, SimulationFailure) as error:
             found.append(error)
+    if driver is not None:
+        able = {i: each for i, each in enumerate(found) if isinstance(each, Scenario)}
+        record = any(map(callable, measures.values()))
+        drivers = [driver] * len(able)
+        moved = simulate_many([*able.values()], drivers, record=record, workers=workers)
+        for place, outcome in zip(able, moved, strict=True):
+            found[place] = outcome
+    for place, outcome in enumerate(found):
+        try:
+            values = [_value(outcome, each) for each in measures.values()]
+            found[place] = [value if math.isfinite(value) else math.nan for value in values]
+        except (InputError, SimulationFailure) as error:
+            found[place] = error
     return found
 
 
 def _value(
-    known: Robot | EquilibriumStudy | InputError, outcome: Outcome | None, measure: Measure
+    outcome: EquilibriumStudy | SimulationResult | InputError | SimulationFailure, measure: Measure
 ) -> float:
     """Value of a measure in SI. Raises InputError for an unknown name, and the error or the failure
     where there is no result."""
-    for one in (known, outcome):
-        if isinstance(one, Exception):
-            raise one
+    if isinstance(outcome, Exception):
+        raise outcome
     if not isinstance(measure, str):
-        return float(measure(outcome or known))
-    if isinstance(outcome, SimulationResult) and measure in METRICS:
-        return float(getattr(outcome.metrics, measure))
-    values = values_at_rest(known) if isinstance(known, EquilibriumStudy) else {}
-    if measure.startswith("frequency "):
-        return values.get(measure, math.nan)
+        return float(measure(outcome))
+    if isinstance(outcome, SimulationResult):
+        values = {name: getattr(outcome.metrics, name) for name in METRICS}
+    else:
+        values = values_at_rest(outcome)
+        if measure.startswith("frequency "):
+            return values.get(measure, math.nan)
     if measure not in values:
         what = "needs a gait or a command" if measure in METRICS else "is unknown"
         raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, values)}")
-    return values[measure]
+    return float(values[measure])
 
 
 def values_at_rest(study: EquilibriumStudy) -> dict[str, float]:
