@@ -64,9 +64,9 @@ PILLAR, MARGIN = 0.1, 0.15
 """Radius of pillars, and distance from them that costs nothing, in m."""
 PENALTY = 10.0
 """Cost per metre of reaching into a pillar or its margin, at the worst time of the horizon."""
-SLALOM = [(1.2, 0.0), (2.7, 0.0), (4.2, 0.0)]
+SLALOM = [(1.2, 0.0), (3.0, 0.0), (4.8, 0.0)]
 """Pillars of the slalom."""
-SLALOM_WAY = [(1.2, 0.8), (2.7, -0.8), (4.2, 0.8), (5.4, 0.0)]
+SLALOM_WAY = [(1.2, 0.8), (3.0, -0.8), (4.8, 0.8), (6.0, 0.0)]
 """Points that the rover has to pass, the last one the goal."""
 SLOPES = ((0, 0.5), (10, 0.5), (20, 0.5), (24, 0.5), (28, 0.8), (32, 0.8))
 """Slopes in degrees, and the coefficients of friction there. The scenario has 0.5."""
@@ -368,7 +368,7 @@ def film(result: SimulationResult, pillars: Sequence[Sequence[float]], file: Pat
         axes.plot(
             *seen[structure.struts].transpose(2, 1, 0), color="black", linewidth=1.8, zorder=3
         )
-        axes.set(xlim=(-0.6, 6.0), ylim=(-1.2, 1.27), aspect="equal")
+        axes.set(xlim=(-0.5, 6.5), ylim=(-1.2, 1.42), aspect="equal")
         axes.set_axis_off()
         canvas.draw()
         picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
