@@ -1,6 +1,6 @@
 """Planning: a rover rolls to a goal, steered by the planner with a cost of one's own."""
 
-# %% Each second the planner simulates 64 motions of 2 s, and takes those that end near the goal.
+# %% Every half second the planner simulates 64 motions of 2 s. Those that end near the goal count.
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from tetra_drake.robot.readings import Readings
 
 engine = "!Compiled {tolerance: 10 mm/s, max_step: 10 ms}"
 rover = td.load_scenario("rover").with_changes({"engine": engine, "simulation.duration": "8 s"})
-goal = np.array([0.0, 2.0])
+goal = np.array([2.0, 0.5])
 
 
 def distance(readings: Readings) -> np.ndarray:
@@ -19,7 +19,7 @@ def distance(readings: Readings) -> np.ndarray:
     return np.asarray(np.linalg.norm(centre - goal, axis=1))
 
 
-# %% The robot could as well be on another engine, or be disturbed. The plan acts 1 s late.
+# %% The robot could as well be on another engine, or be disturbed. A plan acts half a second late.
 planner = td.Planner(
     rover,
     distance,
@@ -28,16 +28,16 @@ planner = td.Planner(
     noise=1.0,
     temperature=0.1,
     control_period=0.1,
-    decision_period=1.0,
+    decision_period=0.5,
     delayed=True,
 )
 result = td.simulate(rover, controller=planner, control_period=0.1)
 path = result.path.centre[:, :2]
 print(f"{planner}; {np.linalg.norm(path[-1] - goal):.2f} m from the goal")
 
-figure = Figure(figsize=(5.0, 5.0), layout="constrained")
+figure = Figure(figsize=(7.0, 3.0), layout="constrained")
 axes = figure.subplots(subplot_kw={"xlabel": "x (m)", "ylabel": "y (m)", "aspect": "equal"})
 axes.plot(*path.T, label="centre of the rover")
 axes.plot(*goal, "o", label="goal")
-axes.legend()
+axes.legend(loc="lower right")
 figure.savefig(f"{Path(__file__).stem}.png", dpi=120)
