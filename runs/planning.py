@@ -181,7 +181,12 @@ class Turn:
 Task = Way | Ahead | Turn
 Record = dict[str, Any]
 """Record of an episode; see recorded()."""
-PLANTS = {"compiled": "!Compiled", "MuJoCo": "!MuJoCo", "diagram": "!Drake"}
+PLANTS: Mapping[str, Mapping[str, Any]] = {
+    "compiled": {"engine": "!Compiled"},
+    "MuJoCo": {"engine": "!Mujoco", "friction.stiffness": "0 N/m"},  # it has no bristles
+    "diagram": {"engine": "!Drake"},
+}
+"""Changes of the scenario by the robot's engine."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +214,7 @@ class Episode:
         changes = {"simulation.steady_from": "0 s", "simulation.duration": f"{self.most} s"}
         changes |= self.changes
         scenario = load_scenario(self.base).with_changes(changes)
-        plant = scenario.with_changes({"engine": PLANTS[self.plant]})
+        plant = scenario.with_changes(PLANTS[self.plant])
         if self.draw is not None:
             plant = plant.with_sections(disturbances=default_disturbances(plant))
             plant = disturbed(plant, fresh_draws(plant, 0, self.draw + 1)[self.draw])
