@@ -508,7 +508,9 @@ def costs_table(groups: Mapping[str, Sequence[Record]]) -> TextTable:
     """CPU of the decisions, and the share that two cores make in time."""
     rows, limit = [], CORES * PLANNING["decision_period"]
     for name, records in groups.items():
-        cpu = np.concatenate([record["cpu"] for record in records] or [[math.nan]])
+        if not records:
+            continue
+        cpu = np.concatenate([record["cpu"] for record in records])
         low, high = np.percentile(cpu, [50, 95])
         kept = f"{100.0 * np.mean(cpu <= limit):.1f} %"
         rows.append([name, f"{cpu.size}", fixed(low), fixed(high), fixed(cpu.max()), kept])
@@ -555,8 +557,8 @@ centre. The work is what the winches give; they recover none.
 Pillars are a part of the cost, not of the simulation: the cost is the way to the goal around
 them, by a map, and the circle around the rover should stay 0.15 m away. With the straight
 distance in place of the way, the rover stays behind a pillar in two of two courses. In the
-slalom the goal is the next of four places. *Least clearance*: least
-distance of the circle from a pillar; a negative one means that the circle reached into it.
+slalom the goal is the next of four places. *Least clearance*: least distance of the circle from a
+pillar; a negative one means that the circle reached into it.
 
 {courses}
 
