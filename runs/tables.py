@@ -76,6 +76,12 @@ MEASURED = {
 }
 """Figures of the folder `measured`, with what they show."""
 
+PLANNED = {
+    "goals": "twenty goals, on three robots",
+    "courses": "courses with pillars",
+}
+"""Figures of the folder `planning`, with what they show."""
+
 FAR = 5.0
 """Distance (in) from which a gait walks; of less, a difference in percent says little."""
 
@@ -253,7 +259,8 @@ def gallery_page(runs: Runs) -> str:
     source = read_text(HERE / f"{GALLERY}.jinja", "template")
     template = jinja2.Template(source, autoescape=True, keep_trailing_newline=True)
     bests = best_of_all(runs)
-    return template.render(bests=bests, replay=REPLAY, picture=PICTURE, measured=MEASURED)
+    figures = {"measured": MEASURED, "planned": PLANNED}
+    return template.render(bests=bests, replay=REPLAY, picture=PICTURE, **figures)
 
 
 def trials_table(name: str, runs: Runs) -> str:

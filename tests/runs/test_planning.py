@@ -1,0 +1,28 @@
+"""The script of the planned rover: it continues after an interruption, and writes its page."""
+
+import json
+
+import numpy as np
+import planning
+import pytest
+
+
+def test_an_interrupted_script_runs_what_is_left_and_writes_its_page(tmp_path, monkeypatch):
+    short = {"samples": 4, "horizon": 0.5, "knots": 2}
+    monkeypatch.setattr(planning, "PLANNING", planning.PLANNING | short)
+    ways = [planning.Way([(0.0, 0.0)], planning.SLALOM), planning.Way([(3.0, 0.0)])]
+    groups, episodes = ("courses", "goals, MuJoCo"), []
+    for group, way in zip(groups, ways, strict=True):
+        episodes.append(planning.Episode(group, "a", lambda way=way: way, most=0.2))
+    planning.run_all(episodes[:1], tmp_path)
+    records = tmp_path / planning.RECORDS
+    first = records.read_text()
+    records.write_text(first + first[:20])  # a line that was cut off
+    planning.run_all(episodes, tmp_path)
+    assert records.read_text().startswith(first) and len(records.read_text().splitlines()) == 2
+    done, late = map(json.loads, records.read_text().splitlines())
+    assert done["is_done"] and done["time"] == pytest.approx(0.1) and not late["is_done"]
+    planning.write_page(tmp_path)
+    assert "1 of 10 (courses)" in (tmp_path / planning.PAGE_NAME).read_text()
+    nodes = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
+    assert planning.clearance(nodes, [(2.0, 0.0), (0.0, 5.0)]) == pytest.approx(1.4)
