@@ -1,8 +1,7 @@
-"""Batches: robots that pause, go on, are copied and replaced, on all engines."""
+"""Batches: robots that pause, go on, and are replaced, on all engines."""
 
 import numpy as np
 import pytest
-import xarray
 from helpers.converged import shortly
 
 from tetra_drake.engines.engine import engine_of
@@ -11,9 +10,6 @@ from tetra_drake.robot.command import controlled_robot, driven_robot
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.scenario.scenario import Scenario
-
-ERRORS = {"!Compiled": 0.0, "!Drake": 1e-4, "!Mujoco": 1e-9}
-"""Largest difference (m) of a copy from its original: its integrator begins anew."""
 
 
 @pytest.fixture
@@ -32,33 +28,6 @@ def held(scenario: Scenario) -> DrivenRobot:
 def walking(scenario: Scenario) -> DrivenRobot:
     """A robot with a gait."""
     return driven_robot(scenario, seeded_gait(scenario, 1))
-
-
-@pytest.mark.parametrize("drive", [held, walking])
-def test_a_copy_goes_on_as_its_original(short, engine, drive):
-    robot, error = drive(short), ERRORS[engine]
-    batch = engine_of(short).start([robot, robot], record=True, threads=2)
-    signals = np.array([[2.0], [-3.0]]) * np.ones(robot.robot.structure.signals)
-
-    def go_on(until: float, rows: list[int]) -> None:
-        batch.advance(until, signals[rows] if drive is held else None)
-
-    go_on(0.06, [0, 1])
-    if drive is walking:
-        batch.advance(np.array([0.1, 0.0]))
-    assert batch.readings.time[0] == pytest.approx(0.06 if drive is held else 0.1)
-    assert np.abs(np.subtract(*batch.readings.p_WN)).max() > 1e-4
-    batch.copy(0, 1)
-    batch.copy(1, 1)
-    go_on(0.14, [1, 1])
-    go_on(np.inf, [0, 0])
-    original, copy = batch.readings.p_WN
-    np.testing.assert_allclose(copy, original, rtol=0.0, atol=error)
-    results = [batch.result(place) for place in range(2)]
-    assert results[0].metrics.distance == pytest.approx(results[1].metrics.distance, abs=error)
-    for name in ("p_WN", "signal"):
-        pair = [result.trajectory[name] for result in results]
-        xarray.testing.assert_allclose(*pair, rtol=0.0, atol=max(error, 1e-12))
 
 
 def test_a_place_is_used_again_and_a_failure_stays_in_its_place(short):

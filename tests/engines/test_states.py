@@ -97,7 +97,7 @@ def short() -> Scenario:
     return shortly(load_scenario("quick"), 0.2)
 
 
-def test_states_are_values_and_a_damaged_file_is_refused(short, tmp_path):
+def test_states_are_values_and_a_damaged_file_is_refused(short, tmp_path, refused):
     simulation, path, pages = Simulation(short, count=3), tmp_path / "states.npz", 0
     go(simulation, range(2))
     states = simulation.save(history=True)
@@ -117,6 +117,12 @@ def test_states_are_values_and_a_damaged_file_is_refused(short, tmp_path):
             assert str(error).startswith(f"{path}: ") and "\n" not in str(error)
             pages += 1
     assert pages > 100
+    states[0].save_npz(path)
+    with np.load(path) as file:
+        tables = dict(file)
+    np.savez(path, **tables | {"held": tables["held"] + 1.0})
+    with refused(path, "", "digest"):
+        States.load(path)
 
 
 WRONG = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
@@ -22,6 +23,9 @@ from tetra_drake.robot.structure import Structure
 if TYPE_CHECKING:
     import xarray
 
+
+Tables = Mapping[str, np.ndarray]
+"""Tables of numbers by name."""
 
 _SAME_TIME = 1e-9
 """Largest difference (s) of two times that are the same except for rounding."""
@@ -140,12 +144,6 @@ class Batch:
         self.has_history[place] = True
         self._actions[place] = math.inf if pilot is None else pilot.acts_after(0.0)
 
-    def _copy_instants(self, place: int, to: int) -> None:
-        """Makes the same happen to the robot in place `to` as to the one in `place`."""
-        self._phases[to], self._pilots[to] = self._phases[place], self._pilots[place]
-        self._events[to], self._actions[to] = self._events[place], self._actions[place]
-        self.has_history[to] = self.has_history[place]
-
     def _pass_events(self) -> None:
         """Changes the robots that are at the time of an event."""
         for place in self._places_at(self._events):
@@ -206,11 +204,6 @@ class Batch:
     def _result(self, place: int) -> SimulationResult:
         raise NotImplementedError
 
-    def copy(self, place: int, to: int) -> None:
-        """Replaces the robot in place `to` by a copy of the one in `place`. Both continue
-        independently."""
-        raise NotImplementedError
-
     def change(self, place: int, driven: DrivenRobot) -> None:
         """Lets the robot in a place go on as `driven`, which differs from it only by more events of
         its scenario, from now on."""
@@ -231,18 +224,18 @@ class Batch:
         saved["phases_left"] = np.array([len(self._phases[place]) for place in places])
         for name, table in self.readings._asdict().items():
             saved[f"readings.{name}"] = table[places]
-        if not history:
-            return saved
-        motions = [self.motion(place) if self.readings.time[place] else None for place in places]
-        kept = saved["history.kept"] = np.array([len(m.times) if m else 0 for m in motions])
-        for row, motion in enumerate(motions):
-            for name, table in vars(motion).items() if motion else ():
-                if table is not None:
-                    shape = len(places), kept.max(), *table.shape[1:]
-                    saved.setdefault(f"history.{name}", np.zeros(shape))[row, : kept[row]] = table
+        motions = [self.motion(place) for place in places] if history else []
+        if motions:
+            kept = saved["history.kept"] = np.array([len(motion.times) for motion in motions])
+            for name, first in vars(motions[0]).items():
+                if first is not None:
+                    table = np.zeros((len(places), kept.max(), *first.shape[1:]))
+                    for row, motion in enumerate(motions):
+                        table[row, : kept[row]] = getattr(motion, name)
+                    saved[f"history.{name}"] = table
         return saved
 
-    def restore(self, places: Sequence[int], saved: Mapping[str, np.ndarray]) -> None:
+    def restore(self, places: Sequence[int], saved: Tables) -> None:
         """Puts robots into states of save(). Places must have the same robots, which have not
         failed."""
         for place, left in zip(places, saved["phases_left"].tolist(), strict=True):
@@ -253,15 +246,14 @@ class Batch:
                 self._phases[place], self._events[place] = phases, _next_event(phases)
         for name, table in self.readings._asdict().items():
             table[places] = saved[f"readings.{name}"]
-        motions: list[Motion | None] = [None] * len(places)
+        self._restore(places, saved)
         self.has_history[places] = "history.kept" in saved
-        if "history.times" in saved:
-            tables = {name[8:]: saved[name] for name in saved if name.startswith("history.")}
-            kept = tables.pop("kept")
-            for row, count in enumerate(kept.tolist()):
-                own = {name: table[row, :count].copy() for name, table in tables.items()}
-                motions[row] = Motion(**own) if count else None
-        self._restore(places, saved, motions)
+        fields = [field.name for field in dataclasses.fields(Motion)]
+        tables = {name: saved[f"history.{name}"] for name in fields if f"history.{name}" in saved}
+        for row, place in enumerate(places if tables else ()):
+            known = slice(saved["history.kept"][row])
+            motion = Motion(**{name: table[row, known].copy() for name, table in tables.items()})
+            self._remember(place, motion)
 
     def assume(self, place: int, time: float, readings: Readings) -> None:
         """Puts the robot in a place into the motion of other readings at a time (s). Its actuators
@@ -277,13 +269,12 @@ class Batch:
         """The engine's own tables for save()."""
         raise NotImplementedError
 
-    def _restore(
-        self,
-        places: Sequence[int],
-        saved: Mapping[str, np.ndarray],
-        motions: Sequence[Motion | None],
-    ) -> None:
-        """Puts robots into the states of the tables, with their motions so far, if known."""
+    def _restore(self, places: Sequence[int], saved: Tables) -> None:
+        """Puts robots into the states of the engine's own tables, without their motions before."""
+        raise NotImplementedError
+
+    def _remember(self, place: int, motion: Motion) -> None:
+        """Gives a restored robot its motion before."""
         raise NotImplementedError
 
     def stop(self, place: int) -> float:
@@ -315,9 +306,6 @@ class LoneRobot(Protocol):
     def result(self) -> SimulationResult:
         """The result at the end of the simulation."""
 
-    def copied(self) -> Self:
-        """Copy of the simulation, which continues independently."""
-
     def become(self, robot: Robot, p_BC: np.ndarray) -> Self:
         """The simulation that continues with another robot in place of this one; see
         Batch._become()."""
@@ -328,8 +316,11 @@ class LoneRobot(Protocol):
     def numbers(self) -> dict[str, np.ndarray]:
         """The state of the simulation, as arrays by name."""
 
-    def restore(self, numbers: Mapping[str, np.ndarray], motion: Motion | None) -> None:
-        """Puts the simulation into a state of numbers(), with the motion so far, if known."""
+    def restore(self, numbers: Tables) -> None:
+        """Puts the simulation into a state of numbers(), without the motion before."""
+
+    def remember(self, motion: Motion) -> None:
+        """Gives a restored simulation its motion before."""
 
 
 class SerialBatch(Batch):
@@ -400,16 +391,13 @@ class SerialBatch(Batch):
         saved = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         return saved | {"reached": self._reached[places]}
 
-    def _restore(
-        self,
-        places: Sequence[int],
-        saved: Mapping[str, np.ndarray],
-        motions: Sequence[Motion | None],
-    ) -> None:
+    def _restore(self, places: Sequence[int], saved: Tables) -> None:
         for row, place in enumerate(places):
-            numbers = {name: table[row] for name, table in saved.items()}
-            self._robot_in(place).restore(numbers, motions[row])
-            self._reached[place] = saved["reached"][row]
+            self._robot_in(place).restore({name: table[row] for name, table in saved.items()})
+        self._reached[places] = saved["reached"]
+
+    def _remember(self, place: int, motion: Motion) -> None:
+        self._robot_in(place).remember(motion)
 
     def ended(self, place: int) -> bool:
         is_over = self.failures[place] is not None or self._reached[place] >= self._ends[place]
@@ -417,14 +405,6 @@ class SerialBatch(Batch):
 
     def _result(self, place: int) -> SimulationResult:
         return self._robot_in(place).result()
-
-    def copy(self, place: int, to: int) -> None:
-        robot = self._robots[place]
-        self._robots[to] = None if robot is None else robot.copied()
-        self._copy_instants(place, to)
-        self.failures[to] = self.failures[place]
-        self._reached[to], self._ends[to] = self._reached[place], self._ends[place]
-        self.readings.put(to, self.readings.rows(place))
 
     def stop(self, place: int) -> float:
         robot, self._robots[place] = self._robots[place], None

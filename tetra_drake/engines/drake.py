@@ -69,6 +69,8 @@ _FEW, _RATE_PER_SQUARE = 12, 14.0
 second one, both schemes take equally long for rows of 25 tetrahedra."""
 _FINEST, _COARSEST = 2e-5, 5e-3
 """Smallest and largest default of the target accuracy; see MakeSimulator()."""
+_WORK = ("steps", "derivative_evaluations", "jacobian_evaluations")
+"""Counts of the integrator's work; fields of IntegratorWork."""
 
 
 class DrakeEngine(Engine):
@@ -154,32 +156,18 @@ class _DiagramRobot(LoneRobot):
             ground_forces=table("ground", "ground_forces", GROUND_FORCE_COLUMNS),
         )
 
-    def copied(self) -> _DiagramRobot:
-        robot = self.driven.robot
-        return self.become(robot, np.zeros((len(robot.structure.bodies), 3)))
-
     def become(self, robot: Robot, p_BC: np.ndarray) -> _DiagramRobot:
         driven = dataclasses.replace(self.driven, robot=robot)
-        copy = _DiagramRobot(driven, record=self._record, viewer=self._viewer)
-        copy.first, copy._speed_limit = self.first, self._speed_limit
-        copy._marks, copy._change_end = self._marks.copy(), self._change_end
-        copy._held, copy.wall_time = self._held, self.wall_time
-        copy._work.before = self._work.total()
-        copy._aimer.follow(self._aimer)
-        copy._sampler.follow(self._sampler)
-        write_tables(copy._observer.tally, self._observer.tally)
-        before, context = self._simulator.get_context(), copy._simulator.get_mutable_context()
-        own = context.get_parameters().Clone()  # such as the masses
-        context.SetTimeStateAndParametersFrom(before)
-        context.get_mutable_parameters().SetFrom(own)
-        numbers, bodies = before.get_continuous_state_vector().CopyToVector(), 13 * len(p_BC)
-        numbers[:bodies] = with_origins(numbers[:bodies], p_BC)
-        context.SetContinuousState(numbers)
-        copy._sampler.restart(numbers)
-        parameters = InitializeParams()
-        parameters.suppress_initialization_events = True
-        copy._simulator.Initialize(parameters)
-        return copy
+        after = _DiagramRobot(driven, record=self._record, viewer=self._viewer)
+        after.first, after._speed_limit = self.first, self._speed_limit
+        after.wall_time, after._change_end = self.wall_time, self._change_end
+        numbers, bodies = self.numbers(), 13 * len(p_BC)
+        of_bodies = numbers["continuous"][:bodies]
+        of_bodies[:] = with_origins(of_bodies, p_BC)
+        after.restore(numbers)
+        after._marks = self._marks.copy()
+        after._sampler.follow(self._sampler)
+        return after
 
     def motion(self) -> Motion:
         return self._sampler.motion()
@@ -188,20 +176,22 @@ class _DiagramRobot(LoneRobot):
         context, work = self._simulator.get_context(), self._work.total()
         groups = range(context.num_discrete_state_groups())
         held = [context.get_discrete_state(group).value() for group in groups]
-        counts = work.steps, work.derivative_evaluations, work.jacobian_evaluations
         return {
             "time": np.array(context.get_time()),
             "continuous": context.get_continuous_state_vector().CopyToVector(),
             "discrete": np.concatenate([np.zeros(0), *held]),
             "held": self._held,
-            "work": np.array(counts),
+            "work": np.array([getattr(work, name) for name in _WORK]),
             "aim": self._aimer.numbers(),
             "tally": numbers_of(self._observer.tally),
         }
 
-    def restore(self, numbers: Mapping[str, np.ndarray], motion: Motion | None) -> None:
+    def remember(self, motion: Motion) -> None:
+        self._sampler.remember(motion)
+
+    def restore(self, numbers: Mapping[str, np.ndarray]) -> None:
         context, tally = self._simulator.get_mutable_context(), self._observer.tally
-        time, state = float(numbers["time"]), numbers["continuous"].copy()
+        time, state = float(numbers["time"]), numbers["continuous"]
         context.SetTime(time)
         context.SetContinuousState(state)
         first = 0
@@ -210,23 +200,15 @@ class _DiagramRobot(LoneRobot):
             context.SetDiscreteState(group, numbers["discrete"][first:end])
             first = end
         write_tables(tally, views(tally, numbers["tally"]))
-        self._sampler.go_on(time, state, motion)
+        self._sampler.go_on(time, state.copy())
         self._marks = [mark for mark in self.first.marks.tolist() if mark > time]
-        self._held, self._change_end = numbers["held"].copy(), 0.0
-        steps, evaluations, of_jacobians = numbers["work"].tolist()
-        self._work.before = IntegratorWork(
-            scheme="",
-            accuracy=0.0,
-            steps=steps,
-            derivative_evaluations=evaluations,
-            jacobian_evaluations=of_jacobians,
-        )
-        # Initialize() needs a limit that allows the initial step, which is the longest.
-        self._simulator.get_mutable_integrator().set_maximum_step_size(self._engine.max_step)
+        self._held = numbers["held"].copy()
+        work = dict(zip(_WORK, numbers["work"].tolist(), strict=True))
+        self._work.before = IntegratorWork(scheme="", accuracy=0.0, **work)
+        self._aimer.restore(numbers["aim"])
         parameters = InitializeParams()
         parameters.suppress_initialization_events = True
         self._simulator.Initialize(parameters)
-        self._aimer.restore(numbers["aim"])
 
     def result(self) -> SimulationResult:
         accuracy = self._simulator.get_integrator().get_target_accuracy()
@@ -401,13 +383,6 @@ class _StepAimer:
         self._longest = settings.max_step
         self._jacobian_is_old = False
 
-    def follow(self, other: _StepAimer) -> None:
-        """Copies the state of another aimer, so that this one continues from there."""
-        self._last_time, self._last_velocities = other._last_time, other._last_velocities
-        self._acceleration, self._longest = other._acceleration, other._longest
-        self._jacobian_is_old = other._jacobian_is_old
-        self._integrator.set_maximum_step_size(other._integrator.get_maximum_step_size())
-
     def numbers(self) -> np.ndarray:
         """The state of the aimer as one array, for restore()."""
         longest = self._integrator.get_maximum_step_size()
@@ -420,6 +395,7 @@ class _StepAimer:
         self._jacobian_is_old = bool(is_old)
         self._last_velocities, self._acceleration = np.split(numbers[4:].copy(), 2)
         self._integrator.set_maximum_step_size(longest)
+        self._integrator.request_initial_step_size_target(longest)  # for Initialize()
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the length of the next step. Call it after each step, with the simulator's context

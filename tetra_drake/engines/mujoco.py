@@ -177,7 +177,7 @@ class _MujocoRobot(LoneRobot):
         self._data = mujoco.MjData(self._model)
 
     def become(self, robot: Robot, p_BC: Array) -> _MujocoRobot:
-        after = self.copied()
+        after = self._copied()
         known = sum(len(motion.times) for motion in self._motions)
         passed = int(np.searchsorted(self._times, self._paused, side="right"))
         after._motions = [*self._motions, self._kept(slice(known, passed))]
@@ -199,7 +199,7 @@ class _MujocoRobot(LoneRobot):
         moved[:, 1 + p], moved[:, 1 + v] = after[:, 4 + p], after[:, 3 + v]
         return moved
 
-    def copied(self) -> _MujocoRobot:
+    def _copied(self) -> _MujocoRobot:
         copied = copy.copy(self)
         for name, value in vars(self).items():
             if isinstance(value, Array):
@@ -377,14 +377,17 @@ class _MujocoRobot(LoneRobot):
             "tally": numbers_of(self._observer.tally),
         }
 
-    def restore(self, numbers: Mapping[str, Array], motion: Motion | None) -> None:
+    def remember(self, motion: Motion) -> None:
+        self._motions = [motion]
+
+    def restore(self, numbers: Mapping[str, Array]) -> None:
         self._state, self._drives = numbers["state"].copy(), numbers["drives"].copy()
         self._before, self._held = numbers["before"].copy(), numbers["held"].copy()
         done, self._paused, self._began = numbers["clock"].tolist()
         self._done, self._is_held = int(done), True
         self._data.qacc_warmstart[:] = numbers["warm_start"]
         write_tables(self._observer.tally, views(self._observer.tally, numbers["tally"]))
-        self._motions = [] if motion is None else [motion]
+        self._motions = []
 
     def result(self) -> SimulationResult:
         known = sum(len(motion.times) for motion in self._motions)

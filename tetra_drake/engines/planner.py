@@ -39,8 +39,7 @@ class Planner:
         ...     td.load_scenario("quick"), {"v_WN": [-1.0, 0.0, 0.0]}, samples=8, horizon=0.1
         ... )
         >>> result = td.simulate(td.load_scenario("quick"), controller=planner)
-        >>> planner.decisions
-        15
+        >>> inches, speed = result.metrics.distance_in, planner.decisions_per_second
 
     The robot may be on another engine than the model, or be disturbed. The planner knows its
     readings only. From them the model gets the positions and velocities of the bodies. Contact
@@ -110,7 +109,7 @@ class Planner:
         self._seed = check_whole(source, "seed", seed, least=0)
         check_type(source, "delayed", delayed, bool)
         check_type(source, "cost", cost, Callable, Mapping)
-        step = control_period or scenario.simulation.control_period
+        step = scenario.simulation.control_period if control_period is None else control_period
         pause = step if decision_period is None else decision_period
         given = {"horizon": horizon, "temperature": temperature, "noise": noise}
         for key, number in (given | {"decision_period": pause, "control_period": step}).items():
@@ -137,8 +136,8 @@ class Planner:
             shape = self.limits.shape
             own = checked_numbers(limits, shape, (2, 1), source=source, key="limits")
             self.limits = np.broadcast_to(own, shape)
-        if not (self.limits[0] <= self.limits[1]).all():
-            raise InputError(source, "limits", "expected the least actions first")
+        if not (np.isfinite(self.limits).all() and (self.limits[0] <= self.limits[1]).all()):
+            raise InputError(source, "limits", "expected finite numbers, the least actions first")
 
         times, grid = step * np.arange(self._steps), np.linspace(0.0, horizon, knots)
         self._between, self._shift = _shares(times, grid), _shares(grid + pause, grid)
@@ -148,9 +147,8 @@ class Planner:
     def reset(self) -> None:
         """Begins anew: without a plan, with a robot at its start, and with the first noise."""
         self.model.reset()
-        middle, half = self.limits.mean(axis=0), 0.5 * np.ptp(self.limits, axis=0)
-        self._middle, self._half = middle, np.where(half > 0.0, half, 1.0)
-        rest = (self.model.rest[0] - middle) / self._half
+        self._middle, self._half = self.limits.mean(axis=0), 0.5 * np.ptp(self.limits, axis=0)
+        rest = (self.model.rest[0] - self._middle) / np.where(self._half > 0.0, self._half, 1.0)
         self._plan = self._next_plan = np.tile(np.clip(rest, -1.0, 1.0), (self._knots, 1))
         self._random = np.random.default_rng(self._seed)
         self._begins, self._next, self._latest = 0.0, -math.inf, -math.inf
@@ -219,7 +217,7 @@ class Planner:
             self.model.step(np.tile(actions, (self._samples, 1)), indices=[0])
 
     def _improved(self, plan: np.ndarray, state: States, now: float) -> np.ndarray:
-        """Weighted mean of noisy copies of a plan, of which the first has no noise."""
+        """Weighted mean of noisy copies of a plan; the first copy has no noise."""
         noise = self._random.normal(0.0, self._noise, (self._samples, *plan.shape))
         noise[0] = 0.0
         candidates = np.clip(plan + noise, -1.0, 1.0)

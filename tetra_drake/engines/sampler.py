@@ -37,21 +37,17 @@ class Sampler:
         """Time (s) and continuous state at the end of the latest step."""
 
     def follow(self, other: Sampler) -> None:
-        """Copies the samples of another sampler, so that this one continues from there."""
-        self._samples, self._latest = other._samples.copy(), other._latest
-        self._next = other._next
+        """Copies the samples of another sampler."""
+        self._samples, self._next = other._samples.copy(), other._next
 
-    def restart(self, state: np.ndarray) -> None:
-        """Replaces the continuous state at the end of the latest step, as the frames of the bodies
-        were moved."""
-        if self._latest is not None:
-            self._latest = self._latest[0], state
-
-    def go_on(self, time: float, state: np.ndarray, motion: Motion | None) -> None:
-        """Continues at a time (s) from a continuous state, after a motion, if it is known."""
-        self._latest = time, state
+    def go_on(self, time: float, state: np.ndarray) -> None:
+        """Continues at a time (s) from a continuous state, without the samples before."""
+        self._samples, self._latest = [], (time, state)
         self._next = int(np.searchsorted(self._times, time, side="right"))
-        self._samples = [] if motion is None else [motion]
+
+    def remember(self, motion: Motion) -> None:
+        """Puts a motion before the samples that follow."""
+        self._samples = [motion]
 
     def after_step(self, context: Context) -> None:
         """Takes the samples within the step that has just ended. `context` is the simulator's."""
@@ -78,6 +74,8 @@ class Sampler:
 
     def motion(self) -> Motion:
         """The motion up to now, at the times of the samples."""
+        if not self._samples:  # it has not begun
+            return motion_at(self._diagram, self._context).rows(slice(0))
         return Motion.joined(self._samples)
 
 

@@ -34,6 +34,9 @@ from tetra_drake.scenario.scenario import Scenario
 MOST_ROBOTS = 100_000
 """Largest number of robots side by side."""
 
+Indices = Sequence[int] | np.ndarray | None
+"""Indices of robots; None for all."""
+
 _UNDISTURBED = json.dumps({"seed": None, "damage": []})
 """Identity of a robot without disturbances and damage; see Simulation._robot_of()."""
 
@@ -141,7 +144,7 @@ class Simulation:
         self,
         *,
         seed: int | Sequence[int] | None = None,
-        indices: Sequence[int] | np.ndarray | None = None,
+        indices: Indices = None,
     ) -> Readings:
         """Puts robots at their start, and returns the readings of all robots.
 
@@ -181,9 +184,7 @@ class Simulation:
             self._is_whole = True
             return self.state
 
-    def step(
-        self, actions: npt.ArrayLike, *, indices: Sequence[int] | np.ndarray | None = None
-    ) -> Readings:
+    def step(self, actions: npt.ArrayLike, *, indices: Indices = None) -> Readings:
         """Simulates one control period, and returns the readings of all robots.
 
         The last period ends at `simulation.duration`.
@@ -235,9 +236,7 @@ class Simulation:
         with self._used("result"):
             return self._batch.result(place)
 
-    def save(
-        self, places: Sequence[int] | np.ndarray | None = None, *, history: bool = False
-    ) -> States:
+    def save(self, places: Indices = None, *, history: bool = False) -> States:
         """States of robots, from which they or others can go on; see restore() and States.
 
             >>> simulation = td.Simulation(td.load_scenario("quick"))
@@ -279,7 +278,7 @@ class Simulation:
                 record=self._record if history else None,
             )
 
-    def restore(self, states: States, places: Sequence[int] | np.ndarray | None = None) -> Readings:
+    def restore(self, states: States, places: Indices = None) -> Readings:
         """Puts robots into saved states, and returns the readings of all robots.
 
         On the compiled engine a restored robot goes on bit for bit as if it had not stopped, in any
@@ -330,9 +329,7 @@ class Simulation:
             self._is_whole = True
             return self.state
 
-    def copy(
-        self, place: int, *, to: Sequence[int] | np.ndarray, history: bool = False
-    ) -> Readings:
+    def copy(self, place: int, *, to: Indices, history: bool = False) -> Readings:
         """Puts robots into the state of robot number `place`, and returns the readings of all.
 
             >>> simulation = td.Simulation(td.load_scenario("quick"), count=8)
@@ -347,7 +344,7 @@ class Simulation:
         Raises:
             InputError: if an index is wrong, or the robot has failed.
         """
-        return self.restore(self.save([place], history=history), np.asarray(to))
+        return self.restore(self.save([place], history=history), to)
 
     def damage(self, place: int, *, cables: Sequence[str]) -> None:
         """Cuts cables of a robot now, like an event of a scenario.
@@ -474,7 +471,7 @@ class Simulation:
         times = (step * (self._listing_steps * steps)).round(MARK_DECIMALS)
         return np.where(times > duration - 0.5 * step, duration, times)
 
-    def _places(self, indices: Sequence[int] | np.ndarray | None) -> list[int]:
+    def _places(self, indices: Indices) -> list[int]:
         """The given indices of robots as a list, or all indices for None. Raises InputError for an
         index without a robot."""
         if indices is None:

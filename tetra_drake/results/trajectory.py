@@ -75,9 +75,10 @@ class Motion:
     def at(self, times: np.ndarray) -> Motion:
         """The motion at `times` (s), which must be among its own times: rows are selected, nothing
         is interpolated."""
-        return self._rows(np.searchsorted(self.times, times))
+        return self.rows(np.searchsorted(self.times, times))
 
-    def _rows(self, rows: np.ndarray) -> Motion:
+    def rows(self, rows: np.ndarray | slice) -> Motion:
+        """The motion at some of its times, by their indices."""
         given = {name: table for name, table in vars(self).items() if table is not None}
         return Motion(**{name: table[rows] for name, table in given.items()})
 
@@ -93,7 +94,7 @@ class Motion:
         begins = [phase.begins for phase in robot.phases[1:]]
         ends = np.searchsorted(self.times, begins, side="right")
         rows = np.split(np.arange(len(self.times)), ends)
-        return [(phase, self._rows(its)) for phase, its in zip(robot.phases, rows, strict=True)]
+        return [(phase, self.rows(its)) for phase, its in zip(robot.phases, rows, strict=True)]
 
     def first_states(self, robot: Robot) -> np.ndarray:
         """States [q; v] (k, 13 n) of the frames that the bodies have at t = 0, whose origins are

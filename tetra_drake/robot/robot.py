@@ -272,15 +272,11 @@ class Robot:
 
     @functools.cached_property
     def starting_modes(self) -> np.ndarray:
-        """Table `modes` of the contact nodes at t = 0; see modes_at()."""
-        return self.modes_at(self.structure.initial_state)
-
-    def modes_at(self, state: np.ndarray) -> np.ndarray:
-        """Table `modes` (contacts, 12) of laws.contact, the states of the contact nodes, for a
-        state [q; v] (13*bodies,) without a motion before. A contact node that touches the ground
-        sticks at its position."""
+        """Table `modes` (contacts, 12) of laws.contact, the states of the contact nodes, at t = 0.
+        A contact node that touches the ground sticks at its position."""
         modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
-        modes_after_step(Packed((self.model, Forces.of(self.model))), state, modes)
+        parts = Packed((self.model, Forces.of(self.model)))
+        modes_after_step(parts, self.structure.initial_state, modes)
         return modes
 
 

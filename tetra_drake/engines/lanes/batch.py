@@ -12,14 +12,14 @@ import functools
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.batch import Batch, Viewer
+from tetra_drake.engines.batch import Batch, Tables, Viewer
 from tetra_drake.engines.engine import Engine
 from tetra_drake.engines.lanes import loop
 from tetra_drake.engines.lanes.places import LAST, NEXT, ROUND, Memory, Places, advance
@@ -159,42 +159,30 @@ class LaneBatch(Batch):
         states[:, loop.DUE] = _NEVER  # it depends on what is recorded
         return {"states": states, "held": self._places.signals[places]}
 
-    def _restore(
-        self,
-        places: Sequence[int],
-        saved: Mapping[str, np.ndarray],
-        motions: Sequence[Motion | None],
-    ) -> None:
+    def _restore(self, places: Sequence[int], saved: Tables) -> None:
         log, states = self._log, self._places.states
         states[places], self._places.signals[places] = saved["states"], saved["held"]
         self._places.holds[places], log.change_ends[places] = 0, 0.0
         self._tried[places] = states[places, loop.TRIED]
         # A mark is passed as soon as a step has ended there.
         log.passed[places] = (log.marks[places] <= states[places, loop.TIME, None]).sum(axis=1)
-        for place, motion in zip(places, motions, strict=True):
-            if motion is not None:
-                kept = log.kept[place] = len(motion.times)
-                for name in ("states", "signals", "modes", "drives"):
-                    getattr(log, name)[place, :kept] = getattr(motion, name)
-                states[place, loop.DUE] = log.times[place, kept]
+
+    def _remember(self, place: int, motion: Motion) -> None:
+        kept = self._log.kept[place] = len(motion.times)
+        for name in ("states", "signals", "modes", "drives"):
+            getattr(self._log, name)[place, :kept] = getattr(motion, name)
+        self._places.states[place, loop.DUE] = self._log.times[place, kept]
 
     def assume(self, place: int, time: float, readings: Readings) -> None:
         robot, prepared = self._phases[place][0].robot, self._prepared[place]
-        state, row = bodies_state(readings, robot.structure), self._places.states[place]
         assert prepared is not None
-        start = numbers_of(prepared.start)
-        new = views(prepared.start, start.copy())
-        start[: row.size] = row
-        old = views(prepared.start, start)
-        new.signals[:], new.drives[:] = old.signals, old.drives
-        new.step.state[:], new.modes[:] = state, robot.modes_at(state)
-        new.tally.time[0] = new.clock[loop.TIME] = time
-        new.clock[loop.DUE], new.clock[loop.ACTIVE] = _NEVER, 1.0
-        self._restore(
-            [place],
-            {"states": numbers_of(new)[np.newaxis, : row.size], "held": old.signals[np.newaxis]},
-            [None],
-        )
+        start, row = prepared.start, self._places.states[place]
+        clock, modes, *_, tally, state = views((*start[:7], start.step.state), row)
+        state[:] = bodies_state(readings, robot.structure)
+        modes[:] = 0.0  # what touches the ground touches down in the next step
+        clock[loop.TIME], clock[loop.PLANNED] = time, start.clock[loop.PLANNED]
+        clock[loop.TRIED], clock[loop.ACTIVE], tally.time[0] = 0.0, 1.0, time
+        self._restore([place], self._save([place]))
         self.readings.put(place, readings._replace(time=time))
         self.has_history[place] = False
 
@@ -205,22 +193,6 @@ class LaneBatch(Batch):
         self._prepared[place] = self.failures[place] = None
         self._follow(place, None)
         return float(self._wall_times[place])
-
-    def copy(self, place: int, to: int) -> None:
-        if place == to:
-            return
-        self.stop(to)
-        logged = set(loop.Log._fields) - {"place"}
-        tables = [getattr(self._log, name) for name in logged]
-        tables += [self._places.states, self._places.constants]
-        tables += [self._places.signals, self._places.holds]
-        tables += [self._heights, self._ends, self._wall_times, self._tried, *self.readings]
-        tables.append(self._controlled)
-        for table in tables:
-            table[to] = table[place]
-        self._places.constants[to, self._first_height] = to * self._heights.shape[1]
-        self._prepared[to], self.failures[to] = self._prepared[place], self.failures[place]
-        self._copy_instants(place, to)
 
     def _hold(self, until: np.ndarray, signals: np.ndarray) -> None:
         places, period = self._places, self._first.constants.period

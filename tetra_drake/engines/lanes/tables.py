@@ -38,7 +38,7 @@ def views(values: Any, numbers: np.ndarray, *, lanes: bool = False) -> Any:
     def view(value: Any) -> Any:
         nonlocal first
         if isinstance(value, tuple):
-            return type(value)(*map(view, value))
+            return getattr(type(value), "_make", tuple)(map(view, value))
         if not _is_real(value):
             is_field = lanes and isinstance(value, np.ndarray)
             return FieldArray(value.copy()) if is_field else value
