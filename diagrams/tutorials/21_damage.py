@@ -15,7 +15,7 @@ robots = td.Simulation(scenario, count=len(cables) + 1, control_period=command.p
 to_centre = robots.robot.structure.node_shares
 
 # %% After 6 s each robot but the last one loses another cable. None of them knows, and all go on.
-way = []
+way: list[np.ndarray] = []
 while not robots.ended.all():
     step = len(way)
     if step == round(6.0 / command.period):
