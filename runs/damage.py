@@ -80,6 +80,8 @@ PLANNER: dict[str, Any] = {
 
 NUMBERS = ("steady_distance", "lateral_drift", "heading_change")
 """Metrics in the records, beside the speed in body lengths per second."""
+DECIMALS = 6
+"""Decimals of the numbers in the records."""
 
 Row = dict[str, Any]
 
@@ -160,8 +162,9 @@ def measured(result: SimulationResult | Exception) -> Row:
         none = dict.fromkeys(("speed", *NUMBERS), 0.0)
         return {"failure": str(result), "lifted_shares": [0.0] * 5, **none}
     metrics = result.metrics
-    row: Row = {"speed": metrics.relative_speed, "lifted_shares": [*metrics.lifted_shares]}
-    return row | {name: getattr(metrics, name) for name in NUMBERS}
+    row: Row = {"speed": round(metrics.relative_speed, DECIMALS)}
+    row["lifted_shares"] = [round(share, DECIMALS) for share in metrics.lifted_shares]
+    return row | {name: round(getattr(metrics, name), DECIMALS) for name in NUMBERS}
 
 
 # Records
@@ -233,7 +236,7 @@ def find_candidates() -> None:
     for first in range(done, len(gaits), BATCH):
         some = gaits[first : first + BATCH]
         results = zip(some, simulate_many(scenario(), some), strict=True)
-        rows = [{"name": gait.name, "turn": gait.turn, **measured(each)} for gait, each in results]
+        rows = [{"turn": gait.turn, **measured(each)} for gait, each in results]
         append(CANDIDATES, rows)
 
 
