@@ -109,6 +109,10 @@ _BODY = {
 """Numbers of a prism that evolve: cables, and the height of the upper nodes, which gives the
 lengths of the struts."""
 
+_MOTORS_MAP = QualityDiversity(
+    measures={"travelling_index": [0.0, 1.0], "lifted": [0.2, 0.7]}, cells=[15, 15]
+)
+
 EXPERIMENTS = {
     "rolling": Experiment(
         "a rover of six struts rolls by a feedback policy, in 10 s",
@@ -187,6 +191,11 @@ EXPERIMENTS = {
         _by(CmaEs(), 3, 1500),
         film=True,
         exported=True,
+    ),
+    "motors-map": Experiment(
+        "gaits of the robot with motors that differ, the fittest of each kind",
+        "motors",
+        _by(_MOTORS_MAP, 1, 12000),
     ),
 }
 """Experiments by name of the folder, in the order of the gallery."""

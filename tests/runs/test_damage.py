@@ -1,0 +1,38 @@
+"""Trial and error after damage: its choices on a made-up map, its records, and its page."""
+
+import damage
+import numpy as np
+import pytest
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.run import load_run
+
+
+def test_a_gait_for_each_motor_is_the_recorded_one():
+    run = load_run(damage.WALKER)
+    same = simulate(damage.scenario(), damage.steered(run.best_gait(), 0.0))
+    recorded = simulate(run.scenario, run.best_gait()).metrics.steady_distance
+    assert same.metrics.steady_distance == pytest.approx(recorded, abs=1e-4)
+
+
+def test_trials_turn_to_the_side_of_the_map_that_still_walks_and_end():
+    places = np.random.default_rng(0).random((200, 3))
+    before = 0.7 + 0.3 * places[:, 0]
+    after = before * (places[:, 2] > 0.5)  # what the damage leaves
+    tried = [int(np.argmax(before * (places[:, 2] < 0.5)))]
+    while (following := damage.next_trial(places, before, tried, after[tried])) is not None:
+        tried.append(following)
+    assert len(tried) < damage.TRIALS and after[tried].max() > 0.9 * after.max()
+
+
+def test_a_record_goes_on_after_a_line_that_was_cut_off(tmp_path):
+    file = tmp_path / "walks.jsonl"
+    damage.append(file, [{"speed": 0.25}])
+    file.write_text(file.read_text() + '{"speed": 0.')
+    damage.append(file, [{"speed": 0.5}])
+    assert damage.read(file) == [{"speed": 0.25}, {"speed": 0.5}]
+
+
+def test_the_page_is_made_from_the_records():
+    records = map(damage.read, (damage.WALKS, damage.PLANS, damage.CANDIDATES))
+    assert damage.page(*records) == (damage.HERE / "README.md").read_text("utf-8")
