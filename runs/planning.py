@@ -544,9 +544,9 @@ Episodes that were run: {run}.
 Twenty goals in all directions, 3 m away. One is reached when the centre is within 0.3 m of it, in
 at most 60 s. *Compiled*: the robot is on the engine of the planner's model, which takes larger
 steps. *MuJoCo*: the robot is on MuJoCo. *Disturbed*: each uncertain number of the robot and
-the ground differs from the model's by up to 5 %, and the rods start displaced (the draws of `tetra-drake
-robustness`). Numbers are medians over the goals that were reached. The path is the way of the
-centre. The work is what the winches give; they recover none.
+the ground differs from the model's by up to 5 %, and the rods start displaced (the draws of
+`tetra-drake robustness`). Numbers are medians over the goals that were reached. The path is the way
+of the centre. The work is what the winches give; they recover none.
 
 {goals}
 
