@@ -313,34 +313,39 @@ def _values(
         moved = simulate_many([*able.values()], drivers, record=record, workers=workers)
         for place, outcome in zip(able, moved, strict=True):
             found[place] = outcome
+    is_named = any(isinstance(each, str) for each in measures.values())
     for place, outcome in enumerate(found):
+        if isinstance(outcome, Exception):
+            continue
         try:
-            values = [_value(outcome, each) for each in measures.values()]
+            known = _numbers_of(outcome) if is_named else {}
+            values = [_value(outcome, known, each) for each in measures.values()]
             found[place] = [value if math.isfinite(value) else math.nan for value in values]
         except (InputError, SimulationFailure) as error:
             found[place] = error
     return found
 
 
+def _numbers_of(outcome: EquilibriumStudy | SimulationResult) -> dict[str, float]:
+    """Numbers of an outcome in SI, by the names of measures."""
+    if isinstance(outcome, SimulationResult):
+        return {name: getattr(outcome.metrics, name) for name in METRICS}
+    return values_at_rest(outcome)
+
+
 def _value(
-    outcome: EquilibriumStudy | SimulationResult | InputError | SimulationFailure, measure: Measure
+    outcome: EquilibriumStudy | SimulationResult, known: Mapping[str, float], measure: Measure
 ) -> float:
-    """Value of a measure in SI. Raises InputError for an unknown name, and the error or the failure
-    where there is no result."""
-    if isinstance(outcome, Exception):
-        raise outcome
+    """Value of a measure in SI. `known` are the numbers of the outcome by name. Raises InputError
+    for an unknown name."""
     if not isinstance(measure, str):
         return float(measure(outcome))
-    if isinstance(outcome, SimulationResult):
-        values = {name: getattr(outcome.metrics, name) for name in METRICS}
-    else:
-        values = values_at_rest(outcome)
-        if measure.startswith("frequency "):
-            return values.get(measure, math.nan)
-    if measure not in values:
+    if measure not in known:
+        if isinstance(outcome, EquilibriumStudy) and measure.startswith("frequency "):
+            return math.nan
         what = "needs a gait or a command" if measure in METRICS else "is unknown"
-        raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, values)}")
-    return float(values[measure])
+        raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, known)}")
+    return float(known[measure])
 
 
 def values_at_rest(study: EquilibriumStudy) -> dict[str, float]:
