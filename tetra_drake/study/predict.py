@@ -15,7 +15,7 @@ import pandas
 
 from tetra_drake import __version__
 from tetra_drake.engines.engine import engine_of
-from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.engines.queue import SimulationQueue
 from tetra_drake.errors import InputError, SimulationFailure, check_type, check_whole
 from tetra_drake.figures.style import (
     OKABE_ITO,
@@ -32,6 +32,7 @@ from tetra_drake.figures.style import (
 )
 from tetra_drake.files import given_path
 from tetra_drake.formatting import TextTable, fixed, rounded
+from tetra_drake.machine import threads_for
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, Driver
 from tetra_drake.robot.gait import GivenGait, given_gait, with_body
@@ -297,22 +298,24 @@ def _values(
     workers: int | None,
 ) -> list[list[float] | Exception]:
     """Values of the measures for each scenario, NaN if not finite; or why there are none."""
-    found: list[Any] = []
-    for each in scenarios:
-        try:
-            if isinstance(each, InputError):
-                raise each
-            robot = Robot.of(each, at_rest=driver is None)
-            found.append(study_equilibrium(robot) if driver is None else each)
-        except InputError as error:
-            found.append(error)
-    if driver is not None:
-        able = {i: each for i, each in enumerate(found) if isinstance(each, Scenario)}
+    found: list[Any] = [*scenarios]
+    able = {i: each for i, each in enumerate(scenarios) if not isinstance(each, InputError)}
+    if driver is None:
+        for place, each in able.items():
+            try:
+                found[place] = study_equilibrium(Robot.of(each, at_rest=True))
+            except InputError as error:
+                found[place] = error
+    else:
+        threads = min(threads_for(workers, source="predict"), max(1, len(able)))
         record = any(map(callable, measures.values()))
-        drivers = [driver] * len(able)
-        moved = simulate_many([*able.values()], drivers, record=record, workers=workers)
-        for place, outcome in zip(able, moved, strict=True):
-            found[place] = outcome
+        with SimulationQueue(threads, record=record) as queue:
+            futures = queue.submit((each, driver) for each in able.values())
+            for place, future in zip(able, futures, strict=True):
+                try:
+                    found[place] = future.result()
+                except (InputError, SimulationFailure) as error:
+                    found[place] = error
     is_named = any(isinstance(each, str) for each in measures.values())
     for place, outcome in enumerate(found):
         if isinstance(outcome, Exception):
