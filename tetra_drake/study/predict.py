@@ -196,6 +196,8 @@ def predict(
     measures = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
     if not measures:
         raise InputError("predict", "quantities", "found none, expected one at least")
+    for name, measure in measures.items():
+        check_type("predict", f"quantities.{name}", measure, str, Callable)
     folder = None if out is None else given_path(out, "predict", "out")
     scenario = given_scenario(scenario)
     driver: Driver | None = command
@@ -453,6 +455,7 @@ def predictions_figure(predictions: Predictions) -> Drawn:
     left.hlines(places, low, high, color=OKABE_ITO["sky_blue"], linewidth=5.0)
     left.plot(middle, places, "o", color=OKABE_ITO["blue"])
     left.set(xlabel="difference from nominal (%)")
+    left.margins(x=0.05)
     left.set_yticks(places, [folded(name, _NAMES * page_width()) for name in names])
     for series, (key, column) in enumerate(shares.items()):
         color, part = line_style(series)["color"], 100.0 * column.fillna(0.0).to_numpy()
