@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -192,6 +194,7 @@ def predict(
     check_whole("predict", "draws", draws, least=1)
     check_whole("predict", "seed", seed, least=0)
     check_type("predict", "quantities", quantities, Sequence, Mapping)
+    check_type("predict", "command", command, Command, NoneType)
     given = [quantities] if isinstance(quantities, str) else quantities
     measures = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
     if not measures:
@@ -346,7 +349,7 @@ def _value(
     if not isinstance(measure, str):
         return float(measure(outcome))
     if measure not in known:
-        if isinstance(outcome, EquilibriumStudy) and measure.startswith("frequency "):
+        if isinstance(outcome, EquilibriumStudy) and re.fullmatch(r"frequency [1-9]\d*", measure):
             return math.nan
         what = "needs a gait or a command" if measure in METRICS else "is unknown"
         raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, known)}")
