@@ -434,27 +434,36 @@ def draw_pillar(axes: Axes, x: float, y: float, *, zorder: float) -> None:
 def goals_figure(groups: Mapping[str, Sequence[Record]]) -> Figure:
     """Paths to the goals, a panel for each group."""
     figure = Figure(figsize=(8.0, 3.0), layout="constrained")
-    for axes, (name, records) in zip(figure.subplots(1, len(groups)), groups.items(), strict=True):
+    panels = figure.subplots(1, len(groups))
+    for axes, (name, records) in zip(panels, groups.items(), strict=True):
         for record in records:
             (goal,) = record["places"]
             axes.plot(*np.transpose(record["path"]), linewidth=0.8)
             axes.add_patch(Circle(goal, NEAR, color="0.8", zorder=0))
         axes.set(title=name, aspect="equal", xlim=(-3.6, 3.6), ylim=(-3.6, 3.6), xlabel="x (m)")
+    panels[0].set(ylabel="y (m)")
     return figure
 
 
 def courses_figure(records: Sequence[Record]) -> Figure:
     """Paths among pillars, with the circles around the places to pass."""
-    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
-    for axes, record in zip(figure.subplots(2, 5).flat, records, strict=False):
+    figure = Figure(figsize=(8.0, 6.6), layout="constrained")
+    names = [record["name"] for record in records]
+    cells = [*(names[:1] or ["."]) * (12 - len(names[1:])), *names[1:]]  # the slalom is wider
+    panels = figure.subplot_mosaic(np.reshape(cells, (3, 4)).tolist())
+    for record in records:
+        axes = panels[record["name"]]
         axes.plot(*np.transpose(record["path"]), linewidth=0.8)
         for place in record["places"]:
             axes.add_patch(Circle(place, NEAR, color="0.8", zorder=0))
         for place in record["pillars"]:
             axes.add_patch(Circle(place, PILLAR, color="C1"))
-        axes.set(title=record["name"], aspect="equal")
+        axes.set_title(record["name"], fontsize="medium")
+        axes.set_aspect("equal", adjustable="datalim")
         axes.autoscale_view()
         axes.tick_params(labelsize=7)
+    figure.supxlabel("x (m)", fontsize="medium")
+    figure.supylabel("y (m)", fontsize="medium")
     return figure
 
 
