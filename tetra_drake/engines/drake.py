@@ -94,7 +94,7 @@ class _DiagramRobot(LoneRobot):
         if driven.gait is not None:
             diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
         else:
-            diagram = MakeTensegrityDiagram(robot, None, controller=HeldSignals(robot))
+            diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
         self._diagram, self._engine = diagram, engine
         self._simulator = MakeSimulator(diagram, robot, engine)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
