@@ -185,6 +185,23 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
             raise InputError(source, f"{key}.{name}", problem)
 
 
+def parameters_of(source: str, system: LeafSystem, context: Context) -> BasicVector:
+    """The parameters in a context of a system, which may be changed.
+
+    Raises InputError if it is the context of another system, or the system has none. Its message
+    names `source`, the method.
+    """
+    check_type(source, "context", context, Context)
+    try:
+        system.ValidateContext(context)
+    except RuntimeError as error:
+        problem = f"is of another system; see {type(system).__name__}.GetMyMutableContextFromRoot()"
+        raise InputError(source, "context", problem) from error
+    if not context.num_numeric_parameter_groups():
+        raise InputError(source, "context", "has no constants; add the system with parameters=True")
+    return context.get_mutable_numeric_parameter(0)
+
+
 def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:
     """Raises InputError unless a system called `name` can be attached to a plant of the builder.
 

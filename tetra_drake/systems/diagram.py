@@ -41,6 +41,7 @@ def MakeTensegrityDiagram(
     controller: System | None = None,
     scene_graph: bool = False,
     meshcat: Meshcat | None = None,
+    parameters: bool = False,
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is at the start of the walk.
 
@@ -84,6 +85,15 @@ def MakeTensegrityDiagram(
     friction_forces and modes (ground), query_object (scene_graph). The classes Steering,
     CableNetwork and GroundContact have their shapes and units.
 
+    With `parameters`, one diagram serves many robots that differ in constants of cables and ground,
+    which are parameters of the context then; see CableNetwork.SetLaw() and
+    GroundContact.SetGround():
+
+    >>> cables, context = diagram.GetSubsystemByName("cables"), diagram.CreateDefaultContext()
+    >>> own = cables.GetMyMutableContextFromRoot(context)
+    >>> law = cables.GetLaw(own)
+    >>> cables.SetLaw(own, law._replace(stiffness=1.1 * law.stiffness))
+
     Raises InputError if a gait is not of this robot, or a port of the controller has another size.
     """
     scenario, structure = robot.scenario, robot.structure
@@ -110,6 +120,7 @@ def MakeTensegrityDiagram(
         drives=robot.starting_drives(),
         slack=structure.slack,
         scene_graph=scene,
+        parameters=parameters,
     )
     ground = AddGroundContact(
         builder,
@@ -118,6 +129,7 @@ def MakeTensegrityDiagram(
         ground=robot.ground,
         radius=robot.ground.radius.tolist(),
         witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
+        parameters=parameters,
     )
     model = robot.model
     held = model.anchors.nodes.size or model.joints.node_a.size or model.loads.nodes.size
