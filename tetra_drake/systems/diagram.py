@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
+from pydrake.geometry import Meshcat, SceneGraph
+from pydrake.lcm import DrakeLcmParams
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
+from pydrake.systems.lcm import ApplyLcmBusConfig
 from pydrake.systems.primitives import ConstantVectorSource, PassThrough, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
@@ -62,9 +64,9 @@ def MakeTensegrityDiagram(
 
     Subsystems:
 
-    - cpg: only with a gait. If the scenario has `cpg.signals: live` (a live
-      network), it is integrated with the robot; otherwise its signals are computed beforehand. A
-      robot without oscillators has no cpg.
+    - cpg: only with a gait. With `cpg.signals: live` in the scenario, it is the network, integrated
+      with the robot (a live network); otherwise its signals, computed beforehand. A robot without
+      oscillators has no cpg.
     - steering: only for a live network
     - feedback: only if the scenario's `cpg.feedback` is not empty
     - cables_actuators: only if the kind of actuators has states, as winches have
@@ -74,7 +76,8 @@ def MakeTensegrityDiagram(
       as `lengths`, `rates`, `tensions` and `normal_forces`, are connected to these. All others are
       input ports of the diagram. See SampledController and robot.command.controlled_robot().
     - scene_graph: with `scene_graph` or `meshcat`; it has struts, spheres and cables. During a
-      simulation it is shown in `meshcat`; pages and films are made from trajectories.
+      simulation it is shown in `meshcat`, where bodies can be dragged with the mouse while Ctrl is
+      held, if Drake has MeshcatMouseSpring; pages and films are made from trajectories.
 
     `steering`, a function from the time (s) to the turn, replaces the gait's turn, -1 to 1.
 
@@ -100,10 +103,12 @@ def MakeTensegrityDiagram(
     gait = None if gait is None else network_gait(gait)
     builder = DiagramBuilder()
 
-    plant, scene = _AddPlant(builder, scene_graph=scene_graph, meshcat=meshcat)
+    plant, scene = _AddPlant(builder, scene_graph=scene_graph or meshcat is not None)
     nodes = AddNodes(plant, structure, AddBodies(plant, structure))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
+    if scene is not None and meshcat is not None:
+        _ShowInMeshcat(builder, plant, scene, meshcat)
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
     if controller is None:
@@ -164,16 +169,31 @@ def MakeTensegrityDiagram(
 
 
 def _AddPlant(
-    builder: DiagramBuilder, *, scene_graph: bool, meshcat: Meshcat | None
+    builder: DiagramBuilder, *, scene_graph: bool
 ) -> tuple[MultibodyPlant, SceneGraph | None]:
-    """Adds an empty, continuous `plant`. With `scene_graph` or `meshcat`, also adds a SceneGraph,
-    which is shown in `meshcat`; otherwise None is returned in its place."""
-    if meshcat is None and not scene_graph:
+    """Adds an empty, continuous `plant`. With `scene_graph`, also adds a SceneGraph; otherwise None
+    is returned in its place."""
+    if not scene_graph:
         return builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0)), None
-    plant, scene = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-    if meshcat is not None:
-        MeshcatVisualizer.AddToBuilder(builder, scene, meshcat)
-    return plant, scene
+    return AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+
+
+def _ShowInMeshcat(
+    builder: DiagramBuilder, plant: MultibodyPlant, scene: SceneGraph, meshcat: Meshcat
+) -> None:
+    """Shows a finalized plant in Meshcat, and lets users drag its bodies where Drake can do so."""
+    from pydrake.visualization import (  # loads matplotlib
+        ApplyVisualizationConfig,
+        VisualizationConfig,
+    )
+
+    config = VisualizationConfig(publish_proximity=False, publish_contacts=False)
+    config.publish_inertia = False
+    # Drake would also send all poses to viewers on the network.
+    buses = ApplyLcmBusConfig({config.lcm_bus: DrakeLcmParams(lcm_url="memq://null")}, builder)
+    ApplyVisualizationConfig(
+        config, builder, lcm_buses=buses, plant=plant, scene_graph=scene, meshcat=meshcat
+    )
 
 
 def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
