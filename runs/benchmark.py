@@ -69,7 +69,7 @@ LARGEST_DIAGRAM = 50  # bodies
 FIXED_STEPS = ("explicit_euler", "runge_kutta2", "semi_explicit_euler")  # without error control
 LONGEST_STEP, SHORTEST_STEP = 1e-3, 7e-6  # s, of the schemes
 ACCEPTED = 1.0  # mm, error of a scheme without error control
-MOMENT = 2.0  # s that each scheme simulates
+MOMENT = 3.0  # s that each scheme simulates
 CANDIDATES = 100  # robots for which the time to a first evaluation is measured
 ROUNDS = 3  # measurements; their medians count
 
