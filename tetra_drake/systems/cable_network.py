@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder
 from pydrake.systems.primitives import Integrator
 
 from tetra_drake.errors import InputError, SimulationFailure, check_type
@@ -36,13 +36,14 @@ from tetra_drake.systems.attachment import (
     checked_numbers,
     parameters_of,
 )
-from tetra_drake.systems.cable_geometry import CableGeometry
+from tetra_drake.systems.cable_geometry import CableGeometry_, RegisterCylinders
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 _LEAST_LENGTH = 1e-9
 """Least length (m) of a cable at the start. The direction of a shorter one is not known."""
 
 
-class CableNetwork(LeafSystem):
+class CableNetwork(ConvertibleSystem):
     """Cables between bodies (thesis Eq. 6), also over rings. The system has no state.
 
     | port              | shape          | unit   | meaning                                  |
@@ -279,10 +280,11 @@ def AddCables(
             for one, each in named
             for number, length in enumerate(each, 1)
         }
-        shown = CableGeometry(scene_graph, name, lengths=of_pieces)
-        builder.AddNamedSystem(f"{name}_geometry", shown)
+        source = scene_graph.RegisterSource(name)
+        cylinders = RegisterCylinders(scene_graph, source, lengths=of_pieces)
+        shown = builder.AddNamedSystem(f"{name}_geometry", CableGeometry_[float](cylinders))
         builder.Connect(network.GetOutputPort("ends"), shown.get_input_port())
-        poses = scene_graph.get_source_pose_port(shown.source)
+        poses = scene_graph.get_source_pose_port(source)
         builder.Connect(shown.get_output_port(), poses)
     return network
 

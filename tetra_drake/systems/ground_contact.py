@@ -14,7 +14,6 @@ from pydrake.systems.framework import (
     DiagramBuilder,
     DiscreteValues,
     EventStatus,
-    LeafSystem,
     WitnessFunction,
     WitnessFunctionDirection,
 )
@@ -36,9 +35,10 @@ from tetra_drake.systems.attachment import (
     checked_numbers,
     parameters_of,
 )
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class GroundContact(LeafSystem):
+class GroundContact(ConvertibleSystem):
     """Normal force (thesis Eq. 1) and friction at m contact nodes, on any terrain.
 
     | port              | in/out | shape   | unit   | meaning                                      |
