@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import seeded_gait
@@ -135,3 +136,34 @@ def test_wrong_constants_are_refused(robots, refused):
     cables = plain.GetSubsystemByName("cables")
     with refused("SetLaw", "context", "parameters=True"):
         cables.SetLaw(cables.GetMyMutableContextFromRoot(root), CableLaw(1.0, 1.0, 1.0))
+
+
+def test_a_clone_has_its_own_constants(robots):
+    diagram = diagram_of(robots[0], parameters=True)
+    clone, context = diagram.Clone(), moving(diagram)
+    of_clone = clone.CreateDefaultContext()
+    of_clone.SetTimeStateAndParametersFrom(context)  # a clone of a plant forgets default poses
+    before = rates(diagram, context)
+    np.testing.assert_array_equal(rates(clone, of_clone), before)
+    put(diagram, context, robots[1])
+    assert np.abs(rates(diagram, context) - before).max() > 1.0
+    of_clone.SetContinuousState(of_clone.get_continuous_state_vector().CopyToVector())
+    np.testing.assert_array_equal(rates(clone, of_clone), before)
+
+
+def test_tensions_have_derivatives_by_the_constants(robots):
+    """dT/dk of a cable at rest is its stretch; this robot's cables also push."""
+    structure, law = robots[0].structure, robots[0].model.cables.law
+    twin = diagram_of(robots[0], parameters=True).GetSubsystemByName("cables").ToAutoDiffXd()
+    context = twin.CreateDefaultContext()
+    for place, given in enumerate((structure.initial_state, np.zeros(structure.signals))):
+        port = twin.get_input_port(place)
+        port.FixValue(context, np.array([AutoDiffXd(number) for number in given]))
+    parameters = context.get_mutable_parameters().get_mutable_numeric_parameter(0)
+    parameters.SetFromVector(InitializeAutoDiff(np.concatenate(law)).ravel())
+    ports = map(twin.get_output_port, range(twin.num_output_ports()))
+    [tensions] = [port for port in ports if port.get_name().endswith("tensions")]
+    slopes = ExtractGradient(tensions.Eval(context))
+    stretch = structure.initial_lengths - law.free_length
+    assert stretch.any()
+    np.testing.assert_allclose(slopes[:, :24], np.diag(stretch), atol=1e-8)

@@ -129,9 +129,8 @@ class AutoDiffTwin(LeafSystem_[AutoDiffXd]):
                 fix = functools.partial(self._system.get_input_port(number).FixValue, of_system)
                 vectors.append((port.Eval(context), fix))
         for group in range(context.num_numeric_parameter_groups()):
-            parameter = of_system.get_mutable_numeric_parameter(group)
             given = context.get_numeric_parameter(group).CopyToVector()
-            vectors.append((given, parameter.SetFromVector))
+            vectors.append((given, functools.partial(_set_parameter, of_system, group)))
         if context.num_continuous_states():
             state = context.get_continuous_state_vector().CopyToVector()
             vectors.append((state, of_system.SetContinuousState))
@@ -170,6 +169,11 @@ class AutoDiffTwin(LeafSystem_[AutoDiffXd]):
     def _refuse(self, context: Context, values: DiscreteValues) -> EventStatus:
         problem = "has a discrete state, which is constant for AutoDiffXd; simulate with floats"
         raise InputError("AutoDiffXd", self.get_name(), problem)
+
+
+def _set_parameter(context: Context, group: int, values: np.ndarray) -> None:
+    # Drake forgets cached values when the vector is fetched, not when it is written.
+    context.get_mutable_numeric_parameter(group).SetFromVector(values)
 
 
 def _to_autodiff(system: ConvertibleSystem) -> AutoDiffTwin:
