@@ -25,7 +25,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.study.equilibrium import save_structure_page, study_equilibrium
-from tetra_drake.study.linearization import linearize
+from tetra_drake.study.linearization import Linearization, linearize
 from tetra_drake.systems import SampledController
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -46,10 +46,16 @@ MAST = {
 """A mast on a ball joint, with a mass on its top and four soft guys: a push topples it."""
 
 
+def undamped() -> Linearization:
+    """The prism without weight, damping and actuators."""
+    groups = "bottom", "top", "side"
+    still = {f"robot__cables__{group}__damping": "0 N*s/m" for group in groups}
+    return linearize(Robot.of(floating_prism(robot__actuated={}, **still)))
+
+
 def test_without_damping_the_oscillations_are_those_of_stiffness_and_mass():
-    still = {f"robot.cables.{group}.damping": "0 N*s/m" for group in ("bottom", "top", "side")}
-    robot = Robot.of(floating_prism(**{key.replace(".", "__"): x for key, x in still.items()}))
-    modes, study = linearize(robot).modes(), study_equilibrium(robot)
+    linear = undamped()
+    modes, study = linear.modes(), study_equilibrium(linear.robot)
     assert len(study.frequencies) == 9, "18 motions less 6 of the whole and 3 spins of the bars"
     assert modes.frequencies == pytest.approx(study.frequencies, rel=1e-7)
     assert modes.damping_ratios == pytest.approx(np.zeros(9), abs=1e-7)
@@ -201,6 +207,20 @@ def test_a_regulator_holds_a_mast_that_topples_without_it_and_does_so_on_the_dia
     assert p_WN[top] == pytest.approx(held[20], abs=1e-3)
 
 
+def test_a_regulator_damps_a_floating_robot_and_lets_it_drift():
+    linear = linearize(floating_prism())
+    gain = linear.lqr(np.diag(np.repeat([1.0, 0.01], 18)), 1e-4 * np.eye(6))
+    alone, together = (
+        np.linalg.eigvals(matrix)
+        for matrix in (linear.system.A(), linear.system.A() - linear.system.B() @ gain)
+    )
+    assert np.count_nonzero(np.abs(together) < 0.3) == 18, "twice 6 motions and 3 spins"
+    slowest = [roots[np.abs(roots) > 0.3].real.max() for roots in (alone, together)]
+    assert slowest[1] < 2.0 * slowest[0] < 0.0
+    drift = np.tile(np.concatenate([np.zeros(3), [1.0, 0.0, 0.0]]), 3)
+    assert gain @ np.concatenate([drift, 0.0 * drift]) == pytest.approx(np.zeros(6), abs=1e-4)
+
+
 def test_the_turn_of_a_spinning_body_from_another_is_carried_along():
     # Both spin with w: exp(w t) exp(theta) = exp(exp(w t) theta) exp(w t).
     robot, w = Robot.of(floating_prism()), np.array([0.3, -0.8, 0.5])
@@ -230,16 +250,21 @@ BAD = [
     (lambda: linearize(PRISM, np.full(39, math.nan)), "state"),
     (lambda: linearize(PRISM, np.zeros(39)), "state"),
     (lambda: linearize(PRISM, "upright"), "state"),
+    (lambda: linearize(PRISM, np.full(39, 1e308)), "state"),
     (lambda: linearize(PRISM, signals=[1.0]), "signals"),
     (lambda: linearize(PRISM, signals=[math.inf] * 6), "signals"),
     (lambda: linearize(PRISM, modes=np.zeros((2, 12))), "modes"),
     (lambda: linearize(PRISM, outputs="lengths"), "outputs"),
     (lambda: linearize(PRISM, outputs=["length"]), "outputs"),
+    (lambda: linearize(PRISM, outputs=[5]), "outputs"),
     (lambda: linearize("incline"), "robot"),
     (lambda: linearize(load_scenario(PRISM).with_changes(NO_GROUND)), "robot"),  # it falls
     (lambda: linearize(PRISM).lqr(np.eye(3), np.eye(6)), "state_cost"),
     (lambda: linearize(PRISM).lqr(np.eye(36), np.eye(5)), "input_cost"),
-    (lambda: linearize(PRISM).lqr(np.eye(36), -np.eye(6)), ""),
+    (lambda: linearize(PRISM).lqr(-np.eye(36), np.eye(6)), "state_cost"),
+    (lambda: linearize(PRISM).lqr(np.tri(36), np.eye(6)), "state_cost"),
+    (lambda: linearize(PRISM).lqr(np.eye(36), np.zeros((6, 6))), "input_cost"),
+    (lambda: undamped().lqr(np.eye(36), np.zeros((0, 0))), "robot.actuated"),
     (lambda: linearize(PRISM).lqr(np.eye(36), np.full((6, 6), math.nan)), "input_cost"),
     (lambda: linearize(PRISM).controller(np.zeros((5, 36))), "gain"),
     (lambda: linearize(PRISM).controller(np.full((6, 36), math.nan)), "gain"),

@@ -58,6 +58,8 @@ _FREQUENCIES = 5
 _SWING, _STILL, _AMPLITUDE = 75, 2, 0.12
 """Number of frames of a mode on the page, and of a robot at rest; greatest displacement of a node,
 as a share of the size of the robot."""
+_FILM_SIZE = 960, 720
+"""Width and height of a film of a mode, in pixels."""
 _NOISE = 1e-9
 """Forces of anchors up to this share of the greatest are rounding errors."""
 
@@ -356,7 +358,7 @@ def save_structure_page(study: EquilibriumStudy, path: Path, *, mode: int | None
         "text": structure_text(study),
     }
     if is_film:
-        make_video(replay_page(**page)[0], path, fps=FRAMES_PER_SECOND)
+        make_video(replay_page(**page)[0], path, size=_FILM_SIZE, fps=FRAMES_PER_SECOND)
     else:
         save_replay(path, **page)
 

@@ -38,9 +38,11 @@ _SLOWEST = 2.0 * math.pi * LEAST_FREQUENCY
 STEP = 1e-6
 """Step of the central differences: in rad, as a share of the largest body's radius (m, and m/s), of
 the greatest force (N), and of the greatest state of an actuator. The matrices are exact to some
-1e-10 of their greatest numbers."""
+1e-10 of their greatest numbers; the spin of a thin bar, whose inertia is small, to 1e-8."""
 BALANCED = 1e-6
 """Force left at rest, at most, as a share of the greatest force."""
+_SAME = 1e-12
+"""Rounding of the numbers of a cost matrix, as a share of the greatest."""
 
 
 class DampedModes(NamedTuple):
@@ -120,18 +122,21 @@ class Linearization:
         Raises:
             InputError: if a matrix is wrong, or the signals cannot bring the motions to rest.
         """
+        if not self.inputs:
+            raise InputError(self.robot.scenario.name, "robot.actuated", "has no signals for LQR")
         A, B = self.system.A(), self.system.B()
-        Q = _checked(state_cost, A.shape, source="lqr", key="state_cost")
-        R = _checked(input_cost, (B.shape[1], B.shape[1]), source="lqr", key="input_cost")
+        Q = _checked_cost(state_cost, len(A), "state_cost")
+        R = _checked_cost(input_cost, B.shape[1], "input_cost", is_definite=True)
         schur, basis, count = linalg.schur(A.T, sort=lambda re, im: math.hypot(re, im) > _SLOWEST)
         kept = basis[:, :count]  # keptᵀ x are states of their own, without the motions left out
+        cost = kept.T @ Q @ kept
         try:
             gain, _ = LinearQuadraticRegulator(
-                schur[:count, :count].T, kept.T @ B, kept.T @ Q @ kept, R
+                schur[:count, :count].T, kept.T @ B, 0.5 * (cost + cost.T), R
             )
-        except (RuntimeError, ValueError) as error:
+        except (RuntimeError, ValueError, SystemExit) as error:  # Drake ends for extreme numbers
             raise InputError("lqr", "", f"finds no gain: {error}") from error
-        return np.asarray(gain @ kept.T)
+        return _checked(gain @ kept.T, (len(R), len(Q)), source="lqr", key="gain")
 
     def controller(self, gain: npt.ArrayLike) -> Controller:
         """State feedback u = -K x: a function from the time (s) and the readings of a robot to its
@@ -218,11 +223,14 @@ def linearize(
     check_type("linearize", "outputs", outputs, list, tuple)
     names = _reading_names(robot.structure)
     for output in outputs:
+        check_type("linearize", "outputs", output, str)
         if output not in names:
             raise InputError("linearize", "outputs", no_such("readings", output, [*names]))
     if state is None:
         _check_balanced(robot, at, fixed)
     A, B, C, D = _matrices(robot, at, fixed, outputs)
+    if not all(np.isfinite(matrix).all() for matrix in (A, B, C, D)):
+        raise InputError("linearize", "state", "found a state whose forces are not finite")
     driven = [structure.cable_names[cable] for cable in np.sort(robot.driven)]
     kinds = ("theta_x theta_y theta_z x y z", "w_x w_y w_z v_x v_y v_z")
     states = [f"{body} {of}" for kind in kinds for body in structure.bodies for of in kind.split()]
@@ -260,6 +268,22 @@ def _checked(
         found = numbers[~np.isfinite(numbers)].flat[0]
         raise InputError(source, key, f"found {found}, expected finite numbers")
     return numbers
+
+
+def _checked_cost(
+    given: npt.ArrayLike, size: int, key: str, *, is_definite: bool = False
+) -> np.ndarray:
+    """A cost matrix (size, size) of lqr(). Raises InputError unless it is symmetric, without
+    negative eigenvalues, and with `is_definite` positive definite. Drake does not check all."""
+    cost = _checked(given, (size, size), source="lqr", key=key)
+    greatest = np.abs(cost).max(initial=0.0)
+    least = np.linalg.eigvalsh(cost).min(initial=greatest)
+    if np.abs(cost - cost.T).max(initial=0.0) > _SAME * greatest:
+        raise InputError("lqr", key, "found a matrix that is not symmetric")
+    if least < -_SAME * greatest or (is_definite and least <= _SAME * greatest):
+        sign = "positive" if is_definite else "not negative"
+        raise InputError("lqr", key, f"found the eigenvalue {least:.3g}, expected all {sign}")
+    return np.asarray(0.5 * (cost + cost.T))
 
 
 def _matrices(
