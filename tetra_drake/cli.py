@@ -633,7 +633,7 @@ def _structure(
     Args:
         unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
         out: write an HTML page that shows the structure in equilibrium; a name that ends in .yaml
-            writes a structure file instead, such as one converted from MJCF; .mp4 or .gif a film
+            writes a structure file instead, such as one converted from MJCF
         mode: show in --out only the mode with damping that has this number
         mjcf: write a model for MuJoCo, with tendons, motors and the key frame `rest`
         sdf: write a model in SDFormat: bodies, and nodes as frames, without cables
@@ -651,7 +651,7 @@ def _structure(
     )
 
     if mode is not None and (out is None or out.suffix in (".yaml", ".yml")):
-        raise InputError("structure", "--mode", "needs --out, a page or a film")
+        raise InputError("structure", "--mode", "needs --out, a page")
     if out and out.suffix in (".yaml", ".yml"):
         save_structure(read_structure(source, unit=unit), out, source=source)
         _say(f"wrote {out}")

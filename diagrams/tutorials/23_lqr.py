@@ -60,11 +60,11 @@ def held(regulated: bool) -> np.ndarray:
     """Greatest speed (m/s) in each direction up to which all pushes are held."""
     robots = td.Simulation(scenario, count=len(pushes))
     readings, stands = robots.step(robots.rest), np.ones(len(pushes), dtype=bool)
-    for place, (direction, speed) in enumerate(pushes):
-        pushed = readings.rows(place).copied()
+    for number, (direction, speed) in enumerate(pushes):
+        pushed = readings.rows(number).copied()
         spin = speed * np.array([-np.sin(direction), np.cos(direction), 0.0])
         pushed.w_WB[:], pushed.v_WN[:2] = spin, np.cross(spin, pushed.p_WN[:2])
-        robots.assume(pushed, place=place)
+        robots.assume(pushed, place=number)
     readings, actions = robots.state, robots.rest.copy()
     while not robots.ended[stands].all():
         for place in np.flatnonzero(stands) if regulated else ():

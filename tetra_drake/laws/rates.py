@@ -13,45 +13,36 @@ from tetra_drake.laws.inertia import over_inertia
 from tetra_drake.laws.model import Model
 
 
-def rates_of_motion(
-    robot: Model, states: np.ndarray, modes: np.ndarray, signals: np.ndarray, drives: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations dv/dt (k, 6*bodies) of the bodies, and rates (k, drives) of the actuators'
-    states, at each of k times. For the arguments see forces_of_motion()."""
-    accelerations, rates = (
-        np.empty((len(states), 6 * robot.bodies.mass.size)),
-        np.empty_like(drives),
-    )
-    parts = Packed((robot, Forces.of(robot)))
-    rates_along(parts, states, modes, signals, drives, accelerations, rates)
-    return accelerations, rates
+def rates_and_forces(
+    robot: Model, state: np.ndarray, modes: np.ndarray, signals: np.ndarray, drives: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, Forces]:
+    """Acceleration dv/dt (6*bodies,) of the bodies, rates (drives,) of the actuators' states, and
+    the tables of forces, in a state.
+
+    The state is [q; v] (13*bodies,), with the contact and friction modes (contacts, 12), signals
+    (m,) in N, and states of the actuators `drives` (drives,).
+    """
+    forces, acceleration = Forces.of(robot), np.empty(6 * robot.bodies.mass.size)
+    forces.drives[:, DRIVE] = drives
+    compute_acceleration(Packed((robot, forces)), state, modes, signals, acceleration)
+    return acceleration, forces.drives[:, RATE].copy(), forces
 
 
 @compiled
-def rates_along(
-    parts: Parts,
-    states: Table,
-    modes: Table,
-    signals: Table,
-    drives: Table,
-    accelerations: Table,
-    rates: Table,
+def compute_acceleration(
+    parts: Parts, state: Table, modes: Table, signals: Table, acceleration: Table
 ) -> None:
-    """Writes the last two arguments, the tables of rates_of_motion(). `parts` is a Model and its
-    Forces."""
+    """Writes dv/dt of the bodies to `acceleration` (6*bodies,), and all tables to the Forces. For
+    the arguments see rates_and_forces(). `parts` is a Model and its Forces, which have the states
+    of the actuators."""
     robot, forces = unpacked(parts)
+    move_robot(robot, state, forces)
+    compute_forces(robot, state, modes, signals, True, forces, acceleration)
     inertia = robot.bodies.inertia if robot.isotropic else forces.inertia
-    for k in range(states.shape[0]):
-        move_robot(robot, states[k], forces)
-        for i in range(drives.shape[1]):
-            forces.drives[i, DRIVE] = drives[k, i]
-        compute_forces(robot, states[k], modes[k], signals[k], False, forces, accelerations[k])
-        for body in range(robot.bodies.mass.size):
-            a = 6 * body
-            torque = accelerations[k, a], accelerations[k, a + 1], accelerations[k, a + 2]
-            spin = over_inertia(inertia, body, torque)
-            for axis in range(3):
-                accelerations[k, a + axis] = spin[axis]
-                accelerations[k, a + 3 + axis] /= robot.bodies.mass[body]
-        for i in range(drives.shape[1]):
-            rates[k, i] = forces.drives[i, RATE]
+    for body in range(robot.bodies.mass.size):
+        a = 6 * body
+        torque = acceleration[a], acceleration[a + 1], acceleration[a + 2]
+        spin = over_inertia(inertia, body, torque)
+        for axis in range(3):
+            acceleration[a + axis] = spin[axis]
+            acceleration[a + 3 + axis] /= robot.bodies.mass[body]

@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas
@@ -46,8 +45,7 @@ from tetra_drake.study.linearization import (
     linearize,
     node_motions,
 )
-from tetra_drake.visualization.replay import FRAMES_PER_SECOND, replay_page, save_replay
-from tetra_drake.visualization.video import KINDS, check_video, make_video
+from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
 _LEAST_SQUARE = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
 
@@ -58,8 +56,6 @@ _FREQUENCIES = 5
 _SWING, _STILL, _AMPLITUDE = 75, 2, 0.12
 """Number of frames of a mode on the page, and of a robot at rest; greatest displacement of a node,
 as a share of the size of the robot."""
-_FILM_SIZE = 960, 720
-"""Width and height of a film of a mode, in pixels."""
 _NOISE = 1e-9
 """Forces of anchors up to this share of the greatest are rounding errors."""
 
@@ -283,15 +279,12 @@ def structure_text(study: EquilibriumStudy) -> str:
         names = [f"force along {axis} ({force})" for axis in "xyz"]
         lines.append(TextTable(["anchor", *names], rows).text())
     if len(structure.bodies) < _LARGE:
-        lowest_damped = zip(study.damped.frequencies, study.damped.damping_ratios, strict=True)
-        rows = [
-            [str(number), rounded(frequency), rounded(ratio)]
-            for number, (frequency, ratio) in enumerate(lowest_damped, start=1)
-        ]
-        names = ["frequency (Hz)", "damping ratio"]
+        lowest_damped = zip(*study.damped[:2], strict=True)
+        rows = [[str(i), *map(rounded, mode)] for i, mode in enumerate(lowest_damped, start=1)]
         sticks = "; nodes on the ground stick" if structure.contacts.size else ""
         lines.append(f"Modes with damping{sticks}:" if rows else "No oscillations with damping.")
-        lines += [TextTable(["mode", *names], rows[:_FREQUENCIES]).text()] if rows else []
+        headings = ["mode", "frequency (Hz)", "damping ratio"]
+        lines += [TextTable(headings, rows[:_FREQUENCIES]).text()] if rows else []
     return "\n\n".join(lines + _faults(study))
 
 
@@ -323,16 +316,14 @@ def save_structure_page(study: EquilibriumStudy, path: Path, *, mode: int | None
 
     Args:
         study: the robot at rest.
-        path: the file to write. A film of the page if it ends in .mp4 or .gif.
+        path: the file to write.
         mode: number of a mode with damping, from 1 on, in place of the modes without damping. It is
             shown without its decay.
 
     Raises:
         InputError: if the file cannot be written, or there is no such mode.
     """
-    robot, is_film = study.robot, path.suffix in KINDS
-    if is_film:
-        check_video(path, fps=FRAMES_PER_SECOND)
+    robot = study.robot
     title, frequencies, motions = _shown_modes(study, mode)
     states = _swinging(study, motions)
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
@@ -350,17 +341,14 @@ def save_structure_page(study: EquilibriumStudy, path: Path, *, mode: int | None
         trajectory[name][:] = trajectory[name].values[-1]
     frames = frequencies.repeat(_SWING)
     shown = {"what": "mode at", "unit": " Hz", "digits": 2, "values": [*frames, *frames[-1:]]}
-    page: dict[str, Any] = {
-        "robot": robot,
-        "trajectory": trajectory,
-        "title": title,
-        "progress": shown if frames.size else None,
-        "text": structure_text(study),
-    }
-    if is_film:
-        make_video(replay_page(**page)[0], path, size=_FILM_SIZE, fps=FRAMES_PER_SECOND)
-    else:
-        save_replay(path, **page)
+    save_replay(
+        path,
+        robot=robot,
+        trajectory=trajectory,
+        title=title,
+        progress=shown if frames.size else None,
+        text=structure_text(study),
+    )
 
 
 def _shown_modes(study: EquilibriumStudy, mode: int | None) -> tuple[str, np.ndarray, np.ndarray]:

@@ -20,9 +20,8 @@ from tetra_drake.engines.simulation import Controller
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.contact import MODE_COLUMNS
-from tetra_drake.laws.forces import forces_of_motion
 from tetra_drake.laws.kinematics import rigid_motions
-from tetra_drake.laws.rates import rates_of_motion
+from tetra_drake.laws.rates import rates_and_forces
 from tetra_drake.robot.equilibrium import displace
 from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Robot
@@ -41,8 +40,6 @@ the greatest force (N), and of the greatest state of an actuator. The matrices a
 1e-10 of their greatest numbers; the spin of a thin bar, whose inertia is small, to 1e-8."""
 BALANCED = 1e-6
 """Force left at rest, at most, as a share of the greatest force."""
-_SAME = 1e-12
-"""Rounding of the numbers of a cost matrix, as a share of the greatest."""
 
 
 class DampedModes(NamedTuple):
@@ -126,7 +123,7 @@ class Linearization:
             raise InputError(self.robot.scenario.name, "robot.actuated", "has no signals for LQR")
         A, B = self.system.A(), self.system.B()
         Q = _checked_cost(state_cost, len(A), "state_cost")
-        R = _checked_cost(input_cost, B.shape[1], "input_cost", is_definite=True)
+        R = _checked_cost(input_cost, B.shape[1], "input_cost")
         schur, basis, count = linalg.schur(A.T, sort=lambda re, im: math.hypot(re, im) > _SLOWEST)
         kept = basis[:, :count]  # keptᵀ x are states of their own, without the motions left out
         cost = kept.T @ Q @ kept
@@ -176,7 +173,6 @@ def linearize(
     given: Robot | GivenScenario,
     state: npt.ArrayLike | None = None,
     *,
-    signals: npt.ArrayLike | None = None,
     modes: npt.ArrayLike | None = None,
     outputs: Sequence[str] = ("p_WN", "lengths", "tensions"),
 ) -> Linearization:
@@ -192,11 +188,10 @@ def linearize(
 
     Args:
         given: a scenario, its name or file, or a run: its robot gets a signal for each driven
-            cable, in the order of `Simulation.step`. Or a robot, with the signals that it has.
+            cable, in the order of `Simulation.step`. Or a robot, with its own `first_signals`.
         state: state [q; v] (13*bodies,) about which motions are small, as of the diagram's port
             `state`; by default the equilibrium on flat ground. If it moves or is not at rest, the
             system describes deviations from the motion through it.
-        signals: signals (N) in this state; by default those at the start.
         modes: table (contacts, 12) of contact and friction modes, see laws.contact; by default the
             nodes in the ground stick where they are.
         outputs: names of readings, see robot.readings.Readings: lengths, rates, tensions,
@@ -206,39 +201,31 @@ def linearize(
         InputError: if the robot has no equilibrium, or an argument does not fit it.
     """
     robot = given if isinstance(given, Robot) else Robot.of(given_scenario(given))
-    bodies = len(robot.structure.bodies)
-    at = robot.equilibrium.state if state is None else state
-    at = _checked(at, (13 * bodies,), key="state")
-    poses = at[: 7 * bodies].reshape(-1, 7)
-    if not poses[:, :4].any(axis=1).all():
-        raise InputError("linearize", "state", "found a quaternion of 0, expected a rotation")
+    size = 13 * len(robot.structure.bodies)
+    at = _checked(robot.equilibrium.state if state is None else state, (size,), key="state")
+    poses = at[: size // 13 * 7].reshape(-1, 7)
     structure = dataclasses.replace(robot.structure, q_WB=poses[:, :4], p_WB=poses[:, 4:])
     robot = dataclasses.replace(robot, structure=structure)
     robot = robot if isinstance(given, Robot) else robot.controlled
-    if signals is not None:
-        own = _checked(signals, robot.first_signals.shape, key="signals")
-        robot = dataclasses.replace(robot, first_signals=own)
     own_modes = robot.starting_modes if modes is None else modes
     fixed = _checked(own_modes, (len(structure.contacts), MODE_COLUMNS), key="modes")
+    names = _reading_names(structure)
     check_type("linearize", "outputs", outputs, list, tuple)
-    names = _reading_names(robot.structure)
     for output in outputs:
         check_type("linearize", "outputs", output, str)
         if output not in names:
             raise InputError("linearize", "outputs", no_such("readings", output, [*names]))
-    if state is None:
-        _check_balanced(robot, at, fixed)
-    A, B, C, D = _matrices(robot, at, fixed, outputs)
-    if not all(np.isfinite(matrix).all() for matrix in (A, B, C, D)):
+    left, greatest = _forces_left(robot, at, fixed)
+    if state is None and left > BALANCED * greatest:
+        problem = f"does not rest on this terrain with these actuators: {left:.3g} N are left"
+        raise InputError(robot.scenario.name, "robot", f"{problem}; give a state")
+    matrices = _matrices(robot, at, fixed, outputs, of_signals=greatest)
+    if not all(np.isfinite(matrix).all() for matrix in matrices):
         raise InputError("linearize", "state", "found a state whose forces are not finite")
-    driven = [structure.cable_names[cable] for cable in np.sort(robot.driven)]
-    kinds = ("theta_x theta_y theta_z x y z", "w_x w_y w_z v_x v_y v_z")
-    states = [f"{body} {of}" for kind in kinds for body in structure.bodies for of in kind.split()]
-    states += [f"drive {cable}" for cable in driven[: len(A) - len(states)]]
     return Linearization(
         robot=robot,
-        system=LinearSystem(A, B, C, D),
-        states=tuple(states),
+        system=LinearSystem(*matrices),
+        states=_state_names(robot),
         inputs=robot.structure.oscillators,
         outputs=tuple(name for output in outputs for name in names[output]),
         state=at,
@@ -270,83 +257,85 @@ def _checked(
     return numbers
 
 
-def _checked_cost(
-    given: npt.ArrayLike, size: int, key: str, *, is_definite: bool = False
-) -> np.ndarray:
-    """A cost matrix (size, size) of lqr(). Raises InputError unless it is symmetric, without
-    negative eigenvalues, and with `is_definite` positive definite. Drake does not check all."""
+def _checked_cost(given: npt.ArrayLike, size: int, key: str) -> np.ndarray:
+    """A cost matrix (size, size) of lqr(). Raises InputError unless it is symmetric without
+    negative eigenvalues, which Drake does not check."""
     cost = _checked(given, (size, size), source="lqr", key=key)
-    greatest = np.abs(cost).max(initial=0.0)
-    least = np.linalg.eigvalsh(cost).min(initial=greatest)
-    if np.abs(cost - cost.T).max(initial=0.0) > _SAME * greatest:
-        raise InputError("lqr", key, "found a matrix that is not symmetric")
-    if least < -_SAME * greatest or (is_definite and least <= _SAME * greatest):
-        sign = "positive" if is_definite else "not negative"
-        raise InputError("lqr", key, f"found the eigenvalue {least:.3g}, expected all {sign}")
+    least = np.linalg.eigvalsh(cost).min(initial=0.0)
+    if not np.allclose(cost, cost.T, 1e-12, 0.0) or least < -1e-12 * np.abs(cost).max(initial=0.0):
+        raise InputError("lqr", key, "expected a symmetric matrix without negative eigenvalues")
     return np.asarray(0.5 * (cost + cost.T))
 
 
 def _matrices(
-    robot: Robot, state: np.ndarray, modes: np.ndarray, outputs: Sequence[str]
+    robot: Robot,
+    state: np.ndarray,
+    modes: np.ndarray,
+    outputs: Sequence[str],
+    *,
+    of_signals: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The matrices A, B, C and D of linearize(), by central differences."""
+    """The matrices A, B, C and D of linearize(), by central differences. Steps of the signals are a
+    share of `of_signals` (N)."""
     structure, drives, signals = robot.structure, robot.starting_drives(), robot.first_signals
     bodies = len(structure.bodies)
+    w_WB = state[7 * bodies :].reshape(-1, 6)[:, :3]
+
+    def rates_and_outputs(x: np.ndarray) -> np.ndarray:
+        """Rates of the states, then outputs, with the states and inputs x."""
+        moves, velocities, wound, pulls = np.split(x, ends)
+        moved = state.copy()
+        displace(state, moves, moved)
+        moved[7 * bodies :] += velocities
+        acceleration, rates, forces = rates_and_forces(
+            robot.model, moved, modes, signals + pulls, drives + wound
+        )
+        speeds = velocities.reshape(-1, 6).copy()
+        speeds[:, :3] += np.cross(w_WB, moves.reshape(-1, 6)[:, :3])
+        cables, ground = forces.cable_forces, forces.ground_forces
+        readings = Readings.of(
+            structure, time=0.0, state=moved, cable_forces=cables, ground_forces=ground
+        )
+        seen = [getattr(readings, output).ravel() for output in outputs]
+        return np.concatenate([speeds.ravel(), acceleration, rates, *seen])
+
+    ends = np.cumsum([6 * bodies, 6 * bodies, drives.size])
     radius = float(structure.radius.max() or np.ptp(structure.p_WN))
     of_bodies = np.tile(np.repeat([1.0, radius], 3), 2 * bodies)
     of_drives = np.full(drives.size, np.abs(drives).max(initial=0.0) or 1.0)
-    of_signals = np.full(signals.size, _greatest_force(robot, state, modes))
-    w_WB = state[7 * bodies :].reshape(-1, 6)[:, :3]
+    scales = np.concatenate([of_bodies, of_drives, np.full(signals.size, of_signals)])
     columns = []
-    for column, scale in enumerate(np.concatenate([of_bodies, of_drives, of_signals])):
-        ends = []
-        for step in (-STEP * scale, STEP * scale):
-            x = np.zeros(12 * bodies + drives.size + signals.size)
-            x[column] = step
-            moved, velocities, of_rest = state.copy(), x[6 * bodies : 12 * bodies], x[12 * bodies :]
-            displace(state, x[: 6 * bodies], moved)
-            moved[7 * bodies :] += velocities
-            motion = (
-                moved[np.newaxis],
-                modes[np.newaxis],
-                signals[np.newaxis] + of_rest[drives.size :],
-                drives[np.newaxis] + of_rest[: drives.size],
-            )
-            acceleration, rates = rates_of_motion(robot.model, *motion)
-            speeds = velocities.reshape(-1, 6).copy()
-            speeds[:, :3] += np.cross(w_WB, x[: 6 * bodies].reshape(-1, 6)[:, :3])
-            _, cables, ground = forces_of_motion(robot.model, *motion)
-            readings = Readings.of(
-                structure, time=0.0, state=moved, cable_forces=cables[0], ground_forces=ground[0]
-            )
-            seen = [getattr(readings, output).ravel() for output in outputs]
-            ends.append(np.concatenate([speeds.ravel(), acceleration[0], rates[0], *seen]))
-        columns.append((ends[1] - ends[0]) / (2.0 * STEP * scale))
-    jacobian, size = np.transpose(columns), 12 * bodies + drives.size
+    for step in STEP * np.diag(scales):
+        change = rates_and_outputs(step) - rates_and_outputs(-step)
+        columns.append(change / (2.0 * step.max()))
+    jacobian, size = np.transpose(columns), ends[-1]
     of_states, of_inputs = jacobian[:, :size], jacobian[:, size:]
     return of_states[:size], of_inputs[:size], of_states[size:], of_inputs[size:]
 
 
-def _greatest_force(robot: Robot, state: np.ndarray, modes: np.ndarray) -> float:
-    """Greatest tension (N) in a state, or the robot's weight if it is greater; 1 if both are 0."""
-    motion = state[np.newaxis], modes[np.newaxis], robot.first_signals[np.newaxis]
-    _, cables, _ = forces_of_motion(robot.model, *motion, robot.starting_drives()[np.newaxis])
-    return max(float(cables[0, :, TENSION].max(initial=0.0)), robot.weight) or 1.0
+def _forces_left(robot: Robot, state: np.ndarray, modes: np.ndarray) -> tuple[float, float]:
+    """The force (N) that accelerates a body most, and the greatest force: a tension or the robot's
+    weight, 1 if both are 0. Torques count with the radius of the body. Infinite if an actuator
+    moves."""
+    bodies, drives = robot.model.bodies, robot.starting_drives()
+    acceleration, rates, forces = rates_and_forces(
+        robot.model, state, modes, robot.first_signals, drives
+    )
+    turns, ways = np.abs(acceleration).reshape(-1, 2, 3).max(axis=2).T
+    levers = bodies.inertia.max(axis=1) / np.maximum(bodies.radius, np.finfo(float).tiny)
+    left = max((turns * levers).max(), (ways * bodies.mass).max())
+    if np.abs(rates).max(initial=0.0) > BALANCED * np.abs(drives).max(initial=1.0):
+        left = math.inf
+    tensions = forces.cable_forces[:, TENSION]
+    return float(left), max(float(tensions.max(initial=0.0)), robot.weight) or 1.0
 
 
-def _check_balanced(robot: Robot, state: np.ndarray, modes: np.ndarray) -> None:
-    """Raises InputError if a robot without actuation does not rest in its equilibrium, for example
-    on a slope, or with actuators that are too weak."""
-    drives, bodies = robot.starting_drives(), robot.model.bodies
-    motion = state[np.newaxis], modes[np.newaxis], robot.first_signals[np.newaxis]
-    accelerations, rates = rates_of_motion(robot.model, *motion, drives[np.newaxis])
-    turns, ways = np.split(np.abs(accelerations).reshape(-1, 6), 2, axis=1)
-    inertia = bodies.inertia.max(axis=1) / np.maximum(bodies.radius, np.finfo(float).tiny)
-    left = max((turns.max(axis=1) * inertia).max(), (ways.max(axis=1) * bodies.mass).max())
-    moves = np.abs(rates).max(initial=0.0) > BALANCED * np.abs(drives).max(initial=1.0)
-    if left > BALANCED * _greatest_force(robot, state, modes) or moves:
-        problem = f"does not rest on this terrain with these actuators: {left:.3g} N are left"
-        raise InputError(robot.scenario.name, "robot", f"{problem}; give a state")
+def _state_names(robot: Robot) -> tuple[str, ...]:
+    """Names of the states of a robot's linear system."""
+    structure, kinds = robot.structure, ("theta_x theta_y theta_z x y z", "w_x w_y w_z v_x v_y v_z")
+    names = [f"{body} {of}" for kind in kinds for body in structure.bodies for of in kind.split()]
+    driven = np.sort(robot.driven)[: robot.starting_drives().size]
+    return (*names, *(f"drive {structure.cable_names[cable]}" for cable in driven))
 
 
 def _reading_names(structure: Structure) -> dict[str, list[str]]:
