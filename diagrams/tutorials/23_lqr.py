@@ -35,9 +35,8 @@ gain = linear.lqr(cost, 1e-3 * np.eye(3))
 hold = linear.controller(gain)
 
 # %% The same push on Drake's diagram. The regulator is a system in it.
-diagram = MakeTensegrityDiagram(
-    linear.robot, None, controller=SampledController(linear.robot, hold, period=0.02)
-)
+regulator = SampledController(linear.robot, hold, period=0.02)
+diagram = MakeTensegrityDiagram(linear.robot, controller=regulator)
 simulator = MakeSimulator(diagram, linear.robot, Drake())
 plant, context = diagram.GetSubsystemByName("plant"), simulator.get_mutable_context()
 push, middle = np.array([0.0, 2.0, 0.0]), linear.robot.structure.p_WB[0]
@@ -67,7 +66,7 @@ def held(regulated: bool) -> np.ndarray:
         robots.assume(pushed, place=number)
     readings, actions = robots.state, robots.rest.copy()
     while not robots.ended[stands].all():
-        for place in np.flatnonzero(stands) if regulated else ():
+        for place in np.flatnonzero(stands).tolist() if regulated else []:
             actions[place] = hold(0.0, readings.rows(place))
         readings = robots.step(actions, indices=np.flatnonzero(stands))
         stands &= readings.p_WN[:, top, 2] > 0.0

@@ -10,6 +10,7 @@ import pytest
 from helpers.anchored import BAR, HUNG, LINE, floating_prism, scenario_of, supported_prism
 from helpers.converged import CONVERGED
 from helpers.meshcat_page import read_page
+from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.systems.primitives import LinearSystem
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
@@ -130,6 +131,34 @@ def test_the_rates_are_those_of_the_diagram():
         assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-9 * np.abs(theirs).max())
 
 
+@pytest.mark.parametrize("actuation", ["!Force", "!Winch {max_force: 200 N, max_speed: 2 m/s}"])
+def test_drake_finds_the_same_matrices_in_its_coordinates(actuation):
+    # Small changes of Drake's states are T x, with N(q) for the displacements in T. So its
+    # derivatives are those of T x' = T A x + T B u.
+    linear = linearize(supported_prism(actuation=actuation))
+    diagram = MakeTensegrityDiagram(linear.robot)
+    context, plant = diagram.CreateDefaultContext(), diagram.GetSubsystemByName("plant")
+    converted, (rates, inputs) = diagram.ToAutoDiffXd(), linear.system.B().shape
+    given = converted.CreateDefaultContext()
+    given.SetTimeStateAndParametersFrom(context)
+    state = context.get_continuous_state_vector().CopyToVector()
+    numbers = InitializeAutoDiff(np.concatenate([state, linear.signals])).ravel()
+    given.SetContinuousState(numbers[: state.size])
+    converted.get_input_port().FixValue(given, numbers[state.size :])
+    theirs = ExtractGradient(converted.EvalTimeDerivatives(given).CopyToVector())
+    own, count = plant.GetMyContextFromRoot(context), plant.num_velocities()
+    to_drake = np.zeros((state.size, rates))
+    for column, unit in enumerate(np.eye(count)):
+        to_drake[: plant.num_positions(), column] = plant.MapVelocityToQDot(own, unit)
+    to_drake[plant.num_positions() :, count:] = np.eye(rates - count)
+    found = to_drake @ np.hstack([linear.system.A(), linear.system.B()])
+    expected = np.hstack([theirs[:, : state.size] @ to_drake, theirs[:, state.size :]])
+    scale = np.abs(found[:, :rates]).max(), np.abs(found[:, rates:]).max()
+    assert found[:, :rates] == pytest.approx(expected[:, :rates], abs=1e-7 * scale[0])
+    assert inputs == 3
+    assert found[:, rates:] == pytest.approx(expected[:, rates:], abs=3e-6 * scale[1])
+
+
 def test_a_winch_follows_its_command_with_its_lag():
     scenario = supported_prism(actuation="!Winch {max_force: 200 N, max_speed: 2 m/s}")
     linear = linearize(scenario)
@@ -195,7 +224,7 @@ def test_a_regulator_holds_a_mast_that_topples_without_it_and_does_so_on_the_dia
     assert np.abs(held[:, :2]).max() > 0.1 and held[-1, 2] > 0.99
     assert fallen[:, 2].min() < 0.0
     law = SampledController(linear.robot, hold, period=0.02)
-    diagram = MakeTensegrityDiagram(linear.robot, None, controller=law)
+    diagram = MakeTensegrityDiagram(linear.robot, controller=law)
     simulator = MakeSimulator(diagram, linear.robot, Drake(accuracy=1e-6))
     plant, context = diagram.GetSubsystemByName("plant"), simulator.get_mutable_context()
     of_middle = np.cross(push, linear.robot.structure.p_WB[0])
