@@ -20,6 +20,8 @@ from pathlib import Path
 from posixpath import dirname, join, normpath
 from typing import Any
 
+from markdown import Extension, Markdown
+from markdown.preprocessors import Preprocessor
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files, InclusionLevel
@@ -43,6 +45,7 @@ LANGUAGES = {".py": "python", ".yaml": "yaml", ".cff": "yaml"}
 _LINK = re.compile(r"""(\]\(|\b(?:src|href)=")([^)"#:\s]+)(?=[)"#])""")
 _HEADED_LIST = re.compile(r"^(\*[^\n]+\*)\n(?=- )", re.MULTILINE)
 """A line before a list, which needs an empty line between for Python-Markdown."""
+_DOCTEST = re.compile(r"^>>> .*(?:\n(?=\S).*)*", re.MULTILINE)
 _UNLISTED = "---\nsearch: {exclude: true}\n---\n"
 CORRECTIONS = {
     r"<th([^>]*)></th>": r"<td\1></td>",
@@ -53,6 +56,22 @@ CORRECTIONS = {
 }
 """Patterns in pages as the theme and Python-Markdown write them, and what is right."""
 _log = logging.getLogger("mkdocs.plugins.tetra_drake")
+
+
+class Doctests(Preprocessor):
+    """Shows lines of a docstring from `>>>` to the next empty line as code."""
+
+    def run(self, lines: list[str]) -> list[str]:
+        """The lines of a text, with fences about doctests."""
+        return _DOCTEST.sub(r"~~~~pycon\n\g<0>\n~~~~", "\n".join(lines)).split("\n")
+
+
+class DoctestExtension(Extension):
+    """Extension of Python-Markdown with Doctests, before fences are found."""
+
+    def extendMarkdown(self, md: Markdown) -> None:
+        """Registers the preprocessor."""
+        md.preprocessors.register(Doctests(md), "doctests", 30)
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
@@ -69,6 +88,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         return [pages(part) for parts in each for part in parts]
 
     config.nav = pages(config.nav)
+    config.markdown_extensions.append(DoctestExtension())
     return config
 
 
@@ -187,7 +207,7 @@ def run(script: Path, wanted: str) -> Output:
     Raises PluginError if it fails, but not if a package is missing that it imports itself.
     """
     if not fnmatch.fnmatch(script.stem, wanted):
-        return Output(reason=f"it runs {wanted}")
+        return Output(reason=f"it runs tutorials named {wanted}")
     sources = [script, *sorted((ROOT / PACKAGE).rglob("*.py"))]
     digest = hashlib.sha256(b"".join(file.read_bytes() for file in sources)).hexdigest()
     folder, drawn = RUNS / f"{script.stem}-{digest[:16]}", f"{script.stem}.png"
@@ -195,7 +215,9 @@ def run(script: Path, wanted: str) -> Output:
         _log.info("Running %s", script.name)
         RUNS.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=RUNS) as work:
-            done = subprocess.run([sys.executable, script], cwd=work, capture_output=True, text=True)
+            done = subprocess.run(
+                [sys.executable, script], cwd=work, capture_output=True, text=True
+            )
             if done.returncode:
                 last = (done.stderr.strip().splitlines() or ["no message"])[-1]
                 if last.startswith("ModuleNotFoundError"):
@@ -221,5 +243,7 @@ def tutorial_page(script: Path, output: Output) -> str:
         text += ["## What it prints", f"~~~~text\n{output.printed}\n~~~~"]
     text += ["## What it draws", f"![Picture of {script.name}]({script.stem}.png)"]
     if output.reason:
-        text.append(f"The picture is from the repository. This build did not run the script: {output.reason}.")
+        text.append(
+            f"The picture is from the repository. This build did not run the script: {output.reason}"
+        )
     return "\n\n".join(text)
