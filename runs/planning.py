@@ -620,8 +620,8 @@ work evenly.
 {costs}
 
 Wall times were measured for {walled} of the goals, on two cores of an AMD EPYC that were not free:
-the load was {load}, some eight processes for each core. So they tell what waits, and not what a
-planner alone on two cores keeps; that was not measured. *Deadlines kept* counts the decisions
+the load average was {load}. So they tell how long a decision waits for others, and not what a
+planner alone on two cores keeps, which was not measured. *Deadlines kept* counts the decisions
 within half a second.
 
 {walls}
