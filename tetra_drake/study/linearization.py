@@ -38,7 +38,7 @@ STEP = 1e-6
 """Step of the central differences: in rad, as a share of the largest body's radius (m, and m/s), of
 the greatest force (N), and of the greatest state of an actuator. The matrices are exact to some
 1e-10 of their greatest numbers; the spin of a thin bar, whose inertia is small, to 1e-8."""
-BALANCED = 1e-6
+BALANCED = 1e-4
 """Force left at rest, at most, as a share of the greatest force."""
 
 
