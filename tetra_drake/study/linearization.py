@@ -217,8 +217,8 @@ def linearize(
             raise InputError("linearize", "outputs", no_such("readings", output, [*names]))
     left, greatest = _forces_left(robot, at, fixed)
     if state is None and left > BALANCED * greatest:
-        problem = f"does not rest on this terrain with these actuators: {left:.3g} N are left"
-        raise InputError(robot.scenario.name, "robot", f"{problem}; give a state")
+        problem = "does not rest on this terrain with these actuators; give a state"
+        raise InputError(robot.scenario.name, "robot", problem)
     matrices = _matrices(robot, at, fixed, outputs, of_signals=greatest)
     if not all(np.isfinite(matrix).all() for matrix in matrices):
         raise InputError("linearize", "state", "found a state whose forces are not finite")
