@@ -162,6 +162,7 @@ def BodyForces_(T: type) -> type:
         def _construct(self, bodies: int, *, converter: SystemScalarConverter) -> None:
             LeafSystem_[T].__init__(self, converter)
             self._bodies = bodies
+            self._origin = np.zeros(3)  # of a body; without a default for AutoDiffXd
             self._force = self.DeclareVectorInputPort("generalized_force", 6 * bodies)
             self.DeclareAbstractOutputPort(
                 "spatial_forces",
@@ -177,7 +178,7 @@ def BodyForces_(T: type) -> type:
             forces, acting = self._force.Eval(context).reshape(-1, 6), []
             for body in np.flatnonzero(forces.any(axis=1) | (T is AutoDiffXd)).tolist():
                 applied = ExternallyAppliedSpatialForce_[T]()
-                applied.p_BoBq_B = np.zeros(3)
+                applied.p_BoBq_B = self._origin
                 applied.body_index = BodyIndex(body - WORLD)
                 applied.F_Bq_W = SpatialForce_[T](forces[body])
                 acting.append(applied)
