@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.errors import InputError
+from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.rates import rates_and_forces
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.readings import first_readings
@@ -248,6 +249,17 @@ def test_a_regulator_damps_a_floating_robot_and_lets_it_drift():
     assert slowest[1] < 2.0 * slowest[0] < 0.0
     drift = np.tile(np.concatenate([np.zeros(3), [1.0, 0.0, 0.0]]), 3)
     assert gain @ np.concatenate([drift, 0.0 * drift]) == pytest.approx(np.zeros(6), abs=1e-4)
+
+
+def test_bristles_hold_the_nodes_that_stick_and_none_in_the_air():
+    # Three nodes bear the prism, each with a bristle of 300 N/m. All bodies move along x.
+    for modes, stiffness in ((None, 900.0), (np.zeros((6, MODE_COLUMNS)), 0.0)):
+        linear = linearize(PRISM, Robot.of(load_scenario(PRISM)).equilibrium.state, modes=modes)
+        along = [name.endswith(" x") for name in linear.states]
+        pushed = [name.endswith(" v_x") for name in linear.states]
+        acceleration = (linear.system.A() @ np.array(along, dtype=float))[pushed]
+        force = linear.robot.structure.mass @ acceleration
+        assert force == pytest.approx(-stiffness, rel=1e-6, abs=1e-4)
 
 
 def test_the_turn_of_a_spinning_body_from_another_is_carried_along():

@@ -157,11 +157,11 @@ def test_steering_has_derivatives_up_to_the_limits_of_the_turn(turn):
 
 
 def walking(changes: dict[str, object]) -> tuple[Diagram, Simulator]:
-    """Diagram of a robot on the ground, and its simulator after half a second."""
+    """Diagram of a robot on the ground, and its simulator after a fifth of a second."""
     scenario = load_scenario("thesis").with_changes(changes)
     diagram = MakeTensegrityDiagram(Robot.of(scenario), seeded_gait(scenario, 1))
     simulator = Simulator(diagram)
-    simulator.AdvanceTo(0.5)
+    simulator.AdvanceTo(0.2)
     return diagram, simulator
 
 
@@ -201,7 +201,7 @@ def test_a_clone_moves_as_its_original_and_apart_from_it(changes):
     other = Simulator(clone)  # a clone of Drake's plant loses default poses of free bodies
     start = diagram.CreateDefaultContext()
     other.get_mutable_context().SetTimeStateAndParametersFrom(start)
-    other.AdvanceTo(0.5)
+    other.AdvanceTo(0.2)
     ends = [
         each.get_context().get_continuous_state_vector().CopyToVector()
         for each in (simulator, other)
@@ -214,3 +214,16 @@ def test_a_robot_for_autodiff_is_not_simulated_because_its_modes_would_stay(refu
     simulator = Simulator_[AutoDiffXd](diagram.ToAutoDiffXd())
     with refused("AutoDiffXd", "timer", "discrete state"):
         simulator.Initialize()
+
+
+def test_inputs_with_unequal_numbers_of_derivatives_are_refused(refused):
+    builder = DiagramBuilder()
+    steering = builder.AddNamedSystem("steers", Steering(doubled, turn=0.0))
+    builder.ExportInput(steering.get_input_port())
+    builder.ExportOutput(steering.get_output_port())
+    diagram = builder.Build().ToAutoDiffXd()
+    context = diagram.CreateDefaultContext()
+    context.SetTime(AutoDiffXd(0.0, [1.0, 0.0]))
+    diagram.get_input_port().FixValue(context, InitializeAutoDiff(np.zeros(1)).ravel())
+    with refused("AutoDiffXd", "steers", "[1, 2] derivatives"):
+        diagram.get_output_port().Eval(context)

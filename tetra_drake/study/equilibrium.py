@@ -121,7 +121,7 @@ class EquilibriumStudy:
     @functools.cached_property
     def damped(self) -> DampedModes:
         """Modes with damping. Nodes on the ground stick; see linearize()."""
-        return linearize(self.robot).modes()
+        return linearize(self.robot, self.robot.equilibrium.state).modes()
 
 
 def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
@@ -279,8 +279,8 @@ def structure_text(study: EquilibriumStudy) -> str:
         names = [f"force along {axis} ({force})" for axis in "xyz"]
         lines.append(TextTable(["anchor", *names], rows).text())
     if len(structure.bodies) < _LARGE:
-        lowest_damped = zip(*study.damped[:2], strict=True)
-        rows = [[str(i), *map(rounded, mode)] for i, mode in enumerate(lowest_damped, start=1)]
+        lowest_damped = enumerate(zip(*study.damped[:2], strict=True), start=1)
+        rows = [[str(i), rounded(hertz), fixed(ratio, 4)] for i, (hertz, ratio) in lowest_damped]
         sticks = "; nodes on the ground stick" if structure.contacts.size else ""
         lines.append(f"Modes with damping{sticks}:" if rows else "No oscillations with damping.")
         headings = ["mode", "frequency (Hz)", "damping ratio"]
@@ -364,7 +364,7 @@ def _shown_modes(study: EquilibriumStudy, mode: int | None) -> tuple[str, np.nda
     damped = study.damped
     if not 1 <= mode <= (count := len(damped.frequencies)):
         raise InputError(name, "mode", f"found {mode}, expected one of {count} modes with damping")
-    title = f"{name}: mode {mode}, damping ratio {rounded(damped.damping_ratios[mode - 1])}"
+    title = f"{name}: mode {mode}, damping ratio {fixed(damped.damping_ratios[mode - 1], 4)}"
     return title, damped.frequencies[mode - 1 : mode], damped.motions[mode - 1 : mode]
 
 

@@ -38,7 +38,7 @@ STEP = 1e-6
 """Step of the central differences: in rad, as a share of the largest body's radius (m, and m/s), of
 the greatest force (N), and of the greatest state of an actuator. The matrices are exact to some
 1e-10 of their greatest numbers; the spin of a thin bar, whose inertia is small, to 1e-8."""
-BALANCED = 1e-6
+BALANCED = 1e-4
 """Force left at rest, at most, as a share of the greatest force."""
 
 
@@ -217,8 +217,8 @@ def linearize(
             raise InputError("linearize", "outputs", no_such("readings", output, [*names]))
     left, greatest = _forces_left(robot, at, fixed)
     if state is None and left > BALANCED * greatest:
-        problem = f"does not rest on this terrain with these actuators: {left:.3g} N are left"
-        raise InputError(robot.scenario.name, "robot", f"{problem}; give a state")
+        problem = "does not rest on this terrain with these actuators; give a state"
+        raise InputError(robot.scenario.name, "robot", problem)
     matrices = _matrices(robot, at, fixed, outputs, of_signals=greatest)
     if not all(np.isfinite(matrix).all() for matrix in matrices):
         raise InputError("linearize", "state", "found a state whose forces are not finite")

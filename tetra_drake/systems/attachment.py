@@ -147,6 +147,8 @@ def BodyStates_(T: type) -> type:
 def BodyForces_(T: type) -> type:
     """Forces on the bodies of a plant, as a list that the plant reads; a class for each type of
     scalars."""
+    Applied, Wrench = ExternallyAppliedSpatialForce_[T], SpatialForce_[T]
+    differentiates = T is AutoDiffXd
 
     class Impl(LeafSystem_[T]):
         """Forces on the n bodies of a plant other than the world, as a list that the plant reads.
@@ -165,7 +167,7 @@ def BodyForces_(T: type) -> type:
             self._force = self.DeclareVectorInputPort("generalized_force", 6 * bodies)
             self.DeclareAbstractOutputPort(
                 "spatial_forces",
-                lambda: AbstractValue.Make([ExternallyAppliedSpatialForce_[T]()]),
+                lambda: AbstractValue.Make([Applied()]),
                 self._calc_forces,
                 {self._force.ticket()},
             )
@@ -175,11 +177,13 @@ def BodyForces_(T: type) -> type:
 
         def _calc_forces(self, context: Context, output: AbstractValue) -> None:
             forces, acting = self._force.Eval(context).reshape(-1, 6), []
-            for body in np.flatnonzero(forces.any(axis=1) | (T is AutoDiffXd)).tolist():
-                applied = ExternallyAppliedSpatialForce_[T]()
-                applied.p_BoBq_B = np.zeros(3)
+            bodies = range(len(forces)) if differentiates else np.flatnonzero(forces.any(axis=1))
+            for body in map(int, bodies):
+                applied = Applied()
+                if differentiates:  # the default is no number, unlike the one for floats
+                    applied.p_BoBq_B = np.zeros(3)  # at the body's origin
                 applied.body_index = BodyIndex(body - WORLD)
-                applied.F_Bq_W = SpatialForce_[T](forces[body])
+                applied.F_Bq_W = Wrench(forces[body])
                 acting.append(applied)
             output.set_value(acting)
 

@@ -75,7 +75,7 @@ def CableGeometry_(T: type) -> type:
                 places = np.linspace(length / 2, distance - length / 2, PIECES)
                 for frame, place in zip(frames, places, strict=True):
                     X_WC = RigidTransform(R_WC, p_WA + place * along)
-                    poses.set_value(frame, X_WC.cast[T]())
+                    poses.set_value(frame, X_WC if T is float else X_WC.cast[T]())
 
     return Impl
 

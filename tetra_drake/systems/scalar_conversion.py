@@ -107,7 +107,6 @@ class AutoDiffTwin(LeafSystem_[AutoDiffXd]):
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: Any) -> None:
         """Writes the rates of the continuous state, with their derivatives."""
-
         if derivatives.size():
             derivatives.SetFromVector(self._differentiated(context, read=self._rates).ravel())
 
@@ -149,7 +148,11 @@ class AutoDiffTwin(LeafSystem_[AutoDiffXd]):
         of_system, vectors = self._counterpart(context)
         value = np.array(read(of_system))
         gradients = [ExtractGradient(given) for given, _ in vectors]
-        gradient = np.zeros((value.size, max(each.shape[1] for each in gradients)))
+        counts = {each.shape[1] for each in gradients} - {0}
+        if len(counts) > 1:
+            problem = f"found {sorted(counts)} derivatives of its inputs, expected one number"
+            raise InputError("AutoDiffXd", self.get_name(), problem)
+        gradient = np.zeros((value.size, max(counts, default=0)))
         for (given, set_values), of_given in zip(vectors, gradients, strict=True):
             start = ExtractValue(given).ravel()
             for place in of_given.any(axis=1).nonzero()[0].tolist():
