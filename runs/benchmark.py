@@ -506,7 +506,7 @@ MORE_TABLES = {"sizes": sizes_table, "schemes": schemes_table, "candidates": can
 
 
 def main(names: Sequence[str], scenario: Scenario) -> None:
-    """Prints the tables of the given names, or `engines` and those of TABLES.
+    """Prints the tables of the given names, or `engines` and all of TABLES.
 
     Raises InputError."""
     tables = [*ENGINES, *TABLES, *MORE_TABLES]

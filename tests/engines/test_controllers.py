@@ -170,3 +170,10 @@ def test_a_scene_graph_without_meshcat_has_struts_and_cables(walking):
     assert {"plant", "cables"} <= set(sources)
     names = [inspector.GetName(one) for one in inspector.GetAllFrameIds()]
     assert {f"{cable} 0" for cable in robot.structure.cable_names} <= set(names)
+
+
+@pytest.mark.parametrize("key", ["robot", "gait", "controller", "scene_graph", "meshcat"])
+def test_an_argument_of_another_type_is_refused(walking, refused, key):
+    given = {"robot": Robot.of(walking)} | {key: "word"}
+    with refused("MakeTensegrityDiagram", key, "'word'"):
+        MakeTensegrityDiagram(**given)

@@ -217,12 +217,9 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
             raise InputError(source, f"{key}.{name}", problem)
 
 
-def parameters_of(source: str, system: LeafSystem, context: Context) -> BasicVector:
-    """The parameters in a context of a system, which may be changed.
-
-    Raises InputError if it is the context of another system, or the system has none. Its message
-    names `source`, the method.
-    """
+def check_parameters(source: str, system: LeafSystem, context: Context) -> None:
+    """Raises InputError unless a context is of this system, and the system has parameters. Its
+    message names `source`, the method."""
     check_type(source, "context", context, Context)
     try:
         system.ValidateContext(context)
@@ -231,7 +228,6 @@ def parameters_of(source: str, system: LeafSystem, context: Context) -> BasicVec
         raise InputError(source, "context", problem) from error
     if not context.num_numeric_parameter_groups():
         raise InputError(source, "context", "has no constants; add the system with parameters=True")
-    return context.get_mutable_numeric_parameter(0)
 
 
 def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:

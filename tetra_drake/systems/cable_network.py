@@ -32,9 +32,9 @@ from tetra_drake.systems.attachment import (
     check_constants,
     check_frame,
     check_host,
+    check_parameters,
     check_part,
     checked_numbers,
-    parameters_of,
 )
 from tetra_drake.systems.cable_geometry import CableGeometry_, RegisterCylinders
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
@@ -83,7 +83,7 @@ class CableNetwork(ConvertibleSystem):
         super().__init__()
         self._names = names
         self._constants = np.concatenate(model.cables.law)  # a copy, which a context may replace
-        law = cable.CableLaw(*np.split(self._constants, len(cable.CableLaw._fields)))
+        law = _law_of(self._constants)
         model = model._replace(cables=model.cables._replace(law=law))
         self._has_parameters = parameters
         if parameters:
@@ -122,8 +122,8 @@ class CableNetwork(ConvertibleSystem):
     def GetLaw(self, context: Context) -> cable.CableLaw:
         """Constants of the cables in a context of this system: a CableLaw of arrays (cables,), in
         the order of the cables. Raises InputError if they are no parameters."""
-        constants = parameters_of("GetLaw", self, context).CopyToVector()
-        return cable.CableLaw(*np.split(constants, len(cable.CableLaw._fields)))
+        check_parameters("GetLaw", self, context)
+        return _law_of(context.get_numeric_parameter(0).CopyToVector())
 
     def SetLaw(self, context: Context, law: cable.CableLaw) -> None:
         """Replaces the constants of the cables in a context of this system.
@@ -132,12 +132,11 @@ class CableNetwork(ConvertibleSystem):
         all cables. Raises InputError if the constants are no parameters, or one of them is negative
         or not finite.
         """
-        parameters = parameters_of("SetLaw", self, context)
+        check_parameters("SetLaw", self, context)
         check_type("SetLaw", "law", law, cable.CableLaw)
-        given = law._asdict().items()
-        count = len(self._names)
+        given, count = law._asdict().items(), len(self._names)
         rows = [checked_numbers("SetLaw", key, row, count=count, least=0.0) for key, row in given]
-        parameters.SetFromVector(np.concatenate(rows))
+        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
 
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
@@ -173,6 +172,13 @@ class CableNetwork(ConvertibleSystem):
     def _drive_rates(self, context: Context) -> np.ndarray:
         self._table(context)
         return self._forces.drives[:, actuator.RATE]
+
+
+def _law_of(constants: np.ndarray) -> cable.CableLaw:
+    """The parameters of a CableNetwork as a CableLaw of arrays (cables,), which share their
+    memory."""
+    rows: Any = np.split(constants, len(cable.CableLaw._fields))
+    return cable.CableLaw(*rows)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import NoneType
+from typing import get_args
 
 import numpy as np
 from pydrake.geometry import Meshcat, SceneGraph
@@ -14,7 +16,7 @@ from pydrake.systems.lcm import ApplyLcmBusConfig
 from pydrake.systems.primitives import ConstantVectorSource, PassThrough, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import AnyGait, Gait, network_gait
 from tetra_drake.robot.network import SteeringSignal, initial_neurons
@@ -99,6 +101,12 @@ def MakeTensegrityDiagram(
 
     Raises InputError if a gait is not of this robot, or a port of the controller has another size.
     """
+    source = "MakeTensegrityDiagram"
+    check_type(source, "robot", robot, Robot)
+    check_type(source, "gait", gait, *get_args(AnyGait), NoneType)
+    check_type(source, "controller", controller, System, NoneType)
+    check_type(source, "scene_graph", scene_graph, bool)
+    check_type(source, "meshcat", meshcat, Meshcat, NoneType)
     scenario, structure = robot.scenario, robot.structure
     gait = None if gait is None else network_gait(gait)
     builder = DiagramBuilder()
@@ -187,8 +195,9 @@ def _ShowInMeshcat(
         VisualizationConfig,
     )
 
-    config = VisualizationConfig(publish_proximity=False, publish_contacts=False)
-    config.publish_inertia = False
+    config = VisualizationConfig(
+        publish_proximity=False, publish_contacts=False, publish_inertia=False
+    )
     # Drake would also send all poses to viewers on the network.
     buses = ApplyLcmBusConfig({config.lcm_bus: DrakeLcmParams(lcm_url="memq://null")}, builder)
     ApplyVisualizationConfig(

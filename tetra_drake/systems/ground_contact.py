@@ -32,8 +32,8 @@ from tetra_drake.systems.attachment import (
     check_constants,
     check_frame,
     check_host,
+    check_parameters,
     checked_numbers,
-    parameters_of,
 )
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
@@ -118,28 +118,29 @@ class GroundContact(ConvertibleSystem):
         DeclareOutput(self, "ground_forces", 3 * count, table, sources)
 
     def SetGround(self, context: Context, ground: contact.Ground) -> None:
-        """Replaces the constants of normal force and friction in a context of this system by those
-        of a ground, such as a robot's ground or one of robot.ground.make_surface(). Its contact
+        """Copies the constants of normal force and friction of a ground, such as a robot's ground
+        or one of robot.ground.make_surface(), to a context of this system. The ground's contact
         nodes are ignored.
 
         Raises InputError if the constants are no parameters, one of them is negative or not finite,
         or the ground has another law of friction or another terrain.
         """
-        parameters = parameters_of("SetGround", self, context)
+        check_parameters("SetGround", self, context)
         check_type("SetGround", "ground", ground, contact.Ground)
         if ground.friction.kind != self._ground.friction.kind:
             raise InputError("SetGround", "ground", "found another law of friction")
-        surfaces = [
-            (*one.grid[:-1], *one.heights)
-            for one in (ground, self._ground)  # without the reach
-        ]
-        if surfaces[0] != surfaces[1]:
+        # The last number of a grid is the largest radius of a foot.
+        theirs, ours = ((*one.grid[:-1], *one.heights) for one in (ground, self._ground))
+        if theirs != ours:
             raise InputError("SetGround", "ground", "found another terrain")
-        given = np.concatenate([ground.normal, ground.friction.constants])
-        count = self._constants.size
-        parameters.SetFromVector(
-            checked_numbers("SetGround", "ground", given, count=count, least=0.0)
-        )
+        rows = [
+            checked_numbers("SetGround", "ground", given, count=own.size, least=0.0)
+            for given, own in (
+                (ground.normal, self._ground.normal),
+                (ground.friction.constants, self._ground.friction.constants),
+            )
+        ]
+        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
 
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
