@@ -162,8 +162,17 @@ def test_a_name_belongs_to_one_kind(site):
         build()
     declare(site, "two", "1", {plugins.KINDS: {"Coulomb": "odd:Coulomb"}})
     plugins.entries.cache_clear()
-    with pytest.raises(InputError, match="as well, expected one of this name"):
+    with pytest.raises(InputError, match=r"plug-in (one|two) 1 as well"):
         build()
+
+
+@pytest.mark.parametrize("file", ["METADATA", "entry_points.txt"])
+def test_damaged_metadata_is_one_line(site, file):
+    declare(site, "odd-kinds", "0.3", {plugins.KINDS: {"Odd": "odd:Odd"}})
+    (site / "odd_kinds-0.3.dist-info" / file).write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="damaged metadata of a package") as refused:
+        build()
+    assert refused.value.key == plugins.KINDS
 
 
 def test_a_structure_of_a_plugin_without_its_file_is_one_line(site):

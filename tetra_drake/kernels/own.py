@@ -12,19 +12,16 @@ import functools
 import hashlib
 import inspect
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import numpy as np
 from numba import types
 from numba.extending import overload, typeof_impl
 
-from tetra_drake.kernels.compiling import INLINED
+from tetra_drake.kernels.compiling import INLINED, F
 from tetra_drake.kernels.lanes import Table, named
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)

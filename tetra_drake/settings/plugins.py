@@ -18,9 +18,8 @@ from typing import Any
 
 from tetra_drake.errors import InputError
 
-KINDS = "tetra_drake.kinds"
-OPTIMIZERS = "tetra_drake.optimizers"
-STRUCTURES = "tetra_drake.structures"
+KINDS, OPTIMIZERS, STRUCTURES = map("tetra_drake.{}".format, ("kinds", "optimizers", "structures"))
+"""Groups of entry points."""
 
 PLUGIN = "plug-in "
 """Beginning of the names of plug-ins among the versions in a record."""
@@ -29,14 +28,21 @@ PLUGIN = "plug-in "
 @functools.cache
 def entries(group: str) -> Mapping[str, Any]:
     """Entry points (importlib.metadata.EntryPoint) of a group, by name. Raises InputError for a
-    name that two plug-ins have."""
+    name that two plug-ins have, and for metadata of a distribution that cannot be read."""
     found: dict[str, Any] = {}
-    for entry in metadata.entry_points(group=group):
+    try:
+        given = [(entry, _title(entry)) for entry in metadata.entry_points(group=group)]
+    except Exception as error:  # the metadata of any distribution may be damaged in any way
+        raise InputError("plug-ins", group, f"damaged metadata of a package: {error!r}") from error
+    for entry, title in given:
         if entry.name in found:
-            other = found[entry.name].dist.name
-            raise refusal(entry, f"found it in {other} as well, expected one of this name")
+            raise refusal(found[entry.name], f"found it in {title} as well, expected it once")
         found[entry.name] = entry
     return found
+
+
+def _title(entry: Any) -> str:
+    return f"{PLUGIN}{entry.dist.name} {entry.dist.version}"
 
 
 def loaded(entry: Any) -> Any:
@@ -51,8 +57,7 @@ def loaded(entry: Any) -> Any:
 
 def refusal(entry: Any, problem: str) -> InputError:
     """Error about an entry point; its source is the distribution with its version."""
-    source = f"{PLUGIN}{entry.dist.name} {entry.dist.version}"
-    return InputError(source, f"{entry.group}.{entry.name}", problem)
+    return InputError(_title(entry), f"{entry.group}.{entry.name}", problem)
 
 
 def plugins_of(sections: Iterable[tuple[str, Any]]) -> dict[str, str]:
@@ -60,8 +65,7 @@ def plugins_of(sections: Iterable[tuple[str, Any]]) -> dict[str, str]:
     `sections` are the scenario, or pairs of names and sections."""
     kinds = {type(section) for _, section in sections}
     added = [*entries(KINDS).values(), *entries(OPTIMIZERS).values()]
-    used = (entry.dist for entry in added if loaded(entry) in kinds)
-    return {f"{PLUGIN}{plugin.name}": str(plugin.version) for plugin in used}
+    return {f"{PLUGIN}{x.dist.name}": str(x.dist.version) for x in added if loaded(x) in kinds}
 
 
 def check_plugins(versions: Mapping[str, str], source: object) -> None:

@@ -217,11 +217,10 @@ class Kinds:
     def _added(self, tags: set[str], base: Any) -> Iterator[type]:
         """Kinds of plug-ins that derive from `base`. Raises InputError for a class that no union
         takes, or whose tag is not the name of its entry point, or is one of `tags`."""
-        bases = self.bases[self.group]
         for name, entry in entries(self.group).items():
             kind: Any = loaded(entry)
-            if not (isinstance(kind, type) and issubclass(kind, bases)):
-                expected = " or ".join(one.__name__ for one in bases)
+            if not (isinstance(kind, type) and issubclass(kind, self.bases[self.group])):
+                expected = " or ".join(one.__name__ for one in self.bases[self.group])
                 raise refusal(entry, f"found {kind!r:.60}, expected a class of {expected}")
             if issubclass(kind, base) and (kind.tag in tags or kind.tag != name):
                 raise refusal(entry, f"found !{kind.tag}, expected !{name}, which no kind here has")
