@@ -11,7 +11,8 @@ from helpers.anchored import BAR, HUNG, LINE, floating_prism, scenario_of, suppo
 from helpers.converged import CONVERGED
 from helpers.meshcat_page import read_page
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
-from pydrake.systems.primitives import LinearSystem
+from pydrake.planning import DirectCollocation
+from pydrake.systems.primitives import Linearize, LinearSystem
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
@@ -158,6 +159,24 @@ def test_drake_finds_the_same_matrices_in_its_coordinates(actuation):
     assert found[:, :rates] == pytest.approx(expected[:, :rates], abs=1e-7 * scale[0])
     assert inputs == 3
     assert found[:, rates:] == pytest.approx(expected[:, rates:], abs=3e-6 * scale[1])
+
+
+def test_drakes_own_tools_take_a_robot_whose_contacts_keep_their_modes():
+    linear = linearize("prism")
+    diagram = MakeTensegrityDiagram(linear.robot, modes=linear.robot.starting_modes)
+    context, signals = diagram.CreateDefaultContext(), diagram.GetInputPort("signals")
+    signals.FixValue(context, np.zeros(len(linear.inputs)))
+    ports = signals.get_index(), diagram.GetOutputPort("lengths").get_index()
+    roots = np.linalg.eigvals(Linearize(diagram, context, *ports, 1e-3).A())
+    swings = np.sort(roots.imag[roots.imag > 1.0]) / math.tau
+    np.testing.assert_allclose(swings, linear.modes().frequencies, rtol=1e-6)
+    plan = DirectCollocation(diagram, context, 3, 0.01, 0.05, signals.get_index())
+    assert len(plan.state(0)) == linear.state.size
+    assert not diagram.CreateDefaultContext().num_discrete_state_groups()
+    for wrong in ([1.0], np.full((len(linear.robot.structure.contacts), MODE_COLUMNS), np.nan)):
+        with pytest.raises(InputError) as caught:
+            MakeTensegrityDiagram(linear.robot, modes=wrong)
+        assert caught.value.key == "modes"
 
 
 def test_a_winch_follows_its_command_with_its_lag():

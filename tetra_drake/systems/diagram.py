@@ -7,6 +7,7 @@ from types import NoneType
 from typing import get_args
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.lcm import DrakeLcmParams
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
@@ -46,6 +47,7 @@ def MakeTensegrityDiagram(
     scene_graph: bool = False,
     meshcat: Meshcat | None = None,
     parameters: bool = False,
+    modes: npt.ArrayLike | None = None,
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is at the start of the walk.
 
@@ -99,6 +101,10 @@ def MakeTensegrityDiagram(
     >>> law = cables.GetLaw(own)
     >>> cables.SetLaw(own, law._replace(stiffness=1.1 * law.stiffness))
 
+    With `modes`, such as robot.starting_modes, contacts keep these modes. The diagram then has no
+    discrete state, as Drake's Linearize and DirectCollocation need it. So it is right near a state
+    only: a node that sticks there keeps its friction where it lifts off.
+
     Raises InputError if a gait is not of this robot, or a port of the controller has another size.
     """
     source = "MakeTensegrityDiagram"
@@ -143,6 +149,7 @@ def MakeTensegrityDiagram(
         radius=robot.ground.radius.tolist(),
         witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
         parameters=parameters,
+        modes=modes,
     )
     model = robot.model
     held = model.anchors.nodes.size or model.joints.node_a.size or model.loads.nodes.size

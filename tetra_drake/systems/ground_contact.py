@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import weakref
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import (
@@ -67,10 +69,21 @@ class GroundContact(ConvertibleSystem):
 
     With `parameters`, the constants of the ground are parameters of the context: the fields of
     laws.contact.NormalForce, then the constants of the law of friction; see SetGround().
+
+    With `modes` (m, 12), the modes are fixed: the system has no discrete state, as Drake's
+    Linearize and DirectCollocation need it.
     """
 
-    def __init__(self, model: Model, *, witness: bool = False, parameters: bool = False) -> None:
+    def __init__(
+        self,
+        model: Model,
+        *,
+        witness: bool = False,
+        parameters: bool = False,
+        modes: np.ndarray | None = None,
+    ) -> None:
         super().__init__()
+        self._fixed_modes = modes
         ground, normals = model.ground, model.ground.normal.size
         self._constants = np.concatenate([ground.normal, ground.friction.constants])  # a copy
         friction = ground.friction._replace(constants=self._constants[normals:])
@@ -84,18 +97,19 @@ class GroundContact(ConvertibleSystem):
         # The kernels write to these arrays at every call.
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
         self._parts = Packed((model, self._forces))
-        state, modes = np.empty(13 * bodies), np.empty((count, contact.MODE_COLUMNS))
+        state, table = np.empty(13 * bodies), np.empty((count, contact.MODE_COLUMNS))
         self._compute_forces = machine_code(
-            compute_ground_forces, self._parts, state, modes, self._force
+            compute_ground_forces, self._parts, state, table, self._force
         )
-        self._update_modes = machine_code(modes_after_step, self._parts, state, modes)
+        self._update_modes = machine_code(modes_after_step, self._parts, state, table)
         self._next_change = machine_code(
-            next_mode_change, self._parts, state, self._force, modes, 0.0
+            next_mode_change, self._parts, state, self._force, table, 0.0
         )
         self._state = self.DeclareVectorInputPort("state", state.size)
-        self.DeclareDiscreteState(modes.size)
-        self.DeclareInitializationDiscreteUpdateEvent(self._start)
-        self.DeclarePerStepDiscreteUpdateEvent(self._update)
+        if modes is None:
+            self.DeclareDiscreteState(table.size)
+            self.DeclareInitializationDiscreteUpdateEvent(self._start)
+            self.DeclarePerStepDiscreteUpdateEvent(self._update)
         # The witness function has no event: it only ends the step, and the per-step update follows.
         # A bound method in place of the lambda would keep the system alive for ever.
         this, falls = weakref.proxy(self), WitnessFunctionDirection.kPositiveThenNonPositive
@@ -106,16 +120,16 @@ class GroundContact(ConvertibleSystem):
                 this._parts_in(context), this._state.Eval(context), this._modes(context)
             ),
         )
-        self._witnesses = [margin] if witness else []
+        self._witnesses = [margin] if witness and modes is None else []
         sources = {self._state.ticket(), self.xd_ticket(), self.all_parameters_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
-        table, rows, discrete = GroundContact._table, GroundContact._modes, {self.xd_ticket()}
+        forces, rows, discrete = GroundContact._table, GroundContact._modes, {self.xd_ticket()}
         n, point = contact.NORMAL, contact.STICK_POINT
-        DeclareOutput(self, "normal_forces", count, lambda s, c: table(s, c)[:, n], sources)
-        DeclareOutput(self, "friction_forces", 2 * count, lambda s, c: table(s, c)[:, :n], sources)
+        DeclareOutput(self, "normal_forces", count, lambda s, c: forces(s, c)[:, n], sources)
+        DeclareOutput(self, "friction_forces", 2 * count, lambda s, c: forces(s, c)[:, :n], sources)
         DeclareOutput(self, "modes", 3 * count, lambda s, c: rows(s, c)[:, :point], discrete)
-        DeclareOutput(self, "mode_table", modes.size, rows, discrete)
-        DeclareOutput(self, "ground_forces", 3 * count, table, sources)
+        DeclareOutput(self, "mode_table", table.size, rows, discrete)
+        DeclareOutput(self, "ground_forces", 3 * count, forces, sources)
 
     def SetGround(self, context: Context, ground: contact.Ground) -> None:
         """Copies the constants of normal force and friction of a ground, such as a robot's ground
@@ -167,6 +181,8 @@ class GroundContact(ConvertibleSystem):
         return self._parts
 
     def _modes(self, context: Context) -> np.ndarray:
+        if self._fixed_modes is not None:
+            return self._fixed_modes
         return context.get_discrete_state_vector().value().reshape(-1, contact.MODE_COLUMNS)
 
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
@@ -203,6 +219,7 @@ def AddGroundContact(
     radius: float | Sequence[float] = 0.0,
     witness: bool = False,
     parameters: bool = False,
+    modes: npt.ArrayLike | None = None,
     name: str = "ground",
 ) -> GroundContact:
     """Adds a ground under spheres at the origins of frames of a plant's bodies.
@@ -210,9 +227,9 @@ def AddGroundContact(
     The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is one
     radius for all spheres, or a radius for each. If it is 0, the ground touches the origins
     themselves. Make `ground` with robot.ground.make_surface(), or use a robot's ground: its contact
-    nodes and their radii are then replaced by `frames` and `radius`. For `witness` and `parameters`
-    see GroundContact. The ports have the contact nodes in the order of `frames`. This example puts
-    a scenario's ground under the tip of a link:
+    nodes and their radii are then replaced by `frames` and `radius`. For `witness`, `parameters`
+    and `modes` see GroundContact. The ports have the contact nodes in the order of `frames`. This
+    example puts a scenario's ground under the tip of a link:
 
     >>> given = load_scenario("coulomb")
     >>> surface = make_surface(given.ground, given.friction, given.terrain)
@@ -242,7 +259,16 @@ def AddGroundContact(
     carriers = nodes.carriers[contacts]
     placed = ground.under(contacts, carriers=carriers, radius=radii, nodes=len(nodes.p_BN))
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
-    contacts_of = GroundContact(model, witness=witness, parameters=parameters)
+    if modes is not None:
+        shape = len(frames), contact.MODE_COLUMNS
+        if np.shape(modes) != shape:
+            problem = f"found shape {np.shape(modes)}, expected {shape}"
+            raise InputError("AddGroundContact", "modes", problem)
+        numbers = checked_numbers(
+            "AddGroundContact", "modes", np.ravel(modes), count=math.prod(shape)
+        )
+        modes = numbers.reshape(shape)
+    contacts_of = GroundContact(model, witness=witness, parameters=parameters, modes=modes)
     system = builder.AddNamedSystem(name, contacts_of)
     Attach(builder, plant, system)
     return system
