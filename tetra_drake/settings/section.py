@@ -190,7 +190,7 @@ class Kinds:
     plug-ins import this package.
     """
 
-    bases: ClassVar[dict[str, tuple[type, ...]]] = {}
+    bases: ClassVar[dict[str, tuple[Any, ...]]] = {}
     """Base classes of the kinds that plug-ins can add to, by group."""
 
     def __init__(self, base: type[Section] | None = None, group: str = KINDS) -> None:
