@@ -219,12 +219,12 @@ class Kinds:
         takes, or whose tag is not the name of its entry point, or is one of `tags`."""
         for name, entry in entries(self.group).items():
             kind: Any = loaded(entry)
-            if not (isinstance(kind, type) and issubclass(kind, self.bases[self.group])):
+            if not {*getattr(kind, "__mro__", ())} & {*self.bases[self.group]}:
                 expected = " or ".join(one.__name__ for one in self.bases[self.group])
                 raise refusal(entry, f"found {kind!r:.60}, expected a class of {expected}")
-            if issubclass(kind, base) and (kind.tag in tags or kind.tag != name):
+            if base in kind.__mro__ and (kind.tag in tags or kind.tag != name):
                 raise refusal(entry, f"found !{kind.tag}, expected !{name}, which no kind here has")
-            if issubclass(kind, base):
+            if base in kind.__mro__:
                 yield kind
 
 
