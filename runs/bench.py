@@ -53,7 +53,7 @@ from tetra_drake.study.statistics import (
 
 HERE = Path(__file__).parent / "bench"
 ENTRIES, RECORDS, PAGE_NAME, FIGURE = HERE / "entries", "records.jsonl", "README.md", "scores"
-SEEDS, EPISODES = 10, 500
+SEEDS, EPISODES = 10, 250
 """Number of solutions of each entry to each task, and the budget of one in episodes."""
 DECIMALS = 6
 """Decimals of the parameters of solutions, and of scores, in the records."""

@@ -54,5 +54,4 @@ def solve(problem: Problem, seed: int) -> Solution:
         noise=0.5,
         decision_period=DECISION_PERIOD,
         seed=seed,
-        workers=1,
     )
