@@ -244,6 +244,6 @@ def tutorial_page(script: Path, output: Output) -> str:
     text += ["## What it draws", f"![Picture of {script.name}]({script.stem}.png)"]
     if output.reason:
         text.append(
-            f"The picture is from the repository. This build did not run the script: {output.reason}"
+            f"The picture is the repository's. This build did not run the script: {output.reason}"
         )
     return "\n\n".join(text)

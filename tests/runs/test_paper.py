@@ -1,4 +1,4 @@
-"""The paper: it is as its records say, in the form that the journal wants, and cites what exists."""
+"""The paper: it is as its records say, in the form that the journal wants, and cites entries."""
 
 import re
 

@@ -34,7 +34,7 @@ WORDS = {
     "simulate": "api.html",
     "form_find": "api.html",
     "AddCables": "api_systems.html",
-    "prestress": "tetra_drake/scenario/",
+    "prestress": "api.html",
     "terrain": "diagrams/tutorials/05",
     "Optuna": "tetra_drake/evolution/",
     "SLURM": "tetra_drake/evolution/",
@@ -183,7 +183,8 @@ def test_search_finds_what_is_searched_for(address, browser):
 
 @pytest.mark.slow
 def test_a_replay_plays(address, browser):
-    with opened(browser, f"{address}runs/index.html", size=DESK, offline=False) as page:
+    with opened(browser, f"{address}index.html", size=DESK, offline=False) as page:
+        page.goto(f"{address}runs/index.html")
         page.locator('a[href="champion/replay.html"]').first.click()
         page.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
 
