@@ -35,8 +35,6 @@ PAGE, TEMPLATE = HERE / "paper/paper.md", HERE / "paper.md.jinja"
 SIZES = (1, 4, 7, 13)
 """Least numbers of bodies of the rows of the table by size."""
 MICRO = 1e6
-FAR = 0.1
-"""Difference of distances (in) on two engines that the paper counts."""
 
 
 def corpus_rows() -> pandas.DataFrame:
@@ -95,7 +93,8 @@ def agreement(runs: tables.Runs) -> dict[str, str | int]:
         "gaits": len(apart),
         "median": fixed(np.median(apart), 4),
         "largest": fixed(apart.max(), 2),
-        "far": int(np.sum(apart > FAR)),
+        "apart": fixed(tables.APART / INCH, 1),
+        "far": int(np.sum(apart > tables.APART / INCH)),
     }
 
 
