@@ -215,6 +215,7 @@ def run(script: Path, wanted: str) -> Output:
         _log.info("Running %s", script.name)
         RUNS.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=RUNS) as work:
+            Path(work, "runs").symlink_to(ROOT / "runs")  # which tutorials read
             done = subprocess.run(
                 [sys.executable, script], cwd=work, capture_output=True, text=True
             )
@@ -223,6 +224,8 @@ def run(script: Path, wanted: str) -> Output:
                 if last.startswith("ModuleNotFoundError"):
                     return Output(reason=last)
                 raise PluginError(f"{script.name} failed: {last}")
+            if not Path(work, drawn).is_file():
+                raise PluginError(f"{script.name} drew no {drawn}")
             kept = Path(work, "kept")
             kept.mkdir()
             (kept / "printed.txt").write_text(done.stdout, encoding="utf-8")

@@ -88,6 +88,9 @@ def test_a_tutorial_that_fails_ends_the_build_but_not_one_without_its_package(ho
     script.write_text("raise ValueError('it is broken')")
     with pytest.raises(Exception, match=r"01_try\.py failed: ValueError: it is broken"):
         hooks.run(script, "*")
+    script.write_text("print('it draws nothing')")
+    with pytest.raises(Exception, match=r"01_try\.py drew no 01_try\.png"):
+        hooks.run(script, "*")
     script.write_text("import no_such_package")
     assert "no_such_package" in hooks.run(script, "*").reason
     assert not list((tmp_path / "kept").iterdir())
