@@ -88,6 +88,8 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         return [pages(part) for parts in each for part in parts]
 
     config.nav = pages(config.nav)
+    if address := config.extra["repository"]:
+        config.nav.append({"Repository": address})
     config.markdown_extensions.append(DoctestExtension())
     return config
 
