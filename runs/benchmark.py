@@ -3,11 +3,13 @@
     python runs/benchmark.py [TABLE ...]
 
 Prints tables in Markdown for tetra_drake/engines/README.md. The gaits are random gaits with seeds
-0, 1 ... on the scenario `thesis`. Without names, all tables except `integrators` and `sizes` are
-printed:
+0, 1 ... on the scenario `thesis`. Without names, the tables `engines`, `batches`, `grounds` and
+`controlled` are printed:
 
     engines        speed and error of the engines
     integrators    speed and error for settings of the diagram; takes longest
+    schemes        all integrators of Drake on the diagrams of `thesis` and `six_bar`
+    candidates     time for another robot: a diagram for each, or one diagram with parameters
     batches        speed of the compiled engine with many gaits at a time
     grounds        speed by ground and network
     controlled     speed of robots that are controlled, on all cores
@@ -30,12 +32,14 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.systems.analysis import GetIntegrationSchemes, ResetIntegratorFromFlags, Simulator
 
+from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mjcf import make_mjcf
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.engines.simulation import Simulation
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.formatting import TextTable, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
@@ -44,10 +48,12 @@ from tetra_drake.robot.gait import AnyGait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 GAITS = 12  # for each engine
 BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time
@@ -60,6 +66,11 @@ SPACING = 0.26  # m between the prisms of a lattice
 SHORT = {"simulation.duration": 3.0, "simulation.steady_from": 1.0}  # s, on the diagram
 LANES = 8  # gaits that a processor with AVX-512 simulates in the time of one
 LARGEST_DIAGRAM = 50  # bodies
+FIXED_STEPS = ("explicit_euler", "runge_kutta2", "semi_explicit_euler")  # without error control
+LONGEST_STEP, SHORTEST_STEP = 1e-3, 7e-6  # s, of the schemes
+ACCEPTED = 1.0  # mm, error of a scheme without error control
+MOMENT = 3.0  # s that each scheme simulates
+CANDIDATES = 100  # robots for which the time to a first evaluation is measured
 ROUNDS = 3  # measurements; their medians count
 
 ENGINES = {
@@ -376,12 +387,126 @@ def lattice(side: int) -> StructureFile:
     return StructureFile.model_validate(tree)
 
 
+def schemes_table(thesis: Scenario) -> str:
+    """Table of all integrators of Drake on diagrams. Errors are of the bodies' positions at the
+    end, from a converged simulation of the compiled engine.
+
+    A scheme without error control gets the longest step with an error below ACCEPTED, of halves of
+    LONGEST_STEP.
+    """
+    moment = {"simulation.duration": MOMENT, "simulation.steady_from": MOMENT / 2.0}
+    rows = []
+    for scenario in (thesis, load_scenario("six_bar")):
+        short = scenario.with_numbers(moment)
+        robot, gait = Robot.of(short), seeded_gait(short, 0)
+        converged = short.with_changes({"engine": CONVERGED})
+        [exact] = simulate_many(converged, [gait], record=True)
+        if not isinstance(exact, SimulationResult):
+            raise exact
+        p_WB = exact.trajectory.p_WB[-1].to_numpy()
+        accuracy = default_accuracy(robot, gait)
+        for scheme in GetIntegrationSchemes():
+            tried = Tried(f"accuracy {accuracy:.2g}", "found no step")
+            if scheme not in FIXED_STEPS:
+                tried = try_scheme(robot, gait, scheme, p_WB, accuracy=accuracy)
+            step = LONGEST_STEP
+            while scheme in FIXED_STEPS and step >= SHORTEST_STEP and tried.failure:
+                tried = try_scheme(robot, gait, scheme, p_WB, step=step)
+                step /= 2.0
+            rows.append([f"`{scenario.name}`", f"`{scheme}`", *tried])
+            print(*rows[-1], file=sys.stderr, flush=True)
+    headings = ["robot", "scheme", "set to", "failure", "error, mm", "evaluations", "CPU s"]
+    return TextTable(headings, rows).markdown()
+
+
+class Tried(NamedTuple):
+    """A try of an integrator, as cells of a table."""
+
+    setting: str
+    failure: str
+    error_mm: str = ""
+    evaluations: str = ""
+    seconds: str = ""
+
+
+def default_accuracy(robot: Robot, gait: AnyGait) -> float:
+    """Target accuracy of the engine `drake` for a robot."""
+    simulator = MakeSimulator(MakeTensegrityDiagram(robot, gait), robot, Drake())
+    return float(simulator.get_integrator().get_target_accuracy())
+
+
+def try_scheme(
+    robot: Robot,
+    gait: AnyGait,
+    scheme: str,
+    p_WB: np.ndarray,
+    *,
+    step: float = LONGEST_STEP,
+    accuracy: float | None = None,
+) -> Tried:
+    """Simulates a diagram with an integrator of Drake, and compares the bodies' positions at the
+    end with p_WB (bodies, 3) in m. `step` (s) is the longest step, or each step without an
+    accuracy."""
+    diagram = MakeTensegrityDiagram(robot, gait, scene_graph=scheme == "cenic")
+    simulator = Simulator(diagram)
+    integrator = ResetIntegratorFromFlags(simulator, scheme, step)
+    setting = f"step {1e3 * step:.3g} ms"
+    if accuracy is not None:
+        integrator.set_target_accuracy(accuracy)
+        setting = f"accuracy {accuracy:.2g}"
+    started = time.process_time()
+    try:
+        simulator.AdvanceTo(robot.scenario.simulation.duration)
+    except (SimulationFailure, RuntimeError) as error:
+        return Tried(setting, str(error).splitlines()[0])
+    seconds = time.process_time() - started
+    state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+    found = state[: 7 * len(p_WB)].reshape(-1, 7)[:, 4:]
+    error_mm = 1e3 * float(np.linalg.norm(found - p_WB, axis=1).max())
+    failure = "" if accuracy or error_mm < ACCEPTED else f"error of {error_mm:.3g} mm"
+    counted = integrator.get_num_derivative_evaluations()
+    evaluations = f"{counted:,.0f}" if counted else "not counted"
+    return Tried(setting, failure, f"{error_mm:.2g}", evaluations, f"{seconds:.2g}")
+
+
+def candidates_table(scenario: Scenario) -> str:
+    """Table of the time from a robot's numbers to the first derivatives of its diagram: a diagram
+    for each robot, or one diagram whose parameters are set."""
+    robot = Robot.of(scenario)
+    signals = np.zeros(robot.structure.signals)
+    softer = robot.model.cables.law._replace(stiffness=0.9 * robot.model.cables.law.stiffness)
+    one = MakeTensegrityDiagram(robot, parameters=True)
+    context = one.CreateDefaultContext()
+    one.GetInputPort("signals").FixValue(context, signals)
+
+    def make_another() -> None:
+        diagram = MakeTensegrityDiagram(Robot.of(scenario))
+        own = diagram.CreateDefaultContext()
+        diagram.GetInputPort("signals").FixValue(own, signals)
+        diagram.EvalTimeDerivatives(own)
+
+    def set_parameters() -> None:
+        cables, ground = (one.GetSubsystemByName(name) for name in ("cables", "ground"))
+        cables.SetLaw(cables.GetMyMutableContextFromRoot(context), softer)
+        ground.SetGround(ground.GetMyMutableContextFromRoot(context), robot.ground)
+        one.EvalTimeDerivatives(context)
+
+    rows = []
+    for name, step in {"its own": make_another, "with parameters": set_parameters}.items():
+        step()
+        started = time.process_time()
+        for _ in range(CANDIDATES):
+            step()
+        rows.append([name, f"{1e3 * (time.process_time() - started) / CANDIDATES:.3g}"])
+    return TextTable(["diagram", "CPU ms per robot"], rows).markdown()
+
+
 TABLES = {"batches": batches_table, "grounds": grounds_table, "controlled": controlled_table}
-MORE_TABLES = {"sizes": sizes_table}
+MORE_TABLES = {"sizes": sizes_table, "schemes": schemes_table, "candidates": candidates_table}
 
 
 def main(names: Sequence[str], scenario: Scenario) -> None:
-    """Prints the tables of the given names, or all but `integrators` and `sizes`.
+    """Prints the tables of the given names, or `engines` and all of TABLES.
 
     Raises InputError."""
     tables = [*ENGINES, *TABLES, *MORE_TABLES]

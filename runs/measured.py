@@ -33,7 +33,7 @@ from measured_robots import (
     spine_poses,
 )
 
-from tetra_drake.figures.style import save_figure
+from tetra_drake.figures.style import LINE_COLOURS, common_style, line_style, save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed
 from tetra_drake.study.fit import Fit
@@ -131,10 +131,14 @@ def is_inside(row: pandas.Series) -> bool:
 
 def totals_table(rows: pandas.DataFrame, by: str) -> TextTable:
     """Median error of the medians, and share of the intervals that hold the measured value, of the
-    rows with a measured value."""
+    rows with a measured value. Tests with the same prediction count once in a further line."""
     known = rows[rows["measured"].notna()]
+    groups = [*known.groupby(by, sort=False), ("all", known)]
+    once = known.drop_duplicates(["median", "low", "high"])
+    if len(once) < len(known):
+        groups.append(("all, repeated tests once", once))
     lines = []
-    for name, group in [*known.groupby(by, sort=False), ("all", known)]:
+    for name, group in groups:
         error = (100.0 * (group["median"] / group["measured"] - 1.0).abs()).median()
         inside = sum(is_inside(row) for _, row in group.iterrows())
         share = f"{inside} of {len(group)} ({100.0 * inside / len(group):.0f} %)"
@@ -143,24 +147,31 @@ def totals_table(rows: pandas.DataFrame, by: str) -> TextTable:
     return TextTable(head, lines)
 
 
+@common_style()
 def intervals_figure(rows: pandas.DataFrame) -> Figure:
     """Measured values beside intervals, each in units of half the width of its interval."""
     known = rows[rows["measured"].notna()]
     figure = Figure(figsize=(7.0, 3.0), layout="constrained")
     axes = figure.subplots()
-    half = (known["high"] - known["low"]) / 2.0
-    places = np.arange(len(known))
-    middle = (known["high"] + known["low"]) / 2.0
+    places = pandas.Series(range(len(known)), index=known.index)
+    deviation = 2.0 * (known["measured"] - known["low"]) / (known["high"] - known["low"]) - 1.0
     axes.axhspan(-1.0, 1.0, color="0.9", label="90 % interval")
-    for number, (kind, group) in enumerate(known.groupby("kind", sort=False)):
-        own = known.index.isin(group.index)
-        deviation = ((known["measured"] - middle) / half)[own]
-        axes.plot(places[own], deviation, "o", color=f"C{number}", label=f"measured {kind}")
-    axes.set(xlabel="quantity", ylabel="place in the interval", ylim=(-3.0, 8.0))
-    axes.legend(frameon=False, ncols=3, loc="upper center")
+    for number, (kind, group) in enumerate(known.groupby("kind", sort=False), start=1):
+        color, own = LINE_COLOURS[number], group.index
+        axes.plot(places[own], deviation[own], "o", color=color, label=f"measured {kind}")
+    names = {}
+    for name, group in known.groupby("structure", sort=False):
+        names[places[group.index].mean()] = str(name).replace(", ", ",\n")
+        axes.axvline(places[group.index].max() + 0.5, color="0.6", linewidth=0.8)
+    axes.set_xticks([*names], [*names.values()])
+    axes.grid(visible=False, axis="x")
+    axes.set(ylabel="place in the interval (ends: -1, 1)", ylim=(-3.0, 8.0))
+    axes.margins(x=0.02)
+    axes.legend(framealpha=1.0, ncols=3, loc="upper left")
     return figure
 
 
+@common_style()
 def simplex_figure(under_load: pandas.DataFrame) -> Figure:
     """Height and cable forces of the simplex over the load."""
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
@@ -171,33 +182,38 @@ def simplex_figure(under_load: pandas.DataFrame) -> Figure:
     }
     for axes, kinds in panels.items():
         for number, (kind, label) in enumerate(kinds.items()):
-            color = f"C{number}"
-            axes.plot(under_load["load"], under_load[kind], color=color, label=label)
+            axes.plot(under_load["load"], under_load[kind], label=label, **line_style(number))
             axes.vlines(
                 under_load["load"],
                 under_load[f"{kind} least"],
                 under_load[f"{kind} greatest"],
-                color=color,
+                color=LINE_COLOURS[number],
                 linewidth=3.0,
                 alpha=0.5,
             )
         axes.vlines([], 0.0, 0.0, color="black", linewidth=3.0, alpha=0.5, label="measured")
         axes.set_xlabel("load per upper node, kN")
+        axes.margins(x=0.03)
         axes.legend(frameon=False)
     heights.set_ylabel("height, mm")
     forces.set_ylabel("tension, kN")
     return figure
 
 
+@common_style()
 def spine_figure(poses: pandas.DataFrame) -> Figure:
     """Paths of the spine's vertebra in its tests: predicted, wanted and seen by the camera."""
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
     place, angle = figure.subplots(1, 2)
+    line = {"linestyle": "-", "color": LINE_COLOURS[1], "linewidth": 2.0}
+    dots = {"linestyle": "", "marker": ".", "color": LINE_COLOURS[2], "markersize": 3.0}
     for _, test in poses.groupby("test"):
-        place.plot(1e3 * test["predicted_x_m"], 1e3 * test["predicted_y_m"], "C0", linewidth=2.0)
-        place.plot(1e3 * test["x_m"], 1e3 * test["y_m"], "C1.", markersize=2.0)
-        angle.plot(test["step"], np.degrees(test["predicted_rad"]), "C0", linewidth=2.0)
-        angle.plot(test["step"], np.degrees(test["rad"]), "C1.", markersize=2.0)
+        place.plot(1e3 * test["predicted_x_m"], 1e3 * test["predicted_y_m"], **line)
+        place.plot(1e3 * test["x_m"], 1e3 * test["y_m"], **dots)
+        angle.plot(test["step"], np.degrees(test["predicted_rad"]), **line)
+        angle.plot(test["step"], np.degrees(test["rad"]), **dots)
+    place.margins(x=0.03)
+    angle.margins(x=0.03)
     place.set(xlabel="x, mm", ylabel="y, mm")
     angle.set(xlabel="set of cable lengths", ylabel="angle, degrees")
     lines = [angle.lines[0], angle.lines[1]]
@@ -207,6 +223,7 @@ def spine_figure(poses: pandas.DataFrame) -> Figure:
     return figure
 
 
+@common_style()
 def jump_figure(jumps: dict[float, list[tuple[float, float]]]) -> Figure:
     """Rise of the jumper over the share that is wound up."""
     figure = Figure(figsize=(5.0, 3.2), layout="constrained")
@@ -214,12 +231,14 @@ def jump_figure(jumps: dict[float, list[tuple[float, float]]]) -> Figure:
     shares = 100.0 * np.array(list(jumps))
     for number, damping in enumerate(SPRING_DAMPINGS):
         rises = [results[number][0] for results in jumps.values()]
-        axes.plot(shares, rises, "o-", label=f"springs damped by {damping:g} N s/m")
+        style = line_style(number + 1)
+        axes.plot(shares, rises, marker="o", label=f"springs damped by {damping:g} N s/m", **style)
     for share, text in JUMPS.items():
         if " to " in text:
             low, high = map(float, text.split(" to "))
             axes.vlines(100.0 * share, low, high, color="black", linewidth=6.0, alpha=0.4)
     axes.plot([], [], color="black", linewidth=6.0, alpha=0.4, label="measured")
+    axes.margins(x=0.03)
     axes.set(xlabel="wound up by, %", ylabel="rise of the centre, m")
     axes.legend(frameon=False)
     return figure
@@ -241,11 +260,24 @@ is named, a tolerance is assumed. The last column names the two largest shares i
 
 {by_structure}
 
-The three tests of the spine had the same commands, and the loads of the simplex are one test, so
-the rows are not independent. The measured values of these structures were known when their
-tolerances were assumed. Three were chosen after a first comparison: the error of 2 % that all force
-readings of the simplex share, the 2 mm of the camera's frame, and the noise of the spine's ranges.
-So these totals flatter. The [blind predictions](#blind-predictions) are the real test.
+Goals: a median error of at most 3 % for shapes and forces, 8 % for frequencies and 15 % for motion,
+and 80 to 97 % of the intervals that hold the measured value. Too few hold for shapes, where two of
+five heights lie 0.1 and 0.3 mm outside, and for the jumper. All hold for frequencies and the spine,
+whose intervals may be too wide.
+
+The totals flatter, for three reasons. Nearly all rows are of the simplex and the spine, and rows of
+one structure are not independent: its loads are one test, and the spine's three tests had the same
+commands. The measured values were known when the tolerances were assumed; the bow of the tubes and
+what may stiffen the frequencies were assumed because the first predictions were off. And these were
+changed after a first comparison of intervals:
+
+- An error of 2 % that all force readings of the simplex share was added.
+- The camera's frame on the spine was known to 1 mm, and now to 2 mm.
+- Friction of the spine's board was up to a tenth of the weight, and now is up to a twentieth.
+- Noise that widens the spine's ranges was added.
+
+The [blind predictions](#blind-predictions) are the real test. The simplex and the spine have the
+changed settings there as well, so the hexagonal prism, Laika and the jumper at rest are blindest.
 
 ## Simplex (UCLouvain)
 
@@ -281,6 +313,10 @@ The frequencies are a tenth too low. A truss with elastic bars and consistent ma
 by the same factor at both self-stresses, 0.92. This mode follows an infinitesimal mechanism, so its
 stiffness comes from the self-stress. Supports that stick instead of sliding change our frequencies
 by less than 4 %. No published number explains the rest.
+
+Two things are in this page's script only, and not in the package. The mass along the cables raises
+the frequencies by 3 % and changes nothing else; masses at nodes, which all engines have, cannot
+give that. The bow of the tubes counts near their buckling load only.
 
 The intervals have the cables' mass spread along them, and what may stiffen the mode:
 
@@ -384,6 +420,13 @@ beginning. Here is one member of each kind; blind.csv has all of them.
 
 Assumed: {assumed[blind_simplex_loads]}.
 
+As the tube S1 is lengthened from a self-stress of 1.5 kN, all forces grow by nearly one factor, and
+the three tubes bear nearly the same:
+
+{blind_simplex_tightened}
+
+Assumed: {assumed[blind_simplex_tightened]}.
+
 {blind_simplex_frequencies}
 
 Assumed: {assumed[blind_simplex_frequencies]}.
@@ -421,8 +464,9 @@ def main(out: Path = HERE) -> None:
     }
     for name, figure in figures.items():
         save_figure(figure, out, name, kinds=["svg"])
-    loads = found["blind_simplex_loads"]
-    found["blind_simplex_loads"] = loads[loads["quantity"].str.match(r"(H3|CB1|CT1|CV1|S1) at")]
+    for name in ("blind_simplex_loads", "blind_simplex_tightened"):
+        is_shown = found[name]["quantity"].str.match(r"(H3|CB1|CT1|CV1|S1) at")
+        found[name] = found[name][is_shown]
     spine = found["blind_spine"]
     found["blind_spine"] = spine[spine["quantity"].str.endswith(spine["quantity"].iloc[0][-17:])]
     page = PAGE.format(

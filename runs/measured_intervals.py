@@ -52,6 +52,8 @@ SEED = 0
 
 BUCKLING, LENGTH, CABLE = 10.66e3, 2.9998, 0.502
 """Buckling load (N) and length (m) of a tube of the simplex, and mass (kg) of a cable."""
+TIGHTENED_FROM = 1.5e3
+"""Self-stress (N) of the simplex from which the lengthening of one tube is counted."""
 SAG = 0.7e-3
 """Sag (m) of an unloaded tube under its weight."""
 ELEMENTS = {
@@ -192,6 +194,50 @@ def one_by_one(
 # The simplex
 
 
+def bowed(
+    longer: Callable[[float], Scenario], unknown: dict[str, float], self_stress: float
+) -> Robot:
+    """A simplex whose tubes are bowed. `longer` gives the one with straight tubes that are longer
+    by a length (m), which is 0 at the self-stress (N).
+
+    A tube that is bowed by a at no load is shorter by pi^2 a^2 / 4 l / (1 - P / Pcr)^2.
+    """
+    least = (math.pi * math.hypot(SAG, unknown["bow of the tubes"])) ** 2 / (4.0 * LENGTH)
+    critical = BUCKLING * (1.0 + unknown["buckling load"])
+
+    def shortening(force: float) -> float:
+        return least / (1.0 - force / critical) ** 2 - least / (1.0 - self_stress / critical) ** 2
+
+    shorter = 0.0
+    for _ in range(8):
+        robot = Robot.of(longer(-shorter))
+        now, before = compression(robot), shorter
+        shorter = shortening(
+            brentq(
+                lambda x, p, d: shortening(x) - d - SOFTNESS * (p - x),
+                -critical,
+                critical * (1.0 - 1e-6),
+                args=(now, before),
+            )
+        )
+        if abs(shorter - before) < 2e-6:
+            break
+    return robot
+
+
+def readings(robot: Robot, unknown: dict[str, float]) -> dict[str, float]:
+    """Heights of the upper nodes and forces of the members of a simplex, with what a reading
+    adds."""
+    study = study_equilibrium(robot)
+    found = {ELEMENTS[cable]: x / 1e3 for cable, x in study.cables["tension"].items()}
+    struts = axial_forces(robot.structure, Unactuated(robot.model), robot.equilibrium.state)
+    found |= {f"S{i}": -force / 1e3 for i, force in enumerate(struts.tolist(), start=1)}
+    gain = 1.0 + unknown["gain of the force readings"]
+    found = {key: force * gain for key, force in found.items()}
+    found |= {f"H{node[1]}": 1e3 * study.nodes.loc[node, "z"] for node in UPPER}
+    return {key: value + unknown[f"reading:{key}"] for key, value in found.items()}
+
+
 def simplex_loads(
     scenario: Scenario,
     unknown: dict[str, float],
@@ -200,52 +246,61 @@ def simplex_loads(
     loads: Sequence[float],
     means: bool,
 ) -> dict[str, float]:
-    """Heights of the upper nodes and forces of the members of the simplex, with what a reading
-    adds, under loads (kN) per upper node; or their means.
-
-    A tube that is bowed by a at no load is shorter by pi^2 a^2 / 4 l / (1 - P / Pcr)^2.
-    """
+    """Heights and forces of the simplex under loads (kN) per upper node; or their means."""
     wanted = 1e3 * self_stress + unknown["self-stress"]
     first = SOFTNESS * wanted + 0.6e-3  # longer than any error of the lengths
     _, base = stressed(scenario, wanted, first=first, within=2.0)
-    least = (math.pi * math.hypot(SAG, unknown["bow of the tubes"])) ** 2 / (4.0 * LENGTH)
-    critical = BUCKLING * (1.0 + unknown["buckling load"])
-
-    def shortening(force: float) -> float:
-        return least / (1.0 - force / critical) ** 2 - least / (1.0 - wanted / critical) ** 2
-
-    shorter, felt = 0.0, 1.0 + unknown["load"]
+    felt = 1.0 + unknown["load"]
     values: dict[str, float] = {}
     for load in loads:
         force = {
             f"robot.loads.{node}": ["0 N", "0 N", f"{-1e3 * load * felt!r} N"] for node in UPPER
         }
-        for _ in range(8):
-            robot = Robot.of(lengthened(scenario, base - shorter).with_changes(force))
-            now, before = compression(robot), shorter
-            shorter = shortening(
-                brentq(
-                    lambda x, p, d: shortening(x) - d - SOFTNESS * (p - x),
-                    -critical,
-                    critical * (1.0 - 1e-6),
-                    args=(now, before),
-                )
-            )
-            if abs(shorter - before) < 2e-6:
-                break
-        study = study_equilibrium(robot)
-        gain = 1.0 + unknown["gain of the force readings"]
-        found = {ELEMENTS[cable]: x / 1e3 for cable, x in study.cables["tension"].items()}
-        struts = axial_forces(robot.structure, Unactuated(robot.model), robot.equilibrium.state)
-        found |= {f"S{i}": -force / 1e3 for i, force in enumerate(struts.tolist(), start=1)}
-        found = {key: force * gain for key, force in found.items()}
-        found |= {f"H{node[1]}": 1e3 * study.nodes.loc[node, "z"] for node in UPPER}
-        found = {key: value + unknown[f"reading:{key}"] for key, value in found.items()}
+
+        def longer(by: float, force: dict[str, list[str]] = force) -> Scenario:
+            return lengthened(scenario, base + by).with_changes(force)
+
+        found = readings(bowed(longer, unknown, wanted), unknown)
         if means:
             table = pandas.Series(found)
             found = table.groupby(table.index.str[:-1]).mean().to_dict()
         values |= {f"{key} at {load:.2f} kN": value for key, value in found.items()}
     return values
+
+
+def simplex_tightened(
+    scenario: Scenario, unknown: dict[str, float], lengthenings: Sequence[float]
+) -> dict[str, float]:
+    """Forces of the simplex as one tube is lengthened, in mm from TIGHTENED_FROM."""
+    wanted = TIGHTENED_FROM + unknown["self-stress"]
+    first = SOFTNESS * wanted + 0.6e-3
+    _, base = stressed(scenario, wanted, first=first, within=2.0)
+    values: dict[str, float] = {}
+    for lengthening in lengthenings:
+        own = (lengthening + unknown["lengthening"]) / 1e3
+
+        def longer(by: float, own: float = own) -> Scenario:
+            return lengthened(lengthened(scenario, base + by), own, struts=1)
+
+        found = readings(bowed(longer, unknown, wanted), unknown)
+        forces = {key: value for key, value in found.items() if key[0] != "H"}
+        values |= {f"{key} at {lengthening:+g} mm": value for key, value in forces.items()}
+    return values
+
+
+def simplex_tightened_case(lengthenings: Sequence[float]) -> Case:
+    """Forces of the simplex as its tube S1 is lengthened, in mm."""
+    loaded = simplex_loads_case(TIGHTENED_FROM / 1e3, (), is_known=False)
+    unknowns = {key: each for key, each in loaded.unknowns.items() if key != "load"}
+    return Case(
+        "simplex, tightened",
+        loaded.scenario,
+        unknowns | {"lengthening": Unknown(0.0, 0.03, "normal")},
+        one_by_one(lambda scenario, unknown: simplex_tightened(scenario, unknown, lengthenings)),
+        60,
+        "the tube S1 is lengthened, by steps known to 0.03 mm from a self-stress of 1.5 kN known "
+        "to 0.025 kN; tubes, stiffnesses, masses, supports and readings of forces as under load",
+    )
 
 
 def simplex_loads_case(self_stress: float, loads: Sequence[float], *, is_known: bool) -> Case:
@@ -567,5 +622,6 @@ def cases() -> dict[str, Case]:
             "slack actuators",
         ),
         "blind_simplex_loads": simplex_loads_case(8.5, (0.0, 0.2, 0.4, 0.6, 0.8), is_known=False),
+        "blind_simplex_tightened": simplex_tightened_case((-1.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0)),
         "blind_simplex_frequencies": simplex_frequencies_case((3.5, 4.5, 5.5)),
     }

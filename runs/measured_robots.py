@@ -83,11 +83,11 @@ def at_rest(robot: Robot) -> dict[str, np.ndarray]:
 # The simplex
 
 
-def lengthened(scenario: Scenario, lengthening: float) -> Scenario:
-    """A simplex with its struts lengthened, in m."""
+def lengthened(scenario: Scenario, lengthening: float, *, struts: int = 3) -> Scenario:
+    """A simplex with its first struts lengthened, in m."""
     structure = structure_of(scenario)
     changes: dict[str, object] = {}
-    for a, b in structure.struts["tube"].pairs:
+    for a, b in structure.struts["tube"].pairs[:struts]:
         start, end = np.array(structure.nodes[a]), np.array(structure.nodes[b])
         shift = 0.5 * lengthening * (end - start) / np.linalg.norm(end - start)
         for node, place in ((a, start - shift), (b, end + shift)):
@@ -106,9 +106,8 @@ def stressed(
 ) -> tuple[Scenario, float]:
     """A simplex whose struts bear a self-stress (N, to `within`) at rest, the effect of weight
     included, and how much longer they are for that, in m; the search begins at `first`."""
-    lengthening, found = first, 0.0
-    if first:
-        found = compression(Robot.of(lengthened(bare, first)))
+    lengthening, scenario = first, lengthened(bare, first)
+    found = compression(Robot.of(scenario)) if first else 0.0
     while abs(self_stress - found) > within:
         lengthening += SOFTNESS * (self_stress - found)
         scenario = lengthened(bare, lengthening)

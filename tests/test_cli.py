@@ -71,6 +71,8 @@ REFUSED = [
     ("simulate --scenario columb", ": columb", "'coulomb'?"),
     ("simulate --scenario scenarios/coulom", ": scenarios/coulom", "'coulomb'?"),
     ("structure six_baer", ": six_baer", "'six_bar'?"),
+    ("structure prism --mode 1", ": structure: --mode", "needs --out"),
+    ("structure prism --mode 99 --out page.html", ": prism: mode", "found 99"),
     *((f"{command} b\0", r": b\x00", "") for command in NUL),
 ]
 

@@ -32,6 +32,7 @@ Functions, and the main attributes of their results:
     compare             how well runs search, with intervals
     form_find           free lengths for a wanted shape and prestress (force densities)
     study_equilibrium   shape, tensions, self-stress, frequencies and modes at rest
+    linearize           Drake's LinearSystem of small motions: system, modes(), lqr(), controller()
     export              writes a gait as commands for the actuators of a prototype
     prepare             compiles everything once, so that nothing later waits
     load_command        commands for actuators from a file, for simulate(scenario, command=...)

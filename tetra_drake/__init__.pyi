@@ -19,6 +19,7 @@ from tetra_drake.scenario.load import load_scenario as load_scenario
 from tetra_drake.study.comparison import compare as compare
 from tetra_drake.study.equilibrium import study_equilibrium as study_equilibrium
 from tetra_drake.study.form import form_find as form_find
+from tetra_drake.study.linearization import linearize as linearize
 from tetra_drake.study.measurements import MotionCapture as MotionCapture
 from tetra_drake.study.measurements import Rest as Rest
 from tetra_drake.study.predict import predict as predict

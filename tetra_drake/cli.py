@@ -619,6 +619,7 @@ def _structure(
     *,
     unit: UnitName | None = None,
     out: File | None = None,
+    mode: Count | None = None,
     mjcf: File | None = None,
     sdf: File | None = None,
 ) -> None:
@@ -626,12 +627,14 @@ def _structure(
 
     Reads a structure file, one of NTRT, an MJCF file (.xml) with tendons, or the robot of a
     scenario, and computes its equilibrium on flat ground without actuation. Prints bodies, cables,
-    states of self-stress, infinitesimal mechanisms, natural frequencies, tensions and heights.
+    states of self-stress, infinitesimal mechanisms, natural frequencies, damping ratios, tensions
+    and heights.
 
     Args:
         unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
         out: write an HTML page that shows the structure in equilibrium; a name that ends in .yaml
             writes a structure file instead, such as one converted from MJCF
+        mode: show in --out only the mode with damping that has this number
         mjcf: write a model for MuJoCo, with tendons, motors and the key frame `rest`
         sdf: write a model in SDFormat: bodies, and nodes as frames, without cables
 
@@ -647,6 +650,8 @@ def _structure(
         study_equilibrium,
     )
 
+    if mode is not None and (out is None or out.suffix in (".yaml", ".yml")):
+        raise InputError("structure", "--mode", "needs --out, a page")
     if out and out.suffix in (".yaml", ".yml"):
         save_structure(read_structure(source, unit=unit), out, source=source)
         _say(f"wrote {out}")
@@ -655,7 +660,7 @@ def _structure(
     text, robot = structure_text(study), study.robot
     rest = robot.equilibrium.state
     if out:
-        save_structure_page(study, out)
+        save_structure_page(study, out, mode=mode)
         text += f"\nto see the structure, open in a browser: {out}"
     if mjcf:
         write_whole(mjcf, make_mjcf(robot, rest=rest))

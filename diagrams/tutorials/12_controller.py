@@ -35,7 +35,7 @@ for i, name in enumerate(("lengths", "rates")):
 builder.ExportOutput(pid.get_output_port_control(), "signals")
 
 # %% Four seconds. With the option --watch, a browser shows the robot in Meshcat as it moves.
-diagram = MakeTensegrityDiagram(robot, None, controller=builder.Build())
+diagram = MakeTensegrityDiagram(robot, controller=builder.Build())
 simulator, found = MakeSimulator(diagram, robot, Drake()), []
 view = open_view(robot.scenario, say=print) if "--watch" in sys.argv else None
 for time in times:

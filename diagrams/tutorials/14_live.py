@@ -25,10 +25,11 @@ def law(time: float, readings: Readings) -> np.ndarray:
 
 
 # %% The diagram, whose SceneGraph shows bodies and cables at the address that Drake prints.
+# With Drake 1.58, hold Ctrl and drag a body with the left mouse button to pull the robot.
 controller, meshcat = SampledController(robot, law, period=0.01), Meshcat()
 centre = robot.structure.p_WB.mean(axis=0)
 meshcat.SetCameraPose(centre + np.array([0.1, -0.35, 0.15]), centre)
-diagram = MakeTensegrityDiagram(robot, None, controller=controller, meshcat=meshcat)
+diagram = MakeTensegrityDiagram(robot, controller=controller, meshcat=meshcat)
 simulator, ways, times = MakeSimulator(diagram, robot, Drake()), [], np.arange(0.0, 4.0, 0.02)
 simulator.set_target_realtime_rate(1.0)
 for time in times:

@@ -69,7 +69,7 @@ def test_the_controller_of_a_diagram_is_that_of_simulate(walking, controller):
 
     robot = controlled_robot(scenario)
     system = SampledController(robot, law, period=0.02)
-    diagram = MakeTensegrityDiagram(robot, None, controller=system)
+    diagram = MakeTensegrityDiagram(robot, controller=system)
     simulator = MakeSimulator(diagram, robot, accurate)
     simulator.AdvanceTo(0.3)
     state = diagram.GetOutputPort("state").Eval(simulator.get_context())
@@ -100,9 +100,7 @@ class Springs(LeafSystem):
 def test_a_controller_makes_no_algebraic_loop_and_may_have_further_outputs(walking, refused):
     robot = controlled_robot(walking)
     springs = Springs(robot, {"lengths": 24, "rates": 24}, {"errors": 2, "signals": 8})
-    with refused("MakeTensegrityDiagram", "gait", "or a controller"):
-        MakeTensegrityDiagram(robot, None)
-    diagram = MakeTensegrityDiagram(robot, None, controller=springs)
+    diagram = MakeTensegrityDiagram(robot, controller=springs)
     found = diagram.GetOutputPort("signals").Eval(diagram.CreateDefaultContext())
     np.testing.assert_allclose(found, robot.starting_cables().length, rtol=1e-12)
 
@@ -113,7 +111,6 @@ OTHER_PORTS = [
     ({}, {"signals": 7}, ("'signals'", "size 7", "8")),
     ({"lengths": 23}, {"signals": 8}, ("'lengths'", "size 23", "24")),
     ({"state": 12}, {"signals": 8}, ("'state'", "size 12", "65")),
-    ({"length": 24}, {"signals": 8}, ("'length'",)),
 ]
 
 
@@ -121,4 +118,62 @@ OTHER_PORTS = [
 def test_a_controller_of_other_ports_is_refused(walking, refused, inputs, outputs, facts):
     robot = controlled_robot(walking)
     with refused("MakeTensegrityDiagram", "controller", *facts):
-        MakeTensegrityDiagram(robot, None, controller=Springs(robot, inputs, outputs))
+        MakeTensegrityDiagram(robot, controller=Springs(robot, inputs, outputs))
+
+
+def test_free_input_ports_of_a_controller_are_ports_of_the_diagram(walking):
+    robot = controlled_robot(walking)
+    controller = Springs(robot, {"lengths": 24, "wanted": 24}, {"signals": 8})
+    diagram = MakeTensegrityDiagram(robot, controller=controller)
+    context = diagram.CreateDefaultContext()
+    assert [diagram.get_input_port(i).get_name() for i in range(diagram.num_input_ports())] == [
+        "wanted"
+    ]
+    diagram.GetInputPort("wanted").FixValue(context, -robot.structure.initial_lengths)
+    found = diagram.GetOutputPort("signals").Eval(context)
+    np.testing.assert_allclose(found, np.zeros(8), atol=1e-15)
+
+
+def test_signals_from_outside_drive_as_those_of_a_controller(walking):
+    robot, held = controlled_robot(walking), np.linspace(0.5, 4.0, 8)
+    diagram = MakeTensegrityDiagram(robot)
+    simulator = MakeSimulator(diagram, robot, Drake(accuracy=1e-5))
+    diagram.GetInputPort("signals").FixValue(simulator.get_mutable_context(), held)
+    simulator.AdvanceTo(0.2)
+    context = simulator.get_context()
+    np.testing.assert_array_equal(diagram.GetOutputPort("signals").Eval(context), held)
+    result = simulate(
+        shortly(walking, 0.2, engine=Drake(accuracy=1e-5)),
+        controller=lambda time, readings: held,
+        record=True,
+    )
+    state = diagram.GetOutputPort("state").Eval(context)
+    p_WB = result.trajectory.p_WB[-1].to_numpy()
+    np.testing.assert_allclose(state[:35].reshape(5, 7)[:, 4:], p_WB, atol=1e-7)
+
+
+def test_a_robot_without_signals_needs_none():
+    robot = Robot.of(load_scenario("prism").with_changes({"robot.actuated": {}}))
+    diagram = MakeTensegrityDiagram(robot)
+    assert diagram.num_input_ports() == 0
+    assert diagram.GetOutputPort("signals").size() == 0
+
+
+def test_a_scene_graph_without_meshcat_has_struts_and_cables(walking):
+    robot = Robot.of(walking)
+    plain, diagram = MakeTensegrityDiagram(robot), MakeTensegrityDiagram(robot, scene_graph=True)
+    assert not plain.HasSubsystemNamed("scene_graph")
+    context = diagram.CreateDefaultContext()
+    query = diagram.GetOutputPort("query_object").Eval(context)
+    inspector = query.inspector()
+    sources = [inspector.GetName(one) for one in inspector.GetAllSourceIds()]
+    assert {"plant", "cables"} <= set(sources)
+    names = [inspector.GetName(one) for one in inspector.GetAllFrameIds()]
+    assert {f"{cable} 0" for cable in robot.structure.cable_names} <= set(names)
+
+
+@pytest.mark.parametrize("key", ["robot", "gait", "controller", "scene_graph", "meshcat"])
+def test_an_argument_of_another_type_is_refused(walking, refused, key):
+    given = {"robot": Robot.of(walking)} | {key: "word"}
+    with refused("MakeTensegrityDiagram", key, "'word'"):
+        MakeTensegrityDiagram(**given)

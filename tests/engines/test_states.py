@@ -9,6 +9,7 @@ from helpers.converged import shortly
 
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.states import States
+from tetra_drake.errors import Diverged
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
@@ -123,6 +124,25 @@ def test_states_are_values_and_a_damaged_file_is_refused(short, tmp_path, refuse
     np.savez(path, **tables | {"held": tables["held"] + 1.0})
     with refused(path, "", "digest"):
         States.load(path)
+
+
+def test_a_failed_robot_keeps_its_failure_and_the_others_go_on(engine, tmp_path):
+    scenario = shortly(load_scenario("quick"), 0.2, engine=engine)
+    one, other = (Simulation(scenario, count=2, workers=1) for _ in range(2))
+    actions = one.rest.copy()
+    actions[1] = 1e9
+    seen = [one.step(actions) for _ in range(4)][-1]
+    assert isinstance(one.failures[1], Diverged) and one.failures[0] is None
+    one.save().save_npz(tmp_path / "states.npz")
+    states = States.load(tmp_path / "states.npz")
+    assert (other.restore(states).p_WN == seen.p_WN).all()
+    assert repr(other.failures) == repr(one.failures) and other.ended.tolist() == [False, True]
+    expected, found = one.step(one.rest), other.step(one.rest)
+    np.testing.assert_allclose(found.p_WN, expected.p_WN, rtol=0.0, atol=ERRORS[engine])
+    assert (found.p_WN[1] == seen.p_WN[1]).all()
+    other.restore(states[0], [1])
+    assert other.failures == [None, None]
+    np.testing.assert_allclose(other.step(one.rest).p_WN[1], found.p_WN[0], atol=ERRORS[engine])
 
 
 WRONG = {

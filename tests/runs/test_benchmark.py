@@ -1,7 +1,13 @@
 """The benchmark: its tables on short simulations of few gaits."""
 
+from itertools import product
+
 import benchmark
 from helpers.converged import shortly
+from pydrake.systems.analysis import GetIntegrationSchemes
+
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
 
 FEW = {"GAITS": 2, "BATCHES": (1, 2), "GROUND_BATCH": 1, "CONTROLLED": (2,), "ROUNDS": 1}
 
@@ -31,3 +37,33 @@ def test_cost_is_measured_by_size(scenario, monkeypatch, capsys):
     assert [row[:2] for row in rows] == [["row", "2"], ["mast", "2"], ["lattice", "12"]]
     assert all(float(cell) > 0.0 for row in rows for cell in row[2:4])
     assert [bool(row[4]) for row in rows] == [True, True, False]
+
+
+def test_all_schemes_of_drake_are_measured(scenario, monkeypatch, capsys):
+    monkeypatch.setattr(benchmark, "MOMENT", 0.03)
+    benchmark.main(["schemes"], scenario)
+    rows = [
+        line.strip("| ").split("|") for line in capsys.readouterr().out.splitlines()[2:] if line
+    ]
+    cells = [[cell.strip() for cell in row] for row in rows]
+    robots, schemes = ["`thesis`", "`six_bar`"], [f"`{one}`" for one in GetIntegrationSchemes()]
+    assert [row[:2] for row in cells] == [list(pair) for pair in product(robots, schemes)]
+    for _, scheme, setting, failure, error_mm, *_ in cells:
+        assert setting.startswith("step") == (scheme.strip("`") in benchmark.FIXED_STEPS)
+        assert not failure
+        assert float(error_mm) < 1.0
+
+
+def test_a_scheme_that_fails_says_why(scenario):
+    robot, gait = Robot.of(scenario), seeded_gait(scenario, 0)
+    p_WB = robot.structure.p_WB
+    tried = benchmark.try_scheme(robot, gait, "explicit_euler", p_WB, step=2e-3)
+    assert "too large" in tried.failure and not tried.error_mm
+
+
+def test_parameters_are_faster_than_a_diagram_for_each_robot(scenario, monkeypatch, capsys):
+    monkeypatch.setattr(benchmark, "CANDIDATES", 10)
+    benchmark.main(["candidates"], scenario)
+    lines = [line for line in capsys.readouterr().out.splitlines()[2:] if line]
+    own, shared = (float(line.split("|")[2]) for line in lines)
+    assert own > 10.0 * shared

@@ -8,6 +8,8 @@ import pandas
 import pytest
 
 LOADS = ("0.60", "2.08")
+MODE = {"S1": 1.0, "S2": 1.0, "S3": 1.0, "CB1": 0.393, "CT2": 0.393, "CV3": 0.681}
+"""Forces of members of the simplex by the compression of its tubes, as published."""
 
 
 def test_the_simplex_is_as_high_as_measured_up_to_a_load_of_1_kn():
@@ -55,7 +57,7 @@ def test_the_hash_of_the_blind_predictions_is_on_the_page():
     assert hashlib.sha256((measured.HERE / "blind.csv").read_bytes()).hexdigest() in page
     table = pandas.read_csv(measured.HERE / "blind.csv")
     assert (table["low"] < table["median"]).all() and (table["median"] < table["high"]).all()
-    assert table["structure"].nunique() == 6 and table["assumed"].notna().all()
+    assert table["structure"].nunique() == 7 and table["assumed"].notna().all()
 
 
 def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
@@ -66,6 +68,15 @@ def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
     )
     lower = {load: straight[f"H at {load} kN"] - bowed[f"H at {load} kN"] for load in LOADS}
     assert lower["0.60"] < 0.5 and lower["2.08"] > 2.0
+
+
+def test_a_longer_tube_stresses_all_members_of_the_simplex_by_the_published_mode():
+    case = measured.cases()["blind_simplex_tightened"]
+    middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
+    (force,) = case.predict([(case.scenario(), middle)])
+    added = {member: force[f"{member} at +8 mm"] - force[f"{member} at +2 mm"] for member in MODE}
+    for member, share in MODE.items():
+        assert added[member] / added["S1"] == pytest.approx(share, rel=0.02)
 
 
 def test_totals_count_the_intervals_that_hold_the_measured_value():

@@ -15,6 +15,7 @@ from pydrake.multibody.tree import Frame, LinearSpringDamper, RevoluteJoint, Spa
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.visualization import VisualizationConfig
 from scipy.integrate import solve_ivp
 
 from tetra_drake.errors import SimulationFailure
@@ -279,4 +280,6 @@ def test_a_robot_is_shown_in_meshcat_with_struts_nodes_and_cables():
     assert inspector.num_geometries() == 5 * (6 + 4) + 24 * 4
     diagram.ForcedPublish(diagram.CreateDefaultContext())
     for path in ("T1", "T1-T2 outer top 0"):
-        assert meshcat.HasPath(f"/drake/visualizer/{path}")
+        assert meshcat.HasPath(f"/drake/illustration/{path}")
+    can_be_dragged = hasattr(VisualizationConfig, "mouse_interaction_stiffness")
+    assert diagram.HasSubsystemNamed("meshcat_mouse_spring") == can_be_dragged

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from time import perf_counter
 
 import numpy as np
+from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import (
     InitializeParams,
     IntegratorBase,
@@ -25,7 +26,13 @@ from tetra_drake.engines.lanes.tables import numbers_of, views
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sampler, drives_at, frame_of
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import (
+    Diverged,
+    InputError,
+    SimulationFailure,
+    StepBudgetExceeded,
+    check_type,
+)
 from tetra_drake.kernels.packed import write_tables
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS, Ground
@@ -37,12 +44,15 @@ from tetra_drake.robot.equilibrium import (
     mass_matrix,
     stiffness_at_rest,
 )
+from tetra_drake.robot.gait import GivenGait, given_gait, with_body
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
 from tetra_drake.robot.structure import with_origins
+from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.systems import HeldSignals
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -94,7 +104,7 @@ class _DiagramRobot(LoneRobot):
         if driven.gait is not None:
             diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
         else:
-            diagram = MakeTensegrityDiagram(robot, None, controller=HeldSignals(robot))
+            diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
         self._diagram, self._engine = diagram, engine
         self._simulator = MakeSimulator(diagram, robot, engine)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
@@ -273,6 +283,38 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
         window = _WITNESS_WINDOW * min(1.0, accuracy / 1e-3)
         simulator.get_mutable_context().SetAccuracy(window / _WITNESS_WINDOW_PER_ACCURACY)
     return simulator
+
+
+def MakeDisturbedSimulator(
+    scenario: GivenScenario, gait: GivenGait, generator: RandomGenerator
+) -> Simulator:
+    """Drake's Simulator of a robot with random disturbances, for Drake's Monte Carlo simulations:
+
+    >>> results = MonteCarloSimulation(
+    ...     make_simulator=functools.partial(MakeDisturbedSimulator, "robust", gait),
+    ...     output=lambda system, context: system.GetOutputPort("state").Eval(context)[4],
+    ...     final_time=5.0,
+    ...     num_samples=100,
+    ...     generator=RandomGenerator(1),
+    ... )
+
+    The generator's next number is the seed of a draw in scenario.disturbances.fresh_draws(), by the
+    scenario's `disturbances`, which robustness() draws, too. Disturbances change masses, lengths,
+    the terrain and so on, so each draw has its own diagram, whose context is not random.
+
+    Raises InputError if the scenario has no disturbances, has events or `disturbances.cuts`, which
+    a Simulator does not know, or the draw is no possible robot.
+    """
+    check_type("MakeDisturbedSimulator", "generator", generator, RandomGenerator)
+    scenario = given_scenario(scenario).on_engine("drake")
+    scenario, gait = with_body(scenario, given_gait(gait, scenario))
+    if scenario.disturbances is None:
+        raise InputError(scenario.name, "disturbances", "is missing; it says what varies")
+    [draw] = fresh_draws(scenario, generator(), 1)
+    if scenario.events or draw.events:
+        raise InputError(scenario.name, "events", "found some; only td.simulate() knows them")
+    robot = Robot.of(disturbed(scenario, draw))
+    return MakeSimulator(MakeTensegrityDiagram(robot, gait), robot, scenario.settings_of(Drake))
 
 
 def default_scheme(robot: Robot) -> str:

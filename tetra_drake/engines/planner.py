@@ -32,6 +32,10 @@ returns costs of the robots (robots,), or of each time (times, robots), whose me
 weights by the names of readings: the cost is the sum of the readings times their weights."""
 
 
+MOST_STEPS = 10_000
+"""Largest number of control periods that a plan looks ahead."""
+
+
 class Planner:
     """Controller that plans the actions of a robot again and again, with a simulation as its model.
 
@@ -52,7 +56,7 @@ class Planner:
 
     Attributes:
         model: the simulation of the samples. `model.damage(0, cables=[...])` tells the planner of
-            cut cables; reset() forgets them.
+            cut cables; `model.reset()` repairs it.
         limits: least and greatest actions, two rows (2, actions).
         wall_times: wall times (s) of the decisions.
         costs: mean costs of the samples in the decisions, without samples that have failed.
@@ -122,6 +126,9 @@ class Planner:
         if self._ahead < 1 or abs(pause - self._ahead * step) > 1e-6 * step or pause > horizon:
             expected = f"expected a multiple of the control period, {step:g} s, up to the horizon"
             raise InputError(source, "decision_period", f"found {pause:g} s, {expected}")
+        if self._steps > MOST_STEPS:
+            expected = f"expected at most {MOST_STEPS} control periods of {step:g} s"
+            raise InputError(source, "horizon", f"found {horizon:g} s, {expected}")
 
         # The model's time begins at each decision anew, so that it needs little memory.
         duration = step * (self._steps + self._ahead + 2)
@@ -145,8 +152,12 @@ class Planner:
         self._costs([self.model.state], 0.0)
 
     def reset(self) -> None:
-        """Begins anew: without a plan, with a robot at its start, and with the first noise."""
+        """Begins anew: without a plan, with a robot at its start, and with the first noise. Cables
+        that the planner knows to be cut stay so."""
+        cut = self.model.damage_of(0)
         self.model.reset()
+        if cut:
+            self.model.damage(0, cables=cut)
         self._middle, self._half = self.limits.mean(axis=0), 0.5 * np.ptp(self.limits, axis=0)
         rest = (self.model.rest[0] - self._middle) / np.where(self._half > 0.0, self._half, 1.0)
         self._plan = self._next_plan = np.tile(np.clip(rest, -1.0, 1.0), (self._knots, 1))
@@ -236,10 +247,10 @@ class Planner:
     def _costs(self, moments: Sequence[Readings], offset: float) -> np.ndarray:
         """Costs (samples,) of the motions with readings at several times; infinite for robots that
         have failed. Their times are counted from `offset` (s). Raises InputError for costs that are
-        NaN or have another shape."""
+        NaN or -inf, or have another shape."""
         readings = Readings(*(np.array(values) for values in zip(*moments, strict=True)))
         readings = readings._replace(time=readings.time + offset)
-        shape, problem = readings.time.shape, ""
+        shape = readings.time.shape
         given: Any = self._cost
         if isinstance(given, Mapping):
             given = sum(self._weighted(name, readings) for name in given)
@@ -248,8 +259,8 @@ class Planner:
         costs = checked_numbers(given, shape[1:], shape, source="Planner", key="cost")
         costs = costs.mean(axis=0) if costs.ndim == 2 else costs
         failed = np.array([failure is not None for failure in self.model.failures])
-        if (bad := np.isnan(costs) & ~failed).any():
-            problem = f"found nan for sample {bad.argmax()}, expected numbers"
+        if (bad := ~(costs > -math.inf) & ~failed).any():
+            problem = f"found {costs[bad.argmax()]} for sample {bad.argmax()}, expected numbers"
             raise InputError("Planner", "cost", problem)
         return np.where(failed, math.inf, costs)
 
@@ -261,7 +272,7 @@ class Planner:
         values, weights = getattr(readings, name), self._cost[name]  # type: ignore[index]
         try:
             weighted = np.broadcast_to(weights, values.shape[2:]) * values
-        except ValueError:
+        except (TypeError, ValueError):
             problem = f"found {weights!r:.60}, expected weights of shape {values.shape[2:]}"
             raise InputError("Planner", f"cost.{name}", problem) from None
         return np.asarray(weighted.reshape(*values.shape[:2], -1).sum(axis=-1))

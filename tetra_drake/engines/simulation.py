@@ -248,28 +248,30 @@ class Simulation:
 
         A state is all that a robot is: positions and velocities, stick points and contact modes,
         states of the actuators, held signals, sums for metrics, its disturbances, damage and passed
-        events. The recorded motion and the wall time are not in it.
+        events. A robot that has failed keeps its failure. The recorded motion and the wall time are
+        not in it.
 
         Args:
             places: the robots, by their indices; all by default.
             history: also saves the motion so far, which result() needs after restore().
 
         Raises:
-            InputError: if an index is wrong, a robot has failed, or a motion is not known.
+            InputError: if an index is wrong, or a motion is not known.
         """
         which = self._places(places)
         check_type("Simulation", "history", history, bool)
         with self._used("save"):
             for place in which:
-                if failure := self.failures[place]:
-                    problem = f"robot {place} has failed, so it has no state: {failure}"
-                    raise InputError("Simulation", "save", problem)
                 if history and not self._batch.has_history[place]:
                     problem = f"robot {place} was restored without its motion before"
                     raise InputError("Simulation", "history", problem)
                 if self._steps[place] == 0:
                     self._begin(place, self._driven(self._robots[place]))
             tables = self._batch.save(which, history=history)
+            failures = [self.failures[place] for place in which]
+            if any(failures):
+                told = [each and [type(each).__name__, each.time, each.reason] for each in failures]
+                tables["failures"] = np.array([json.dumps(each) for each in told])
             return States(
                 scenario=self.scenario.name,
                 identity=self._identity,
@@ -324,7 +326,14 @@ class Simulation:
                     self._put(place, identity, robots[identity])
                 if is_other or self._steps[place] == 0 or self.failures[place]:
                     self._begin(place, driven[identity])
-            self._batch.restore(which, own)
+            told = [json.loads(str(each)) for each in own.get("failures", ["null"] * count)]
+            well = np.array([each is None for each in told], dtype=bool)
+            going = own if well.all() else {name: table[well] for name, table in own.items()}
+            self._batch.restore(np.array(which)[well].tolist(), going)
+            for row in np.flatnonzero(~well).tolist():
+                last = Readings(*(own[f"readings.{name}"][row] for name in Readings._fields))
+                self._batch.readings.put(which[row], last)
+                self._batch.failures[which[row]] = _failure_of(*told[row])
             self._steps[which] = steps
             self._is_whole = True
             return self.state
@@ -342,7 +351,7 @@ class Simulation:
             history: also copies the motion so far, which result() needs.
 
         Raises:
-            InputError: if an index is wrong, or the robot has failed.
+            InputError: if an index is wrong.
         """
         return self.restore(self.save([place], history=history), to)
 
@@ -377,6 +386,11 @@ class Simulation:
             if self._steps[place] > 0:
                 self._batch.change(place, self._driven(robot))
 
+    def damage_of(self, place: int) -> list[str]:
+        """Names of the cables of a robot that damage() has cut since its start."""
+        (place,) = self._places([place])
+        return [name for _, cut in json.loads(self._identities[place])["damage"] for name in cut]
+
     def assume(self, readings: Readings, *, place: int = 0) -> None:
         """Puts a robot of the compiled engine into the motion of given readings, for example of a
         robot on another engine, or of a real one.
@@ -387,9 +401,12 @@ class Simulation:
         actuators keep the states that they have.
 
         Raises:
-            InputError: if the engine is another one, or the index or the time is wrong.
+            InputError: if the engine or the robot is another one, or the index or the time is
+                wrong.
         """
         (place,) = self._places([place])
+        for name, given, own in zip(Readings._fields, readings, self._batch.readings, strict=True):
+            checked_numbers(given, own.shape[1:], source="Simulation", key=f"readings.{name}")
         steps = self._steps_until(np.array([readings.time]))[0]
         if steps == 0:
             problem = f"found the time {readings.time} s, expected one after the start"
@@ -493,6 +510,12 @@ def _damaged(robot: Robot, at: float, cables: Sequence[str]) -> Robot:
     except InputError as error:
         raise InputError("Simulation", "cables", error.problem) from error
     return dataclasses.replace(robot, scenario=robot.scenario.with_sections(events=events))
+
+
+def _failure_of(kind: str, time: float, reason: str) -> SimulationFailure:
+    """The failure of a kind, as saved states name it."""
+    kinds = {each.__name__: each for each in SimulationFailure.__subclasses__()}
+    return kinds[kind](time=time, reason=reason)
 
 
 def is_list(values: object) -> TypeGuard[Sequence[Any]]:

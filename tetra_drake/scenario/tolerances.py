@@ -31,7 +31,7 @@ _PER_CABLE = re.compile(r"((?:robot\.|)cables\.[^.]+)\.(stiffness|damping|free_l
 def _as_mapping(given: Any) -> Any:
     """Mapping with the settings of a tolerance that is given as one text or number."""
     if isinstance(given, int | float) and not isinstance(given, bool):
-        return {"size": f"{float(given)!r}"}
+        return {"size": str(given)}
     match = re.fullmatch(_SHORT, given) if isinstance(given, str) else None
     if match is None:
         return given
@@ -66,7 +66,8 @@ class Tolerance(Section):
         try:
             size = quantity_to_si(text, unit) if unit and not is_share else float(text)
         except ValueError as error:
-            raise ValueError(f"{error}, or a share, such as 2 %") from error
+            found = error if unit and not is_share else f"found '{self.size}', expected a number"
+            raise ValueError(f"{found}, or a share, such as 2 %") from error
         if not 0.0 <= size < math.inf:
             raise ValueError(f"found {self.size}, expected 0 or more")
         is_some, size = size > 0.0, size * abs(number) / 100.0 if is_share else size

@@ -24,7 +24,7 @@ from tetra_drake.laws.actuator import Force
 from tetra_drake.laws.cable import TENSION
 from tetra_drake.laws.capsules import NoStrutContact
 from tetra_drake.laws.contact import CONTACT, MODE_COLUMNS, NORMAL
-from tetra_drake.laws.kinematics import FORCE, rigid_motions
+from tetra_drake.laws.kinematics import FORCE
 from tetra_drake.laws.terrain import Flat, Nothing
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, mass_matrix, stiffness_at_rest
@@ -39,11 +39,14 @@ from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenar
 from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.settings.refusals import no_such
+from tetra_drake.study.linearization import (
+    LEAST_FREQUENCY,
+    DampedModes,
+    linearize,
+    node_motions,
+)
 from tetra_drake.visualization.replay import FRAMES_PER_SECOND, save_replay
 
-LEAST_FREQUENCY = 0.05
-"""Least natural frequency in Hz. A slower mode is a motion that no force resists, such as the spin
-of a bar about its axis."""
 _LEAST_SQUARE = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
 
 _LARGE = 50
@@ -110,14 +113,15 @@ class EquilibriumStudy:
         motions = motions[:, squares > _LEAST_SQUARE]
         by_body = motions.reshape(len(structure.bodies), 6, -1)
         by_body[:, :3] /= unactuated.radius
-        p_WB = self.robot.equilibrium.state[: 7 * len(by_body)].reshape(-1, 7)[:, 4:]
-        p_WN = self.nodes[["x", "y", "z"]].to_numpy()
-        modes = np.zeros((motions.shape[1], *p_WN.shape))
-        for body, motion in enumerate(by_body):
-            own = slice(structure.first_node[body], structure.first_node[body + 1])
-            modes[:, own] = (rigid_motions(p_WN[own] - p_WB[body]) @ motion).transpose(2, 0, 1)
+        of_bodies = by_body.transpose(2, 0, 1)
+        modes = node_motions(structure, self.robot.equilibrium.state, of_bodies)
         farthest = np.linalg.norm(modes, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
-        return modes / farthest, by_body.transpose(2, 0, 1) / farthest
+        return modes / farthest, of_bodies / farthest
+
+    @functools.cached_property
+    def damped(self) -> DampedModes:
+        """Modes with damping. Nodes on the ground stick; see linearize()."""
+        return linearize(self.robot, self.robot.equilibrium.state).modes()
 
 
 def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
@@ -274,6 +278,13 @@ def structure_text(study: EquilibriumStudy) -> str:
         rows = [[str(node), *map(rounded, row / units.force)] for node, row in forces.iterrows()]
         names = [f"force along {axis} ({force})" for axis in "xyz"]
         lines.append(TextTable(["anchor", *names], rows).text())
+    if len(structure.bodies) < _LARGE:
+        lowest_damped = enumerate(zip(*study.damped[:2], strict=True), start=1)
+        rows = [[str(i), rounded(hertz), fixed(ratio, 4)] for i, (hertz, ratio) in lowest_damped]
+        sticks = "; nodes on the ground stick" if structure.contacts.size else ""
+        lines.append(f"Modes with damping{sticks}:" if rows else "No oscillations with damping.")
+        headings = ["mode", "frequency (Hz)", "damping ratio"]
+        lines += [TextTable(headings, rows[:_FREQUENCIES]).text()] if rows else []
     return "\n\n".join(lines + _faults(study))
 
 
@@ -299,12 +310,22 @@ def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> st
     return low if low == high else f"{low} to {high}"
 
 
-def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
+def save_structure_page(study: EquilibriumStudy, path: Path, *, mode: int | None = None) -> None:
     """Writes an HTML page that shows the robot in equilibrium in 3D, the text of structure_text(),
-    and the lowest modes, one after the other, slowed down and enlarged. Raises InputError if the
-    page cannot be written."""
+    and the lowest modes, one after the other, slowed down and enlarged.
+
+    Args:
+        study: the robot at rest.
+        path: the file to write.
+        mode: number of a mode with damping, from 1 on, in place of the modes without damping. It is
+            shown without its decay.
+
+    Raises:
+        InputError: if the file cannot be written, or there is no such mode.
+    """
     robot = study.robot
-    states = _swinging(study)
+    title, frequencies, motions = _shown_modes(study, mode)
+    states = _swinging(study, motions)
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
     modes = np.zeros((len(states), len(loads), MODE_COLUMNS))
     modes[:, :, CONTACT] = loads > 0.0
@@ -317,34 +338,48 @@ def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
     )
     trajectory = make_dataset(robot, motion)
     for name in ("tension", "normal_force", "friction_force"):  # not of the enlarged motion
-        trajectory[name][:] = trajectory[name].values[0]
-    frames = study.lowest_frequencies().repeat(_SWING) if len(states) > _STILL else np.zeros(0)
+        trajectory[name][:] = trajectory[name].values[-1]
+    frames = frequencies.repeat(_SWING)
     shown = {"what": "mode at", "unit": " Hz", "digits": 2, "values": [*frames, *frames[-1:]]}
     save_replay(
         path,
         robot=robot,
         trajectory=trajectory,
-        title=f"{robot.scenario.name} at rest",
+        title=title,
         progress=shown if frames.size else None,
         text=structure_text(study),
     )
 
 
-def _swinging(study: EquilibriumStudy) -> np.ndarray:
-    """States (frames, 13 * bodies) of a robot that swings in its lowest modes, twice in each, in
-    _SWING frames each. The node that moves farthest moves by the share _AMPLITUDE of the robot's
-    size. A robot without modes, or with so many bodies that they take long, rests for _STILL
-    frames."""
+def _shown_modes(study: EquilibriumStudy, mode: int | None) -> tuple[str, np.ndarray, np.ndarray]:
+    """Title of the page, frequencies (Hz) of the modes to show, and the motions (modes, bodies, 6)
+    of the bodies: the mode with damping of number `mode`, complex, or the lowest ones without
+    damping. Finding the latter takes long for many bodies; then there are none."""
+    name = study.robot.scenario.name
+    if mode is None:
+        if len(study.robot.structure.bodies) >= _LARGE:
+            return f"{name} at rest", np.zeros(0), np.zeros((0, 1, 6))
+        lowest = study.frequencies[:_FREQUENCIES], study._modes[1][:_FREQUENCIES]
+        return f"{name} at rest", *lowest
+    damped = study.damped
+    if not 1 <= mode <= (count := len(damped.frequencies)):
+        raise InputError(name, "mode", f"found {mode}, expected one of {count} modes with damping")
+    title = f"{name}: mode {mode}, damping ratio {fixed(damped.damping_ratios[mode - 1], 4)}"
+    return title, damped.frequencies[mode - 1 : mode], damped.motions[mode - 1 : mode]
+
+
+def _swinging(study: EquilibriumStudy, motions: np.ndarray) -> np.ndarray:
+    """States (frames, 13 * bodies) of a robot that swings in modes with these motions of its bodies
+    (modes, bodies, 6), twice in each, in _SWING frames each, and rests in the end. The node that
+    moves farthest moves by the share _AMPLITUDE of the robot's size. A robot without modes rests
+    for _STILL frames."""
     bodies, rest = len(study.robot.structure.bodies), study.robot.equilibrium.state
-    if bodies >= _LARGE:
-        return np.tile(rest, (_STILL, 1))
-    _, motions = study._modes
     if not len(motions):
         return np.tile(rest, (_STILL, 1))
-    states = np.tile(rest, (len(motions[:_FREQUENCIES]) * _SWING + 1, 1))
+    states = np.tile(rest, (len(motions) * _SWING + 1, 1))
     size = float(np.ptp(study.nodes[["x", "y", "z"]].to_numpy(), axis=0).max())
-    swing = _AMPLITUDE * size * np.sin(4.0 * math.pi * np.arange(_SWING) / _SWING)
-    moved = motions[:_FREQUENCIES, np.newaxis] * swing[:, np.newaxis, np.newaxis]
+    swing = -1j * np.exp(4j * math.pi * np.arange(_SWING) / _SWING)  # begins at rest if real
+    moved = _AMPLITUDE * size * (motions[:, np.newaxis] * swing[:, np.newaxis, np.newaxis]).real
     poses = states[:-1, : 7 * bodies].reshape(-1, 7)
     turns, ways = np.split(moved.reshape(-1, 6), 2, axis=1)
     turned = Rotation.from_rotvec(turns) * Rotation.from_quat(poses[:, [1, 2, 3, 0]])

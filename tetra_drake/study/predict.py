@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -192,10 +194,13 @@ def predict(
     check_whole("predict", "draws", draws, least=1)
     check_whole("predict", "seed", seed, least=0)
     check_type("predict", "quantities", quantities, Sequence, Mapping)
+    check_type("predict", "command", command, Command, NoneType)
     given = [quantities] if isinstance(quantities, str) else quantities
     measures = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
     if not measures:
         raise InputError("predict", "quantities", "found none, expected one at least")
+    for name, measure in measures.items():
+        check_type("predict", f"quantities.{name}", measure, str, Callable)
     folder = None if out is None else given_path(out, "predict", "out")
     scenario = given_scenario(scenario)
     driver: Driver | None = command
@@ -344,7 +349,7 @@ def _value(
     if not isinstance(measure, str):
         return float(measure(outcome))
     if measure not in known:
-        if isinstance(outcome, EquilibriumStudy) and measure.startswith("frequency "):
+        if isinstance(outcome, EquilibriumStudy) and re.fullmatch(r"frequency [1-9]\d*", measure):
             return math.nan
         what = "needs a gait or a command" if measure in METRICS else "is unknown"
         raise InputError("predict", f"quantities.{measure}", f"{what}; {hint(measure, known)}")
@@ -453,6 +458,7 @@ def predictions_figure(predictions: Predictions) -> Drawn:
     left.hlines(places, low, high, color=OKABE_ITO["sky_blue"], linewidth=5.0)
     left.plot(middle, places, "o", color=OKABE_ITO["blue"])
     left.set(xlabel="difference from nominal (%)")
+    left.margins(x=0.05)
     left.set_yticks(places, [folded(name, _NAMES * page_width()) for name in names])
     for series, (key, column) in enumerate(shares.items()):
         color, part = line_style(series)["color"], 100.0 * column.fillna(0.0).to_numpy()

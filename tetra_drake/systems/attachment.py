@@ -2,7 +2,7 @@
 
 Attached systems, such as CableNetwork, take the state of all bodies as if these were free, and give
 a torque and a force on each. If the bodies are free, these are the plant's own state and
-generalized force; otherwise BodyStates and BodyForces translate.
+generalized force; otherwise BodyStates_ and BodyForces_ translate.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.value import AbstractValue
-from pydrake.multibody.math import SpatialForce
+from pydrake.math import RigidTransform_
+from pydrake.multibody.math import SpatialForce_, SpatialVelocity_
 from pydrake.multibody.plant import (
-    ExternallyAppliedSpatialForce,
+    ExternallyAppliedSpatialForce_,
     ExternallyAppliedSpatialForceMultiplexer,
     MultibodyPlant,
 )
@@ -30,9 +32,12 @@ from pydrake.systems.framework import (
     DependencyTicket,
     DiagramBuilder,
     LeafSystem,
+    LeafSystem_,
     System,
+    SystemScalarConverter,
 )
 from pydrake.systems.primitives import Adder
+from pydrake.systems.scalar_conversion import TemplateSystem
 
 from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.model import WORLD
@@ -97,65 +102,92 @@ class Nodes(NamedTuple):
         )
 
 
-class BodyStates(LeafSystem):
-    """State of the bodies of a plant, as if they were free. The system has no state.
+@TemplateSystem.define("BodyStates_", T_list=[float, AutoDiffXd])
+def BodyStates_(T: type) -> type:
+    """State of the bodies of a plant, as if they were free; a class for each type of scalars."""
 
-    | port               | in, out | shape    | unit | meaning                                     |
-    |--------------------|---------|----------|------|---------------------------------------------|
-    | body_poses         | in      | abstract | SI   | list of the poses X_WB, from the plant      |
-    | spatial_velocities | in      | abstract | SI   | list of the velocities V_WB, from the plant |
-    | state              | out     | (13*n,)  | SI   | [q; v] of the n bodies other than the world |
+    class Impl(LeafSystem_[T]):
+        """State of the n bodies of a plant other than the world, as if they were free. The system
+        has no state.
 
-    As for free bodies in Drake, q has a quaternion (w first) and a position per body, and v an
-    angular and a linear velocity in the world frame.
-    """
+        | port               | in, out | shape    | unit | meaning                                 |
+        |--------------------|---------|----------|------|-----------------------------------------|
+        | body_poses         | in      | abstract | SI   | list of poses X_WB, from the plant      |
+        | spatial_velocities | in      | abstract | SI   | list of velocities V_WB, from the plant |
+        | state              | out     | (13*n,)  | SI   | [q; v] of the bodies                    |
 
-    def __init__(self, plant: MultibodyPlant) -> None:
-        super().__init__()
-        poses = plant.get_body_poses_output_port().Allocate()
-        velocities = plant.get_body_spatial_velocities_output_port().Allocate()
-        self._poses = self.DeclareAbstractInputPort("body_poses", poses)
-        self._velocities = self.DeclareAbstractInputPort("spatial_velocities", velocities)
-        sources = {self._poses.ticket(), self._velocities.ticket()}
-        size = 13 * (plant.num_bodies() - 1)
-        self.DeclareVectorOutputPort("state", size, self._calc_state, sources)
+        As for free bodies in Drake, q has a quaternion (w first) and a position per body, and v an
+        angular and a linear velocity in the world frame.
+        """
 
-    def _calc_state(self, context: Context, output: BasicVector) -> None:
-        poses, velocities = self._poses.Eval(context)[1:], self._velocities.Eval(context)[1:]
-        q = [[*X_WB.rotation().ToQuaternion().wxyz(), *X_WB.translation()] for X_WB in poses]
-        v = [V_WB.get_coeffs() for V_WB in velocities]
-        output.SetFromVector(np.concatenate([np.ravel(q), np.ravel(v)]))
+        def _construct(self, bodies: int, *, converter: SystemScalarConverter) -> None:
+            LeafSystem_[T].__init__(self, converter)
+            self._bodies = bodies
+            poses, velocities = [RigidTransform_[T]()], [SpatialVelocity_[T]()]
+            self._poses = self.DeclareAbstractInputPort("body_poses", AbstractValue.Make(poses))
+            self._velocities = self.DeclareAbstractInputPort(
+                "spatial_velocities", AbstractValue.Make(velocities)
+            )
+            sources = {self._poses.ticket(), self._velocities.ticket()}
+            self.DeclareVectorOutputPort("state", 13 * bodies, self._calc_state, sources)
+
+        def _construct_copy(self, other: Any, *, converter: SystemScalarConverter) -> None:
+            Impl._construct(self, other._bodies, converter=converter)
+
+        def _calc_state(self, context: Context, output: BasicVector) -> None:
+            poses, velocities = self._poses.Eval(context)[1:], self._velocities.Eval(context)[1:]
+            q = [[*X_WB.rotation().ToQuaternion().wxyz(), *X_WB.translation()] for X_WB in poses]
+            v = [V_WB.get_coeffs() for V_WB in velocities]
+            output.SetFromVector(np.concatenate([np.ravel(q), np.ravel(v)]))
+
+    return Impl
 
 
-class BodyForces(LeafSystem):
-    """Forces on the bodies of a plant, as a list that the plant reads. The system has no state.
+@TemplateSystem.define("BodyForces_", T_list=[float, AutoDiffXd])
+def BodyForces_(T: type) -> type:
+    """Forces on the bodies of a plant, as a list that the plant reads; a class for each type of
+    scalars."""
+    Applied, Wrench = ExternallyAppliedSpatialForce_[T], SpatialForce_[T]
+    differentiates = T is AutoDiffXd
 
-    | port              | in, out | shape    | unit   | meaning                                    |
-    |-------------------|---------|----------|--------|--------------------------------------------|
-    | generalized_force | in      | (6*n,)   | N m, N | [t_W; f_W] at the origin of each of the n  |
-    |                   |         |          |        | bodies other than the world                |
-    | spatial_forces    | out     | abstract | N m, N | list of ExternallyAppliedSpatialForce, for |
-    |                   |         |          |        | bodies whose force is not zero             |
-    """
+    class Impl(LeafSystem_[T]):
+        """Forces on the n bodies of a plant other than the world, as a list that the plant reads.
+        The system has no state.
 
-    def __init__(self, plant: MultibodyPlant) -> None:
-        super().__init__()
-        self._force = self.DeclareVectorInputPort("generalized_force", 6 * (plant.num_bodies() - 1))
-        self.DeclareAbstractOutputPort(
-            "spatial_forces",
-            lambda: AbstractValue.Make([ExternallyAppliedSpatialForce()]),
-            self._calc_forces,
-            {self._force.ticket()},
-        )
+        | port              | in, out | shape    | unit   | meaning                                |
+        |-------------------|---------|----------|--------|----------------------------------------|
+        | generalized_force | in      | (6*n,)   | N m, N | [t_W; f_W] at the origin of each body  |
+        | spatial_forces    | out     | abstract | N m, N | list of ExternallyAppliedSpatialForce; |
+        |                   |         |          |        | zeros only where they have derivatives |
+        """
 
-    def _calc_forces(self, context: Context, output: AbstractValue) -> None:
-        forces, acting = self._force.Eval(context).reshape(-1, 6), []
-        for body in np.flatnonzero(forces.any(axis=1)).tolist():
-            applied = ExternallyAppliedSpatialForce()  # at the body's origin
-            applied.body_index = BodyIndex(body - WORLD)
-            applied.F_Bq_W = SpatialForce(forces[body])
-            acting.append(applied)
-        output.set_value(acting)
+        def _construct(self, bodies: int, *, converter: SystemScalarConverter) -> None:
+            LeafSystem_[T].__init__(self, converter)
+            self._bodies = bodies
+            self._force = self.DeclareVectorInputPort("generalized_force", 6 * bodies)
+            self.DeclareAbstractOutputPort(
+                "spatial_forces",
+                lambda: AbstractValue.Make([Applied()]),
+                self._calc_forces,
+                {self._force.ticket()},
+            )
+
+        def _construct_copy(self, other: Any, *, converter: SystemScalarConverter) -> None:
+            Impl._construct(self, other._bodies, converter=converter)
+
+        def _calc_forces(self, context: Context, output: AbstractValue) -> None:
+            forces, acting = self._force.Eval(context).reshape(-1, 6), []
+            bodies = range(len(forces)) if differentiates else np.flatnonzero(forces.any(axis=1))
+            for body in map(int, bodies):
+                applied = Applied()
+                if differentiates:  # the default is no number, unlike the one for floats
+                    applied.p_BoBq_B = np.zeros(3)  # at the body's origin
+                applied.body_index = BodyIndex(body - WORLD)
+                applied.F_Bq_W = Wrench(forces[body])
+                acting.append(applied)
+            output.set_value(acting)
+
+    return Impl
 
 
 def checked_numbers(
@@ -183,6 +215,19 @@ def check_constants(source: str, key: str, constants: Mapping[str, Any]) -> None
         if not (isinstance(value, numbers.Real) and 0.0 <= float(value) < math.inf):
             problem = f"found {value!r:.60}, expected a number of 0 or more"
             raise InputError(source, f"{key}.{name}", problem)
+
+
+def check_parameters(source: str, system: LeafSystem, context: Context) -> None:
+    """Raises InputError unless a context is of this system, and the system has parameters. Its
+    message names `source`, the method."""
+    check_type(source, "context", context, Context)
+    try:
+        system.ValidateContext(context)
+    except RuntimeError as error:
+        problem = f"is of another system; see {type(system).__name__}.GetMyMutableContextFromRoot()"
+        raise InputError(source, "context", problem) from error
+    if not context.num_numeric_parameter_groups():
+        raise InputError(source, "context", "has no constants; add the system with parameters=True")
 
 
 def check_host(source: str, builder: DiagramBuilder, plant: MultibodyPlant, *, name: str) -> None:
@@ -237,6 +282,7 @@ def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> No
     plant must be finalized.
     """
     name, source = system.get_name(), system.GetOutputPort("generalized_force")
+    count = plant.num_bodies() - 1
     has_free_bodies = all(
         body.is_floating_base_body()
         and body.has_quaternion_dofs()
@@ -250,12 +296,12 @@ def Attach(builder: DiagramBuilder, plant: MultibodyPlant, system: System) -> No
     else:
         bodies = f"bodies_of_{plant.get_name()}"
         if not builder.HasSubsystemNamed(bodies):
-            states = builder.AddNamedSystem(bodies, BodyStates(plant))
+            states = builder.AddNamedSystem(bodies, BodyStates_[float](count))
             builder.Connect(plant.get_body_poses_output_port(), states.get_input_port(0))
             velocities = plant.get_body_spatial_velocities_output_port()
             builder.Connect(velocities, states.get_input_port(1))
         state = builder.GetSubsystemByName(bodies).get_output_port()
-        forces = builder.AddNamedSystem(f"forces_of_{name}", BodyForces(plant))
+        forces = builder.AddNamedSystem(f"forces_of_{name}", BodyForces_[float](count))
         builder.Connect(source, forces.get_input_port())
         source, port = forces.get_output_port(), plant.get_applied_spatial_force_input_port()
         adder = ExternallyAppliedSpatialForceMultiplexer(2)

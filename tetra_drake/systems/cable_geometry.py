@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from pydrake.autodiffutils import AutoDiffXd, ExtractValue
 from pydrake.common.value import AbstractValue
 from pydrake.geometry import (
     Cylinder,
     FrameId,
-    FramePoseVector,
+    FramePoseVector_,
     GeometryFrame,
     GeometryInstance,
     MakePhongIllustrationProperties,
     SceneGraph,
+    SourceId,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.framework import Context, LeafSystem_, SystemScalarConverter
+from pydrake.systems.scalar_conversion import TemplateSystem
 
 from tetra_drake.robot.structure import PASSIVE_COLOUR
 
@@ -27,51 +31,77 @@ SLENDERNESS = 100.0
 """Length of the shortest cable divided by the radius with which all cables are shown."""
 
 
-class CableGeometry(LeafSystem):
-    """Poses of the cylinders that show cables in a SceneGraph. The system has no state.
+@TemplateSystem.define("CableGeometry_", T_list=[float, AutoDiffXd])
+def CableGeometry_(T: type) -> type:
+    """Poses of the cylinders that show cables in a SceneGraph; a class for each type of scalars."""
 
-    | port          | shape       | unit | meaning                                      |
-    |---------------|-------------|------|----------------------------------------------|
-    | ends          | (6*pieces,) | m    | per piece: position of start, then of end    |
-    | geometry_pose |             | SI   | FramePoseVector of all cylinders             |
+    class Impl(LeafSystem_[T]):
+        """Poses of the cylinders that show cables in a SceneGraph. The system has no state.
 
-    A shape in a SceneGraph keeps its length. So each straight piece of a cable is shown by PIECES
-    cylinders, which slide along each other like the tubes of a telescope.
-    """
+        | port          | in, out | shape       | unit | meaning                                   |
+        |---------------|---------|-------------|------|-------------------------------------------|
+        | ends          | in      | (6*pieces,) | m    | per piece: position of start, then of end |
+        | geometry_pose | out     |             | SI   | FramePoseVector of all cylinders, without |
+        |               |         |             |      | derivatives                               |
 
-    def __init__(self, scene_graph: SceneGraph, name: str, *, lengths: Mapping[str, float]) -> None:
-        """Registers the cylinders in a scene, with a source called `name`. `lengths` has the length
-        (m) of each straight piece of a cable at the start, by its name."""
-        super().__init__()
-        self.source = scene_graph.RegisterSource(name)
-        """Identifier of the source of the cylinders in the scene."""
-        self._pieces: list[tuple[float, list[FrameId]]] = []
-        """Length (m) and frames of the cylinders of each cable."""
-        properties = MakePhongIllustrationProperties(PASSIVE_COLOUR)
-        radius = min(lengths.values()) / SLENDERNESS
-        for cable, length in lengths.items():
-            frames = []
-            for piece in (f"{cable} {i}" for i in range(PIECES)):
-                frame = scene_graph.RegisterFrame(self.source, GeometryFrame(piece))
-                shown = GeometryInstance(RigidTransform(), Cylinder(radius, SHARE * length), piece)
-                shown.set_illustration_properties(properties)
-                scene_graph.RegisterGeometry(self.source, frame, shown)
-                frames.append(frame)
-            self._pieces.append((SHARE * length, frames))
-        self._ends = self.DeclareVectorInputPort("ends", 6 * len(lengths))
-        self.DeclareAbstractOutputPort(
-            "geometry_pose",
-            lambda: AbstractValue.Make(FramePoseVector()),
-            self._calc_poses,
-            {self._ends.ticket()},
-        )
+        A shape in a SceneGraph keeps its length. So each straight piece of a cable is shown by
+        PIECES cylinders, which slide along each other like the tubes of a telescope.
+        """
 
-    def _calc_poses(self, context: Context, output: AbstractValue) -> None:
-        poses, ends = output.get_mutable_value(), self._ends.Eval(context).reshape(-1, 2, 3)
-        for (p_WA, p_WB), (length, frames) in zip(ends, self._pieces, strict=True):
-            distance = np.linalg.norm(p_WB - p_WA)
-            along = (p_WB - p_WA) / distance
-            R_WC = RotationMatrix.MakeFromOneVector(along, 2)
-            places = np.linspace(length / 2, distance - length / 2, PIECES)
-            for frame, place in zip(frames, places, strict=True):
-                poses.set_value(frame, RigidTransform(R_WC, p_WA + place * along))
+        def _construct(
+            self, cylinders: Sequence[Cylinders], *, converter: SystemScalarConverter
+        ) -> None:
+            """`cylinders` are of each straight piece, from RegisterCylinders()."""
+            LeafSystem_[T].__init__(self, converter)
+            self._cylinders = cylinders
+            self._ends = self.DeclareVectorInputPort("ends", 6 * len(cylinders))
+            self.DeclareAbstractOutputPort(
+                "geometry_pose",
+                lambda: AbstractValue.Make(FramePoseVector_[T]()),
+                self._calc_poses,
+                {self._ends.ticket()},
+            )
+
+        def _construct_copy(self, other: Any, *, converter: SystemScalarConverter) -> None:
+            Impl._construct(self, other._cylinders, converter=converter)
+
+        def _calc_poses(self, context: Context, output: AbstractValue) -> None:
+            poses, ends = output.get_mutable_value(), self._ends.Eval(context)
+            ends = (ends if T is float else ExtractValue(ends)).reshape(-1, 2, 3)
+            for (p_WA, p_WB), (length, frames) in zip(ends, self._cylinders, strict=True):
+                distance = np.linalg.norm(p_WB - p_WA)
+                along = (p_WB - p_WA) / distance
+                R_WC = RotationMatrix.MakeFromOneVector(along, 2)
+                places = np.linspace(length / 2, distance - length / 2, PIECES)
+                for frame, place in zip(frames, places, strict=True):
+                    X_WC = RigidTransform(R_WC, p_WA + place * along)
+                    poses.set_value(frame, X_WC if T is float else X_WC.cast[T]())
+
+    return Impl
+
+
+class Cylinders(NamedTuple):
+    """Cylinders that show a straight piece of a cable."""
+
+    length: float
+    """Length (m) of each cylinder."""
+    frames: list[FrameId]
+
+
+def RegisterCylinders(
+    scene_graph: SceneGraph, source: SourceId, *, lengths: Mapping[str, float]
+) -> list[Cylinders]:
+    """Registers the cylinders that show the straight pieces of cables in a scene. `lengths` has the
+    length (m) of each piece at the start, by its name."""
+    properties = MakePhongIllustrationProperties(PASSIVE_COLOUR)
+    radius, registered = min(lengths.values()) / SLENDERNESS, []
+    for cable, length in lengths.items():
+        frames = []
+        for piece in (f"{cable} {i}" for i in range(PIECES)):
+            frame = scene_graph.RegisterFrame(source, GeometryFrame(piece))
+            shown = GeometryInstance(RigidTransform(), Cylinder(radius, SHARE * length), piece)
+            shown.set_illustration_properties(properties)
+            scene_graph.RegisterGeometry(source, frame, shown)
+            frames.append(frame)
+        registered.append(Cylinders(SHARE * length, frames))
+    return registered

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
-from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder
 from pydrake.systems.primitives import Integrator
 
 from tetra_drake.errors import InputError, SimulationFailure, check_type
@@ -32,16 +32,18 @@ from tetra_drake.systems.attachment import (
     check_constants,
     check_frame,
     check_host,
+    check_parameters,
     check_part,
     checked_numbers,
 )
-from tetra_drake.systems.cable_geometry import CableGeometry
+from tetra_drake.systems.cable_geometry import CableGeometry_, RegisterCylinders
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 _LEAST_LENGTH = 1e-9
 """Least length (m) of a cable at the start. The direction of a shorter one is not known."""
 
 
-class CableNetwork(LeafSystem):
+class CableNetwork(ConvertibleSystem):
     """Cables between bodies (thesis Eq. 6), also over rings. The system has no state.
 
     | port              | shape          | unit   | meaning                                  |
@@ -67,14 +69,25 @@ class CableNetwork(LeafSystem):
     `lengths` and `rates` depend on the state alone, so a controller of lengths makes no algebraic
     loop. Where the model is `slack`, a cable goes slack instead of pushing. A cable whose ends meet
     has no direction: the outputs raise SimulationFailure.
+
+    With `parameters`, the constants of the cables are parameters of the context (4*cables,): each
+    field of laws.cable.CableLaw for all cables, one field after the other; see SetLaw().
     """
 
-    def __init__(self, model: Model, *, names: Sequence[str], signals: int) -> None:
+    def __init__(
+        self, model: Model, *, names: Sequence[str], signals: int, parameters: bool = False
+    ) -> None:
         """Makes the system for the cables of `model`, which has their constants, their actuators
         and the bodies. `names` are the cables' names, for errors. `signals` is the number m of
         signals, not the signals themselves."""
         super().__init__()
         self._names = names
+        self._constants = np.concatenate(model.cables.law)  # a copy, which a context may replace
+        law = _law_of(self._constants)
+        model = model._replace(cables=model.cables._replace(law=law))
+        self._has_parameters = parameters
+        if parameters:
+            self.DeclareNumericParameter(BasicVector(self._constants))
         bodies, count = model.bodies.mass.size, model.cables.signal.size
         # The kernel writes to these arrays at every call.
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
@@ -86,7 +99,7 @@ class CableNetwork(LeafSystem):
         )
         self._state = self.DeclareVectorInputPort("state", state.size)
         motion = {self._state.ticket()}
-        inputs = set(motion)
+        inputs = {*motion, self.all_parameters_ticket()}
         self._signals = self._drives = None
         if signals:
             self._signals = self.DeclareVectorInputPort("signals", signals)
@@ -106,6 +119,25 @@ class CableNetwork(LeafSystem):
         size = 6 * len(self._ends)
         DeclareOutput(self, "ends", size, CableNetwork._ends_of_pieces, motion)
 
+    def GetLaw(self, context: Context) -> cable.CableLaw:
+        """Constants of the cables in a context of this system: a CableLaw of arrays (cables,), in
+        the order of the cables. Raises InputError if they are no parameters."""
+        check_parameters("GetLaw", self, context)
+        return _law_of(context.get_numeric_parameter(0).CopyToVector())
+
+    def SetLaw(self, context: Context, law: cable.CableLaw) -> None:
+        """Replaces the constants of the cables in a context of this system.
+
+        The states of actuators stay. Each field of `law` is an array (cables,), or one number for
+        all cables. Raises InputError if the constants are no parameters, or one of them is negative
+        or not finite.
+        """
+        check_parameters("SetLaw", self, context)
+        check_type("SetLaw", "law", law, cable.CableLaw)
+        given, count = law._asdict().items(), len(self._names)
+        rows = [checked_numbers("SetLaw", key, row, count=count, least=0.0) for key, row in given]
+        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
+
     def _table(
         self, context: Context, force: np.ndarray | None = None, *, moves_only: bool = False
     ) -> np.ndarray:
@@ -116,6 +148,8 @@ class CableNetwork(LeafSystem):
         valid. Raises SimulationFailure if a number of a cable is not finite although the state is.
         """
         signals, force = self._no_signals, self._force if force is None else force
+        if self._has_parameters:
+            self._constants[:] = context.get_numeric_parameter(0).value()
         if self._drives is not None and not moves_only:
             self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
         if self._signals is not None and not moves_only:
@@ -138,6 +172,13 @@ class CableNetwork(LeafSystem):
     def _drive_rates(self, context: Context) -> np.ndarray:
         self._table(context)
         return self._forces.drives[:, actuator.RATE]
+
+
+def _law_of(constants: np.ndarray) -> cable.CableLaw:
+    """The parameters of a CableNetwork as a CableLaw of arrays (cables,), which share their
+    memory."""
+    rows: Any = np.split(constants, len(cable.CableLaw._fields))
+    return cable.CableLaw(*rows)
 
 
 @dataclass(frozen=True)
@@ -169,6 +210,7 @@ def AddCables(
     drives: npt.ArrayLike | None = None,
     slack: bool = True,
     scene_graph: SceneGraph | None = None,
+    parameters: bool = False,
     name: str = "cables",
 ) -> CableNetwork:
     """Adds cables between bodies of a plant, or from a body to the world.
@@ -188,6 +230,8 @@ def AddCables(
             that fit signals of 0 at the plant's default positions.
         slack: False if cables also push.
         scene_graph: where to show the cables.
+        parameters: True if the constants of the cables are parameters of the context, which
+            CableNetwork.SetLaw() replaces. The forces then take a few microseconds more.
         name: name of the system.
 
     Raises:
@@ -202,6 +246,7 @@ def AddCables(
     check_type("AddCables", "actuated", actuated, Mapping)
     check_type("AddCables", "actuation", actuation, ActuatorKind)
     check_type("AddCables", "slack", slack, bool)
+    check_type("AddCables", "parameters", parameters, bool)
     pieces = _default_lengths(plant, cables)
     lengths = np.array([sum(of_pieces) for of_pieces in pieces])
     nodes = Nodes.of(plant, (frame for one in cables for frame in one.path))
@@ -227,7 +272,7 @@ def AddCables(
         "slack": slack,
     }
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, **laws)
-    network = CableNetwork(model, names=names, signals=len(actuated))
+    network = CableNetwork(model, names=names, signals=len(actuated), parameters=parameters)
     builder.AddNamedSystem(name, network)
     Attach(builder, plant, network)
     if len(starts):
@@ -241,10 +286,11 @@ def AddCables(
             for one, each in named
             for number, length in enumerate(each, 1)
         }
-        shown = CableGeometry(scene_graph, name, lengths=of_pieces)
-        builder.AddNamedSystem(f"{name}_geometry", shown)
+        source = scene_graph.RegisterSource(name)
+        cylinders = RegisterCylinders(scene_graph, source, lengths=of_pieces)
+        shown = builder.AddNamedSystem(f"{name}_geometry", CableGeometry_[float](cylinders))
         builder.Connect(network.GetOutputPort("ends"), shown.get_input_port())
-        poses = scene_graph.get_source_pose_port(shown.source)
+        poses = scene_graph.get_source_pose_port(source)
         builder.Connect(shown.get_output_port(), poses)
     return network
 

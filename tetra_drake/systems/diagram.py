@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import NoneType
+from typing import get_args
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
+from pydrake.geometry import Meshcat, SceneGraph
+from pydrake.lcm import DrakeLcmParams
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
-from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
+from pydrake.systems.lcm import ApplyLcmBusConfig
+from pydrake.systems.primitives import ConstantVectorSource, PassThrough, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import AnyGait, Gait, network_gait
 from tetra_drake.robot.network import SteeringSignal, initial_neurons
@@ -35,13 +39,18 @@ from tetra_drake.systems import (
 
 def MakeTensegrityDiagram(
     robot: Robot,
-    gait: AnyGait | None,
+    gait: AnyGait | None = None,
     *,
     steering: SteeringSignal | None = None,
     controller: System | None = None,
+    scene_graph: bool = False,
     meshcat: Meshcat | None = None,
+    parameters: bool = False,
 ) -> Diagram:
     """Diagram of a robot that walks with a gait. Its default context is at the start of the walk.
+
+    The robot may also be driven by a controller, or by signals from outside: without `gait` and
+    `controller`, the diagram has an input port `signals`.
 
         steering ──→ cpg ──→ start_up ─┬─→ cables ──┬──→ forces ──→ plant ──┬──→ state
                       ↑                │      ↑     │                       │
@@ -57,42 +66,61 @@ def MakeTensegrityDiagram(
 
     Subsystems:
 
-    - cpg: if the scenario has `cpg.signals: live`, the network, integrated with the robot (a live
-      network); otherwise its signals, computed beforehand. A robot without oscillators has no cpg.
+    - cpg: only with a gait. With `cpg.signals: live` in the scenario, it is the network, integrated
+      with the robot (a live network); otherwise its signals, computed beforehand. A robot without
+      oscillators has no cpg.
     - steering: only for a live network
     - feedback: only if the scenario's `cpg.feedback` is not empty
     - cables_actuators: only if the kind of actuators has states, as winches have
     - state_forces: only if struts touch, or nodes of bodies are held, joined or loaded
     - controller: in place of cpg and start_up, a system with the output port `signals`, and any
-      others. Its input ports may be `state` and any output port of cables and ground, such as
-      `lengths`, `rates`, `tensions` and `normal_forces`: ports of the same name are connected. See
-      SampledController and robot.command.controlled_robot().
+      others. Its input ports `state` and those named like an output port of cables or ground, such
+      as `lengths`, `rates`, `tensions` and `normal_forces`, are connected to these. All others are
+      input ports of the diagram. See SampledController and robot.command.controlled_robot().
+    - scene_graph: with `scene_graph` or `meshcat`; it has struts, spheres and cables. During a
+      simulation it is shown in `meshcat`, where bodies can be dragged with the mouse while Ctrl is
+      held, if Drake has MeshcatMouseSpring; pages and films are made from trajectories.
 
-    `steering`, a function from the time (s) to the turn, replaces the gait's turn, -1 to 1. Input
-    port of the diagram: turn, only of a live network. Output ports, with their subsystems in
-    parentheses: state (plant), signals (start_up or controller), drives (cables_actuators),
-    tensions and lengths (cables), normal_forces, friction_forces and modes (ground). The classes
-    Steering, CableNetwork and GroundContact have their shapes and units. With `meshcat`, a
-    SceneGraph shows struts, spheres and cables there during a simulation; pages and films are made
-    from trajectories.
+    `steering`, a function from the time (s) to the turn, replaces the gait's turn, -1 to 1.
 
-    Raises InputError if there is neither a gait of a network nor a controller, or a port of the
-    controller has another name or size.
+    Input ports of the diagram: turn of a live network; signals (m,) in N without gait and
+    controller, one for each of the structure's m `oscillators`; ports of the controller. Output
+    ports, with their subsystems in parentheses: state (plant), signals (start_up, controller or
+    signals), drives (cables_actuators), tensions and lengths (cables), normal_forces,
+    friction_forces and modes (ground), query_object (scene_graph). The classes Steering,
+    CableNetwork and GroundContact have their shapes and units.
+
+    With `parameters`, one diagram serves many robots that differ in constants of cables and ground,
+    which are parameters of the context then; see CableNetwork.SetLaw() and
+    GroundContact.SetGround():
+
+    >>> cables, context = diagram.GetSubsystemByName("cables"), diagram.CreateDefaultContext()
+    >>> own = cables.GetMyMutableContextFromRoot(context)
+    >>> law = cables.GetLaw(own)
+    >>> cables.SetLaw(own, law._replace(stiffness=1.1 * law.stiffness))
+
+    Raises InputError if a gait is not of this robot, or a port of the controller has another size.
     """
+    source = "MakeTensegrityDiagram"
+    check_type(source, "robot", robot, Robot)
+    check_type(source, "gait", gait, *get_args(AnyGait), NoneType)
+    check_type(source, "controller", controller, System, NoneType)
+    check_type(source, "scene_graph", scene_graph, bool)
+    check_type(source, "meshcat", meshcat, Meshcat, NoneType)
     scenario, structure = robot.scenario, robot.structure
     gait = None if gait is None else network_gait(gait)
     builder = DiagramBuilder()
 
-    plant, scene_graph = _AddPlant(builder, meshcat)
+    plant, scene = _AddPlant(builder, scene_graph=scene_graph or meshcat is not None)
     nodes = AddNodes(plant, structure, AddBodies(plant, structure))
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
+    if scene is not None and meshcat is not None:
+        _ShowInMeshcat(builder, plant, scene, meshcat)
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    if gait is not None and controller is None:
+    if controller is None:
         signals = _AddSignals(builder, robot, gait, steering)
-    elif controller is None:
-        raise InputError("MakeTensegrityDiagram", "gait", "is needed, or a controller")
     cables = AddCables(
         builder,
         plant,
@@ -104,7 +132,8 @@ def MakeTensegrityDiagram(
         actuation=scenario.actuation,
         drives=robot.starting_drives(),
         slack=structure.slack,
-        scene_graph=scene_graph,
+        scene_graph=scene,
+        parameters=parameters,
     )
     ground = AddGroundContact(
         builder,
@@ -113,6 +142,7 @@ def MakeTensegrityDiagram(
         ground=robot.ground,
         radius=robot.ground.radius.tolist(),
         witness=isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness",
+        parameters=parameters,
     )
     model = robot.model
     held = model.anchors.nodes.size or model.joints.node_a.size or model.loads.nodes.size
@@ -128,7 +158,7 @@ def MakeTensegrityDiagram(
     if builder.HasSubsystemNamed("cables_actuators"):
         actuators = builder.GetSubsystemByName("cables_actuators")
         builder.ExportOutput(actuators.get_output_port(), "drives")
-    if controller is None and structure.signals and scenario.cpg.feedback:
+    if builder.HasSubsystemNamed("cpg") and scenario.cpg.feedback:
         assert gait is not None
         feedback = Feedback(robot, gains=[gain for _, gain in gait.gains])
         _AddFeedback(builder, feedback, state, signals, ground)
@@ -139,21 +169,40 @@ def MakeTensegrityDiagram(
         builder.ExportOutput(cables.GetOutputPort(name), name)
     for name in ("normal_forces", "friction_forces", "modes"):
         builder.ExportOutput(ground.GetOutputPort(name), name)
+    if scene is not None:
+        builder.ExportOutput(scene.get_query_output_port(), "query_object")
     diagram = builder.Build()
     diagram.set_name("tensegrity_robot")
     return diagram
 
 
 def _AddPlant(
-    builder: DiagramBuilder, meshcat: Meshcat | None
+    builder: DiagramBuilder, *, scene_graph: bool
 ) -> tuple[MultibodyPlant, SceneGraph | None]:
-    """Adds an empty, continuous `plant`. With `meshcat`, also adds a SceneGraph that is shown
-    there; otherwise None is returned in its place."""
-    if meshcat is None:
+    """Adds an empty, continuous `plant`. With `scene_graph`, also adds a SceneGraph; otherwise None
+    is returned in its place."""
+    if not scene_graph:
         return builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0)), None
-    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
-    return plant, scene_graph
+    return AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+
+
+def _ShowInMeshcat(
+    builder: DiagramBuilder, plant: MultibodyPlant, scene: SceneGraph, meshcat: Meshcat
+) -> None:
+    """Shows a finalized plant in Meshcat, and lets users drag its bodies where Drake can do so."""
+    from pydrake.visualization import (  # loads matplotlib
+        ApplyVisualizationConfig,
+        VisualizationConfig,
+    )
+
+    config = VisualizationConfig(
+        publish_proximity=False, publish_contacts=False, publish_inertia=False
+    )
+    # Drake would also send all poses to viewers on the network.
+    buses = ApplyLcmBusConfig({config.lcm_bus: DrakeLcmParams(lcm_url="memq://null")}, builder)
+    ApplyVisualizationConfig(
+        config, builder, lcm_buses=buses, plant=plant, scene_graph=scene, meshcat=meshcat
+    )
 
 
 def cables_of(structure: Structure, nodes: Sequence[Frame]) -> list[Cable]:
@@ -203,8 +252,8 @@ def _AddController(
     size: int,
 ) -> OutputPort:
     """Adds `controller` to the diagram. Its input ports are connected to `state` and to the ports
-    of `sources` with the same names. Returns its output port `signals`, which must have `size`
-    numbers. Raises InputError for a port of another name or size."""
+    of `sources` with the same names; all others are exported. Returns its output port `signals`,
+    which must have `size` numbers. Raises InputError for a port of another size."""
     if not controller.HasOutputPort("signals"):
         ports = map(controller.get_output_port, range(controller.num_output_ports()))
         found = ", ".join(port.get_name() for port in ports) or "no output ports"
@@ -220,8 +269,8 @@ def _AddController(
         if name == "state":
             given = [state]
         if not given:
-            problem = f"found the input port '{name}', expected a port of cables or ground"
-            raise InputError("MakeTensegrityDiagram", "controller", problem)
+            builder.ExportInput(port, name)
+            continue
         _check_size(port, given[0].size())
         builder.Connect(given[0], port)
     return signals
@@ -234,10 +283,11 @@ def _check_size(port: InputPort | OutputPort, size: int) -> None:
 
 
 def _AddSignals(
-    builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
+    builder: DiagramBuilder, robot: Robot, gait: Gait | None, steering: SteeringSignal | None
 ) -> OutputPort:
     """Adds the systems `cpg` and `start_up` to the diagram. Returns the output port of `start_up`,
-    with the signals (m,) of the cables.
+    with the signals (m,) of the cables. Without a gait, there is a system `signals` in their place,
+    which passes on the diagram's input port of this name.
 
     `cpg` is a live network, integrated with the robot, with a system `steering`; or it is a source
     of signals that were computed beforehand. `steering`, a function from the time (s) to the turn,
@@ -247,6 +297,10 @@ def _AddSignals(
     if not size:
         none = builder.AddNamedSystem("start_up", ConstantVectorSource(np.zeros(0)))
         return none.get_output_port()
+    if gait is None:
+        passed = builder.AddNamedSystem("signals", PassThrough(size))
+        builder.ExportInput(passed.get_input_port(), "signals")
+        return passed.get_output_port()
     if cpg.signals == "live":
         robot.turns(gait, steering)  # raises InputError for a wrong turn
         network = MatsuokaCpg(

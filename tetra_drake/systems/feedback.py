@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
@@ -12,9 +12,10 @@ from tetra_drake.laws.contact import MODE_COLUMNS
 from tetra_drake.laws.feedback import compute_feedback
 from tetra_drake.laws.forces import Forces
 from tetra_drake.robot.robot import Robot
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class Feedback(LeafSystem):
+class Feedback(ConvertibleSystem):
     """Feedback from a robot's motion and contacts to its oscillators (see laws.feedback).
 
     The system has no state.

@@ -14,7 +14,6 @@ from pydrake.systems.framework import (
     DiagramBuilder,
     DiscreteValues,
     EventStatus,
-    LeafSystem,
     WitnessFunction,
     WitnessFunctionDirection,
 )
@@ -23,7 +22,7 @@ from tetra_drake.errors import InputError, check_type
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import contact
-from tetra_drake.laws.forces import Forces, compute_ground_forces
+from tetra_drake.laws.forces import Forces, Parts, compute_ground_forces
 from tetra_drake.laws.mode_change import mode_margin, modes_after_step, next_mode_change
 from tetra_drake.laws.model import Model
 from tetra_drake.systems.attachment import (
@@ -33,11 +32,13 @@ from tetra_drake.systems.attachment import (
     check_constants,
     check_frame,
     check_host,
+    check_parameters,
     checked_numbers,
 )
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class GroundContact(LeafSystem):
+class GroundContact(ConvertibleSystem):
     """Normal force (thesis Eq. 1) and friction at m contact nodes, on any terrain.
 
     | port              | in/out | shape   | unit   | meaning                                      |
@@ -63,10 +64,21 @@ class GroundContact(LeafSystem):
     `model` has the bodies, the ground and its contact nodes. With `witness`, a step also ends where
     a mode changes, to within Drake's isolation window: 0.01 s times the accuracy of
     Context.SetAccuracy().
+
+    With `parameters`, the constants of the ground are parameters of the context: the fields of
+    laws.contact.NormalForce, then the constants of the law of friction; see SetGround().
     """
 
-    def __init__(self, model: Model, *, witness: bool = False) -> None:
+    def __init__(self, model: Model, *, witness: bool = False, parameters: bool = False) -> None:
         super().__init__()
+        ground, normals = model.ground, model.ground.normal.size
+        self._constants = np.concatenate([ground.normal, ground.friction.constants])  # a copy
+        friction = ground.friction._replace(constants=self._constants[normals:])
+        self._ground = ground._replace(normal=self._constants[:normals], friction=friction)
+        model = model._replace(ground=self._ground)
+        self._has_parameters = parameters
+        if parameters:
+            self.DeclareNumericParameter(BasicVector(self._constants))
         bodies, count = model.bodies.mass.size, model.ground.contacts.size
         self._is_round = model.ground.is_round
         # The kernels write to these arrays at every call.
@@ -91,11 +103,11 @@ class GroundContact(LeafSystem):
             "mode margin",
             falls,
             lambda context: mode_margin(
-                this._parts, this._state.Eval(context), this._modes(context)
+                this._parts_in(context), this._state.Eval(context), this._modes(context)
             ),
         )
         self._witnesses = [margin] if witness else []
-        sources = {self._state.ticket(), self.xd_ticket()}
+        sources = {self._state.ticket(), self.xd_ticket(), self.all_parameters_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
         table, rows, discrete = GroundContact._table, GroundContact._modes, {self.xd_ticket()}
         n, point = contact.NORMAL, contact.STICK_POINT
@@ -104,6 +116,31 @@ class GroundContact(LeafSystem):
         DeclareOutput(self, "modes", 3 * count, lambda s, c: rows(s, c)[:, :point], discrete)
         DeclareOutput(self, "mode_table", modes.size, rows, discrete)
         DeclareOutput(self, "ground_forces", 3 * count, table, sources)
+
+    def SetGround(self, context: Context, ground: contact.Ground) -> None:
+        """Copies the constants of normal force and friction of a ground, such as a robot's ground
+        or one of robot.ground.make_surface(), to a context of this system. The ground's contact
+        nodes are ignored.
+
+        Raises InputError if the constants are no parameters, one of them is negative or not finite,
+        or the ground has another law of friction or another terrain.
+        """
+        check_parameters("SetGround", self, context)
+        check_type("SetGround", "ground", ground, contact.Ground)
+        if ground.friction.kind != self._ground.friction.kind:
+            raise InputError("SetGround", "ground", "found another law of friction")
+        # The last number of a grid is the largest radius of a foot.
+        theirs, ours = ((*one.grid[:-1], *one.heights) for one in (ground, self._ground))
+        if theirs != ours:
+            raise InputError("SetGround", "ground", "found another terrain")
+        rows = [
+            checked_numbers("SetGround", "ground", given, count=own.size, least=0.0)
+            for given, own in (
+                (ground.normal, self._ground.normal),
+                (ground.friction.constants, self._ground.friction.constants),
+            )
+        ]
+        context.get_mutable_numeric_parameter(0).SetFromVector(np.concatenate(rows))
 
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
@@ -117,11 +154,17 @@ class GroundContact(LeafSystem):
         assumes that the acceleration of each node is constant.
         """
         state, modes = self._state.Eval(context), self._modes(context).copy()
-        return self._next_change(self._parts, state, acceleration, modes, horizon)
+        return self._next_change(self._parts_in(context), state, acceleration, modes, horizon)
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """Witness functions of the system: one with `witness`, otherwise none."""
         return self._witnesses
+
+    def _parts_in(self, context: Context) -> Parts:
+        """Model and tables for the kernels, with the constants in a context."""
+        if self._has_parameters:
+            self._constants[:] = context.get_numeric_parameter(0).value()
+        return self._parts
 
     def _modes(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, contact.MODE_COLUMNS)
@@ -134,7 +177,7 @@ class GroundContact(LeafSystem):
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         modes = values.get_mutable_value().reshape(-1, contact.MODE_COLUMNS)
-        changed = self._update_modes(self._parts, self._state.Eval(context), modes)
+        changed = self._update_modes(self._parts_in(context), self._state.Eval(context), modes)
         if changed or (self._is_round and modes[:, contact.CONTACT].any()):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
@@ -143,7 +186,8 @@ class GroundContact(LeafSystem):
         """The forces of the port `ground_forces` as a table (contacts, 3) in N. Writes the
         generalized force to `force` (6*n,), if given."""
         state, modes = self._state.Eval(context), self._modes(context)
-        self._compute_forces(self._parts, state, modes, self._force if force is None else force)
+        written = self._force if force is None else force
+        self._compute_forces(self._parts_in(context), state, modes, written)
         return self._forces.ground_forces
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
@@ -158,6 +202,7 @@ def AddGroundContact(
     ground: contact.Ground,
     radius: float | Sequence[float] = 0.0,
     witness: bool = False,
+    parameters: bool = False,
     name: str = "ground",
 ) -> GroundContact:
     """Adds a ground under spheres at the origins of frames of a plant's bodies.
@@ -165,9 +210,9 @@ def AddGroundContact(
     The plant must be finalized, may have any joints, and should be continuous. `radius` (m) is one
     radius for all spheres, or a radius for each. If it is 0, the ground touches the origins
     themselves. Make `ground` with robot.ground.make_surface(), or use a robot's ground: its contact
-    nodes and their radii are then replaced by `frames` and `radius`. For `witness` see
-    GroundContact. The ports have the contact nodes in the order of `frames`. This example puts a
-    scenario's ground under the tip of a link:
+    nodes and their radii are then replaced by `frames` and `radius`. For `witness` and `parameters`
+    see GroundContact. The ports have the contact nodes in the order of `frames`. This example puts
+    a scenario's ground under the tip of a link:
 
     >>> given = load_scenario("coulomb")
     >>> surface = make_surface(given.ground, given.friction, given.terrain)
@@ -181,6 +226,7 @@ def AddGroundContact(
     check_type("AddGroundContact", "frames", frames, Sequence)
     check_type("AddGroundContact", "ground", ground, contact.Ground)
     check_type("AddGroundContact", "witness", witness, bool)
+    check_type("AddGroundContact", "parameters", parameters, bool)
     normal = contact.NormalForce(*ground.normal.tolist())._asdict()
     check_constants("AddGroundContact", "ground", normal)
     for place, frame in enumerate(frames):
@@ -196,6 +242,7 @@ def AddGroundContact(
     carriers = nodes.carriers[contacts]
     placed = ground.under(contacts, carriers=carriers, radius=radii, nodes=len(nodes.p_BN))
     model = Model.of_nodes(nodes.p_BN, nodes.first_node, ground=placed)
-    system = builder.AddNamedSystem(name, GroundContact(model, witness=witness))
+    contacts_of = GroundContact(model, witness=witness, parameters=parameters)
+    system = builder.AddNamedSystem(name, contacts_of)
     Attach(builder, plant, system)
     return system

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, ContinuousState
 
 from tetra_drake.laws import oscillator
 from tetra_drake.systems.attachment import DeclareOutput
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class MatsuokaCpg(LeafSystem):
+class MatsuokaCpg(ConvertibleSystem):
     """Network of n Matsuoka oscillators (thesis Eq. 7-9).
 
     | port     | in, out | shape | unit | meaning                                               |

@@ -6,19 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
 from tetra_drake.laws.cable import CABLE_FORCE_COLUMNS
 from tetra_drake.laws.contact import GROUND_FORCE_COLUMNS
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 from tetra_drake.systems.attachment import DeclareOutput
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 Law = Callable[[float, Readings], npt.ArrayLike]
 """Function from the time (s) and the readings of a robot to its signals (m,) in N."""
 
 
-class HeldSignals(LeafSystem):
+class HeldSignals(ConvertibleSystem):
     """Source of a robot's signals, which holds them until Hold() sets new ones.
 
     | port    | in, out | shape | unit | meaning                                            |

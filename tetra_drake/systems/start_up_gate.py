@@ -10,9 +10,10 @@ from pydrake.systems.framework import (
     DiagramBuilder,
     DiscreteValues,
     InputPortIndex,
-    LeafSystem,
 )
 from pydrake.systems.primitives import ConstantVectorSource, PortSwitch
+
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 _LONGER_THAN_ANY_SIMULATION = 1e9  # s; the period of an event that happens once
 
@@ -45,7 +46,7 @@ class StartUpGate(Diagram):
         builder.BuildInto(self)
 
 
-class _Timer(LeafSystem):
+class _Timer(ConvertibleSystem):
     """Selector of the input port that a PortSwitch passes on. The discrete state (1,) is 0 before
     the time `start_up` (s), then 1.
 

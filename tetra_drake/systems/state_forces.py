@@ -4,15 +4,16 @@ loads."""
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from tetra_drake.kernels.compiling import machine_code
 from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws.forces import Forces, compute_state_forces, compute_strut_forces
 from tetra_drake.robot.robot import Robot
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class StateForces(LeafSystem):
+class StateForces(ConvertibleSystem):
     """Forces of struts that touch, anchors, joints and constant loads. The system has no state.
 
     | port              | in, out | shape   | unit   | meaning                                 |

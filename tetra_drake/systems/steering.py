@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from tetra_drake.robot.network import checked_turn
+from tetra_drake.systems.scalar_conversion import ConvertibleSystem
 
 
-class Steering(LeafSystem):
+class Steering(ConvertibleSystem):
     """Tonic input of the oscillators as a function of the turn. The system has no state.
 
     | port  | in, out | shape | unit | meaning                                                |

@@ -1,0 +1,472 @@
+"""TensegrityBench: tasks for tensegrity robots, and methods that solve them at equal budgets.
+
+    python runs/bench.py [ENTRY.py ...]
+
+Runs entries, by default those in bench/entries/. An entry is a file with a function
+`solve(problem, seed)`, see Problem. Each entry solves each task with each seed. records.jsonl in
+the folder bench/ gets a line for each solution; solutions that have one are skipped, so an
+interrupted script continues. Then the script writes the page README.md from the records.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import importlib.util
+import json
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from tetra_drake.engines.planner import Planner
+from tetra_drake.engines.queue import SimulationQueue
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.evolution.evaluation import GaitEvaluation
+from tetra_drake.figures.style import save_figure
+from tetra_drake.files import write_whole
+from tetra_drake.formatting import TextTable, fixed
+from tetra_drake.interrupts import heeding_interrupts
+from tetra_drake.machine import available_cores
+from tetra_drake.optimizers import optimizer_of
+from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Task as Candidate
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizer_kinds import OptimizerKind
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.study.statistics import (
+    interquartile_mean,
+    interval,
+    interval_of_resamples,
+    resampled,
+)
+
+HERE = Path(__file__).parent / "bench"
+ENTRIES, RECORDS, PAGE_NAME, FIGURE = HERE / "entries", "records.jsonl", "README.md", "scores"
+SEEDS, EPISODES = 10, 500
+"""Number of solutions of each entry to each task, and the budget of one in episodes."""
+DECIMALS = 6
+"""Decimals of the parameters of solutions, and of scores, in the records."""
+LEAST_SPEED = 0.02
+"""Speed (body lengths/s) below which a gait does not count as efficient."""
+
+Solution: TypeAlias = Vector | Planner | Callable[..., npt.ArrayLike]
+"""Parameters of a gait or policy, or a controller as simulate(controller=...) takes it."""
+Record: TypeAlias = dict[str, Any]
+"""Record of a solution: task, entry, seed, score, seconds, and parameters if any. The best one of a
+task and entry also has the score on the second engine."""
+
+
+def relative_speed(result: SimulationResult) -> float:
+    """Speed of the centre along x in body lengths per second."""
+    return result.metrics.relative_speed
+
+
+def turning_rate(result: SimulationResult) -> float:
+    """Mean rate of the heading in degrees per second, left positive."""
+    duration = result.scenario.simulation.duration
+    return math.degrees(result.metrics.heading_change) / duration
+
+
+def efficiency(result: SimulationResult) -> float:
+    """Inverse of the cost of transport; 0 for robots slower than LEAST_SPEED."""
+    metrics = result.metrics
+    return 1.0 / metrics.cost_of_transport if metrics.relative_speed >= LEAST_SPEED else 0.0
+
+
+MUJOCO = {"engine": "!Mujoco", "friction.stiffness": "0 N/m"}
+"""Changes for a second engine: MuJoCo, which has no bristles."""
+DIAGRAM = {"engine": "!Drake"}
+"""Changes for a second engine: Drake's, for terrains that MuJoCo does not have here."""
+PAYLOAD = "25 g"
+"""Payload of each tetrahedron, which has 20 g itself."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task: a scenario, and the score of a motion on it."""
+
+    name: str
+    about: str
+    base: str
+    """Name of a shipped scenario."""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    score: Callable[[SimulationResult], float] = relative_speed
+    unit: str = "body lengths/s"
+    second: Mapping[str, Any] = field(default_factory=lambda: MUJOCO)
+    """Changes of the scenario for the second engine."""
+
+    @functools.cached_property
+    def scenario(self) -> Scenario:
+        """Scenario of the task, on the compiled engine."""
+        common = {"simulation.control_period": "100 ms", "name": self.name}
+        return load_scenario(self.base).with_changes({**common, **self.changes})
+
+    def scored(self, solution: Solution, *, changes: Mapping[str, Any] | None = None) -> float:
+        """Score of a solution on the task's scenario, with `changes`; 0 if the simulation fails."""
+        scenario = self.scenario.with_changes(changes or {})
+        try:
+            if callable(solution):
+                return self.score(simulate(scenario, controller=solution))
+            gait = ParameterSpace.of(scenario).gait(np.asarray(solution), name=self.name)
+            return self.score(simulate(scenario, gait))
+        except SimulationFailure:
+            return 0.0
+
+
+TASKS = (
+    Task("walk", "the thesis's robot walks", "coulomb"),
+    Task(
+        "roll",
+        "a six-bar rover rolls by a policy",
+        "rolling",
+        {"disturbances": None, "simulation.steady_from": "2 s"},
+    ),
+    Task("climb", "up 10 degrees", "incline", {"terrain": "!Incline {slope: 10 deg}"}),
+    Task("rough", "over rough ground", "rough", second=DIAGRAM),
+    Task(
+        "turn",
+        "a robot with left and right oscillators turns to the left",
+        "turning",
+        {"simulation.duration": "15 s"},
+        turning_rate,
+        "deg/s",
+    ),
+    Task(
+        "payload",
+        f"{PAYLOAD} on each tetrahedron of 20 g",
+        "coulomb",
+        {"robot.payload": [PAYLOAD] * 5},
+    ),
+    Task(
+        "damage",
+        "a driven cable breaks after 5 s; the speed after 6 s counts",
+        "coulomb",
+        {
+            "events": [{"at": "5 s", "cut": ["T2-T3 outer bottom_left"]}],
+            "simulation.steady_from": "6 s",
+        },
+    ),
+    Task(
+        "efficient",
+        f"little work for the way, at {LEAST_SPEED} body lengths/s or more",
+        "coulomb",
+        score=efficiency,
+        unit="1 / cost of transport",
+    ),
+)
+
+
+class Problem:
+    """A task with a budget, as an entry gets it.
+
+    The budget counts simulated seconds: EPISODES times the duration of the task's scenario.
+    `solve(problem, seed)` returns a parameter vector of `space`, or a controller, which the bench
+    simulates once more on two engines.
+
+    Attributes:
+        task: the task; its name, scenario and score.
+        scenario: the task's scenario.
+        space: the parameters of its gaits, or of its policy.
+        left: budget that is left, in simulated seconds.
+    """
+
+    def __init__(self, task: Task, queue: SimulationQueue, *, episodes: int = EPISODES) -> None:
+        self.task, self.scenario, self._queue = task, task.scenario, queue
+        self.space = ParameterSpace.of(self.scenario)
+        self._duration = self.scenario.simulation.duration
+        self.left = self.budget = episodes * self._duration
+        self._evaluation = GaitEvaluation(self.scenario, task.score)
+
+    def evaluate(self, vectors: Sequence[Vector]) -> list[Evaluation]:
+        """Evaluations of parameter vectors, one episode each. `fitness` is the score; -inf for a
+        simulation that failed. Raises InputError if the budget is too small."""
+        self.spend(len(vectors) * self._duration)
+        candidates = [Candidate(np.asarray(vector, dtype=float)) for vector in vectors]
+        futures = [self._evaluation.on_queue(each, self._queue) for each in candidates]
+        return [future.result() for future in futures]
+
+    def spend(self, seconds: float) -> None:
+        """Takes simulated seconds from the budget, for simulations that evaluate() does not make.
+        Raises InputError if it is too small."""
+        if not 0.0 <= seconds <= self.left + 1e-6:
+            problem = f"found {seconds:g} simulated seconds, expected at most {self.left:g}"
+            raise InputError("bench", self.task.name, problem)
+        self.left -= seconds
+
+    def search(self, kind: OptimizerKind, seed: int) -> Vector:
+        """The best vector that an optimiser of the package finds with the whole budget. A search
+        that ends early is followed by another."""
+        generator, episodes = np.random.default_rng(seed), round(self.left / self._duration)
+        evolution = self.scenario.evolution.model_copy(update={"evaluations": episodes})
+        make, best = optimizer_of(kind), (-math.inf, self.space.low)
+        optimizer = make(self.space, evolution, generator)
+        while (count := round(self.left / self._duration)) > 0:
+            vectors = optimizer.ask()[:count]
+            evaluations = self.evaluate(vectors)
+            for vector, evaluation in zip(vectors, evaluations, strict=True):
+                best = max(best, (evaluation.fitness, vector), key=lambda one: one[0])
+            if count > len(vectors) and optimizer.tell(evaluations).stop:
+                optimizer = make(self.space, evolution, generator)
+        return best[1]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A method that solves tasks, from a file."""
+
+    name: str
+    about: str
+    solve: Callable[[Problem, int], Solution]
+    tasks: Sequence[str]
+    """Names of the tasks that it can solve."""
+
+    @classmethod
+    def of(cls, file: Path) -> Entry:
+        """The entry in a Python file: its function `solve`, its docstring, and a list TASKS if it
+        solves some tasks only. Raises InputError if it cannot be imported or has no `solve`."""
+        spec = importlib.util.spec_from_file_location(f"entry_{file.stem}", file)
+        if not file.is_file() or spec is None or spec.loader is None:
+            raise InputError(file, "", "is no Python file")
+        module = importlib.util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            problem = f"cannot be imported: {type(error).__name__}: {error}"
+            raise InputError(file, "", problem) from error
+        solve = getattr(module, "solve", None)
+        if not callable(solve):
+            problem = f"found {solve!r:.60}, expected a function solve(problem, seed)"
+            raise InputError(file, "solve", problem)
+        names = [task.name for task in TASKS]
+        tasks = getattr(module, "TASKS", names)
+        if unknown := set(tasks) - set(names):
+            problem = f"found {sorted(unknown)[0]!r}, expected some of {', '.join(names)}"
+            raise InputError(file, "TASKS", problem)
+        about = (module.__doc__ or file.stem).strip().split("\n")[0].rstrip(".")
+        return cls(file.stem, about, solve, tasks)
+
+
+def read(file: Path) -> list[Record]:
+    """Records of a file. A last line that was cut off does not count."""
+    lines = file.read_text("utf-8").splitlines(keepends=True) if file.exists() else []
+    return [json.loads(line) for line in lines if line.endswith("\n")]
+
+
+def append(file: Path, records: Iterable[Record]) -> None:
+    """Adds records to a file, whole or not at all."""
+    write_whole(file, "".join(f"{json.dumps(one)}\n" for one in [*read(file), *records]))
+
+
+def solved(
+    entry: Entry, task: Task, seeds: Sequence[int], *, episodes: int = EPISODES
+) -> list[Record]:
+    """Records of an entry's solutions to a task, one for each seed. The seeds are solved side by
+    side. Raises InputError if the entry raises an error or returns something else."""
+    started = time.perf_counter()
+    with ThreadPoolExecutor(len(seeds)) as threads, SimulationQueue(available_cores()) as queue:
+        problems = [Problem(task, queue, episodes=episodes) for _ in seeds]
+        found = list(threads.map(entry.solve, problems, seeds))
+    solutions = [_checked(one, problems[0], entry) for one in found]
+    wall_time, records = (time.perf_counter() - started) / len(seeds), []
+    for seed, problem, solution in zip(seeds, problems, solutions, strict=True):
+        record = {"task": task.name, "entry": entry.name, "about": entry.about, "seed": seed}
+        if not callable(solution):
+            record["parameters"] = solution.tolist()
+        record["score"] = round(task.scored(solution), DECIMALS)
+        record["simulated_s"] = round(problem.budget - problem.left, 3)
+        record["wall_s"] = round(wall_time, 2)
+        records.append(record)
+    best = max(range(len(records)), key=lambda place: records[place]["score"])
+    second = task.scored(solutions[best], changes=task.second)
+    records[best]["second"] = round(second, DECIMALS)
+    return records
+
+
+def _checked(solution: Any, problem: Problem, entry: Entry) -> Solution:
+    """A controller, or the rounded parameters of a solution. Raises InputError if they do not fit
+    the space."""
+    if callable(solution):
+        return solution
+    expected = f"{len(problem.space.names)} numbers or a controller"
+    try:
+        vector = np.asarray(solution, dtype=float)
+    except (TypeError, ValueError):
+        vector = np.zeros(0)
+    if vector.shape != problem.space.low.shape or not np.isfinite(vector).all():
+        raise InputError(entry.name, "solve", f"returned {solution!r:.60}, expected {expected}")
+    return vector.round(DECIMALS)
+
+
+# The page
+
+
+def scores(records: Sequence[Record]) -> dict[tuple[str, str], np.ndarray]:
+    """Scores by task and entry, in the order of the seeds."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for one in sorted(records, key=lambda one: one["seed"]):
+        found.setdefault((one["task"], one["entry"]), []).append(one["score"])
+    return {place: np.array(values) for place, values in found.items()}
+
+
+def shares(records: Sequence[Record]) -> dict[str, dict[str, np.ndarray]]:
+    """Scores by entry and task, as shares of the task's best interquartile mean."""
+    found: dict[str, dict[str, np.ndarray]] = {}
+    by_place = scores(records)
+    for (task, entry), values in by_place.items():
+        rivals = [v for (other, _), v in by_place.items() if other == task]
+        best = max(float(interquartile_mean(rival)) for rival in rivals)
+        found.setdefault(entry, {})[task] = values / best
+    return found
+
+
+def overall(of_tasks: Mapping[str, np.ndarray]) -> tuple[float, float, float]:
+    """Interquartile mean of an entry's shares over all tasks and seeds, and its 95 % interval by a
+    bootstrap within each task."""
+    generator, tasks = np.random.default_rng(0), [*of_tasks.values()]
+    resamples = np.concatenate([resampled(values, generator) for values in tasks], axis=1)
+    low, high = interval_of_resamples(interquartile_mean(resamples, axis=1))
+    return float(interquartile_mean(np.concatenate(tasks))), low, high
+
+
+def entry_names(records: Sequence[Record]) -> list[str]:
+    """Names of the entries in the records, the best first."""
+    of_entries = shares(records)
+    return sorted(
+        of_entries, key=lambda name: (-len(of_entries[name]), -overall(of_entries[name])[0])
+    )
+
+
+def task_table(records: Sequence[Record]) -> TextTable:
+    """Interquartile means of the scores, with their intervals, by task and entry."""
+    names, found = entry_names(records), scores(records)
+    rows = []
+    for task in TASKS:
+        row = [task.name, task.unit]
+        means = {
+            n: float(interquartile_mean(found[task.name, n]))
+            for n in names
+            if (task.name, n) in found
+        }
+        for name in names:
+            if name not in means:
+                row.append("-")
+                continue
+            low, high = interval(found[task.name, name], interquartile_mean)
+            text = f"{means[name]:.3g} ({low:.3g} to {high:.3g})"
+            row.append(f"**{text}**" if means[name] == max(means.values()) else text)
+        rows.append(row)
+    return TextTable(["task", "unit", *names], rows, (0, 1))
+
+
+def overall_table(records: Sequence[Record]) -> TextTable:
+    """Shares of the best over all tasks, agreement with the second engine, and time, by entry."""
+    of_entries, rows = shares(records), []
+    for name in entry_names(records):
+        own = [one for one in records if one["entry"] == name]
+        mean, low, high = overall(of_entries[name])
+        kept = [
+            one["second"] / one["score"] for one in own if one.get("second") and one["score"] > 0
+        ]
+        rows.append(
+            [
+                name,
+                own[0]["about"],
+                f"{len(of_entries[name])}",
+                f"{mean:.2f} ({low:.2f} to {high:.2f})",
+                f"{np.median(kept):.0%}" if kept else "-",
+                fixed(float(np.median([one["wall_s"] for one in own])), 1),
+            ]
+        )
+    headings = ["entry", "method", "tasks", "share of the best", "second engine", "time, s"]
+    return TextTable(headings, rows, (0, 1))
+
+
+def best_table(records: Sequence[Record]) -> TextTable:
+    """The best solution of each task on both engines."""
+    rows = []
+    for task in TASKS:
+        own = [one for one in records if one["task"] == task.name]
+        if not own:
+            continue
+        best = max(own, key=lambda one: one["score"])
+        engine = "MuJoCo" if task.second is MUJOCO else "diagram"
+        numbers = [f"{best[key]:.3g}" for key in ("score", "second")]
+        rows.append([task.name, best["entry"], f"{best['seed']}", *numbers, engine])
+    headings = ["task", "entry", "seed", "compiled", "second", "second engine"]
+    return TextTable(headings, rows, (0, 1, 5))
+
+
+def scores_figure(records: Sequence[Record]) -> Figure:
+    """Scores of all seeds by task and entry, as shares of the best interquartile mean."""
+    names, of_entries = entry_names(records), shares(records)
+    figure = Figure(figsize=(8.0, 4.0), layout="constrained")
+    axes = figure.subplots(2, math.ceil(len(TASKS) / 2), sharex=True, sharey=True).flat
+    for axis, task in zip(axes, TASKS, strict=False):
+        for place, name in enumerate(names):
+            values = of_entries[name].get(task.name, np.zeros(0))
+            axis.plot(values, np.full(values.shape, place), "o", color=f"C{place}", alpha=0.6, ms=4)
+        axis.set_title(task.name)
+        axis.axvline(1.0, color="0.7", linewidth=0.8)
+        axis.set_yticks(range(len(names)), names)
+        axis.set_ylim(len(names) - 0.5, -0.5)
+        axis.set_xlim(left=min(0.0, axis.get_xlim()[0]))
+    figure.supxlabel("score as a share of the best interquartile mean")
+    return figure
+
+
+def page(records: Sequence[Record]) -> str:
+    """Text of the page, from the records."""
+    about = "\n".join(f"- `{t.name}`: {t.about}; score in {t.unit}" for t in TASKS)
+    template = (HERE / "page.md").read_text("utf-8")
+    return template.format(
+        about=about,
+        overall=overall_table(records).markdown(),
+        tasks=task_table(records).markdown(),
+        best=best_table(records).markdown(),
+        episodes=EPISODES,
+        seeds=SEEDS,
+        least=LEAST_SPEED,
+    )
+
+
+def main() -> None:
+    """Runs the entries, and writes the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("entries", nargs="*", type=Path, help="files of entries")
+    parser.add_argument("--task", choices=[task.name for task in TASKS], help="only this task")
+    parser.add_argument("--page", action="store_true", help="only writes the page")
+    arguments = parser.parse_args()
+    files = arguments.entries or sorted(ENTRIES.glob("*.py"))
+    entries = [] if arguments.page else [Entry.of(file) for file in files]
+    for task in TASKS:
+        for entry in entries:
+            done = {(one["task"], one["entry"], one["seed"]) for one in read(HERE / RECORDS)}
+            seeds = [seed for seed in range(SEEDS) if (task.name, entry.name, seed) not in done]
+            if not seeds or task.name not in entry.tasks or arguments.task not in (None, task.name):
+                continue
+            records = solved(entry, task, seeds)
+            append(HERE / RECORDS, records)
+            mean = float(interquartile_mean([one["score"] for one in records]))
+            wall_time = sum(one["wall_s"] for one in records)
+            print(
+                f"{task.name}, {entry.name}: {mean:.3g} {task.unit}, {wall_time:.0f} s", flush=True
+            )
+    records = read(HERE / RECORDS)
+    save_figure(scores_figure(records), HERE, FIGURE, kinds=["svg"])
+    write_whole(HERE / PAGE_NAME, page(records))
+
+
+if __name__ == "__main__":
+    with heeding_interrupts():
+        main()

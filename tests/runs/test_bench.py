@@ -1,0 +1,86 @@
+"""The benchmark: budgets, entries from files, records that go on, and its page."""
+
+import dataclasses
+
+import bench
+import numpy as np
+import pytest
+
+from tetra_drake.errors import InputError
+
+SHORT = {"simulation.duration": "4 s"}
+WALK = dataclasses.replace(bench.TASKS[0], changes=SHORT)
+ENTRY = '''"""The first of two random vectors."""
+import numpy as np
+TASKS = ["walk"]
+def solve(problem, seed):
+    generator, space = np.random.default_rng(seed), problem.space
+    vectors = generator.uniform(space.low, space.high, (2, len(space.low)))
+    vectors = [space.repair(vector) for vector in vectors]
+    found = problem.evaluate(vectors)
+    assert problem.left == 0.0 and len(found) == 2
+    return vectors[0]
+'''
+
+
+def entry_of(folder, text):
+    file = folder / "mine.py"
+    file.write_text(text)
+    return bench.Entry.of(file)
+
+
+def test_an_entry_is_a_file_and_its_score_is_that_of_its_solution(tmp_path):
+    entry = entry_of(tmp_path, ENTRY)
+    assert entry.tasks == ["walk"] and entry.about == "The first of two random vectors"
+    (record,) = bench.solved(entry, WALK, [3], episodes=2)
+    duration = WALK.scenario.simulation.duration
+    assert record["simulated_s"] == 2 * duration and record["seed"] == 3
+    assert WALK.scored(np.array(record["parameters"])) == pytest.approx(record["score"], abs=1e-6)
+    assert record["second"] == pytest.approx(record["score"], abs=0.1)  # in MuJoCo
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("1 +", ""),
+        ("solve = 1", "solve"),
+        ("TASKS = ['fly']\ndef solve(problem, seed): ...", "TASKS"),
+        ("def solve(problem, seed): return [1.0]", "solve"),
+        ("def solve(problem, seed): return 'walk'", "solve"),
+        ("def solve(problem, seed): problem.evaluate([problem.space.low] * 3)", "walk"),
+        ("def solve(problem, seed): problem.spend(-1.0)", "walk"),
+    ],
+)
+def test_what_is_no_entry_is_refused(tmp_path, text, key):
+    with pytest.raises(InputError) as caught:
+        bench.solved(entry_of(tmp_path, text), WALK, [0], episodes=2)
+    assert caught.value.key == key and "\n" not in str(caught.value)
+
+
+def test_records_go_on_after_a_line_that_was_cut_off(tmp_path):
+    file = tmp_path / "records.jsonl"
+    bench.append(file, [{"score": 1.0}])
+    file.write_text(file.read_text() + '{"sco')
+    bench.append(file, [{"score": 2.0}])
+    assert bench.read(file) == [{"score": 1.0}, {"score": 2.0}]
+
+
+def test_shares_are_of_the_best_interquartile_mean():
+    values = {"good": [0.0, 2.0, 2.0, 100.0], "bad": [1.0, 1.0, 1.0, 1.0]}
+    records = [
+        {"task": "walk", "entry": entry, "seed": seed, "score": score}
+        for entry, scores in values.items()
+        for seed, score in enumerate(scores)
+    ]
+    of_entries = bench.shares(records)
+    assert of_entries["bad"]["walk"].tolist() == [0.5] * 4
+    assert bench.overall(of_entries["good"])[0] == 1.0
+    assert bench.overall(of_entries["bad"]) == (0.5, 0.5, 0.5)
+    assert bench.entry_names(records) == ["good", "bad"]
+
+
+def test_the_page_is_made_from_the_records():
+    records = bench.read(bench.HERE / bench.RECORDS)
+    assert bench.page(records) == (bench.HERE / bench.PAGE_NAME).read_text("utf-8")
+    entries = {bench.Entry.of(file).name for file in bench.ENTRIES.glob("*.py")}
+    assert entries <= {one["entry"] for one in records}

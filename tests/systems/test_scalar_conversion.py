@@ -1,0 +1,229 @@
+"""Systems for AutoDiffXd and clones: derivatives against Drake's elements and closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import LinearSpringDamper, RigidBody, SpatialInertia
+from pydrake.systems.analysis import Simulator, Simulator_
+from pydrake.systems.controllers import LinearQuadraticRegulator
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Linearize
+
+from tetra_drake.laws.actuator import Winch
+from tetra_drake.laws.cable import CableLaw
+from tetra_drake.laws.oscillator import Network
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.systems import AddCables, AddFrame, Cable, MatsuokaCpg, Steering
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+LAW = CableLaw(stiffness=40.0, damping=6.0, free_length=0.2)
+UPRIGHT = np.array([np.pi, 0.0, 0.0, 0.0])
+
+Attaches = Callable[[DiagramBuilder, MultibodyPlant, list[Cable]], None]
+
+
+def acrobot(attach: Attaches, *, shown: bool = False) -> Diagram:
+    """Drake's acrobot with two cables from the world to its tip."""
+    builder = DiagramBuilder()
+    if shown:
+        plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    else:
+        plant = builder.AddSystem(MultibodyPlant(time_step=0.0))
+    Parser(plant).AddModelsFromUrl("package://drake/examples/acrobot/Acrobot.urdf")
+    tip = AddFrame(plant, "tip", plant.GetFrameByName("lower_link"), [0.0, 0.0, -1.5])
+    places = {"left": [-1.0, 0.1, -2.0], "right": [1.0, 0.1, -2.0]}
+    anchors = [AddFrame(plant, name, plant.world_frame(), place) for name, place in places.items()]
+    attach(builder, plant, [Cable(anchor.name(), anchor, tip, LAW) for anchor in anchors])
+    builder.ExportInput(plant.get_actuation_input_port(), "torque")
+    builder.ExportOutput(plant.get_state_output_port(), "state")
+    return builder.Build()
+
+
+def with_cables(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
+    plant.Finalize()
+    scene_graph = (
+        builder.GetSubsystemByName("scene_graph") if plant.geometry_source_is_registered() else None
+    )
+    AddCables(builder, plant, cables=cables, slack=False, scene_graph=scene_graph)
+
+
+def with_springs(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
+    for cable in cables:
+        ends: list[object] = []
+        for frame in (cable.frame_a, cable.frame_b):
+            ends += [frame.body(), frame.GetFixedPoseInBodyFrame().translation()]
+        law = [cable.law.free_length, cable.law.stiffness, cable.law.damping]
+        plant.AddForceElement(LinearSpringDamper(*ends, *law))
+    plant.Finalize()
+
+
+def rates_and_gradient(diagram: System, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rates of the continuous state of a system for AutoDiffXd, and their derivatives by
+    `numbers`, which are its state and then its inputs."""
+    context, given = diagram.CreateDefaultContext(), InitializeAutoDiff(numbers).ravel()
+    states = context.num_continuous_states()
+    context.SetContinuousState(given[:states])
+    if given.size > states:
+        diagram.get_input_port(0).FixValue(context, given[states:])
+    rates = diagram.EvalTimeDerivatives(context).CopyToVector()
+    return ExtractValue(rates).ravel(), ExtractGradient(rates)
+
+
+def test_cables_have_the_derivatives_of_drakes_linear_spring_dampers():
+    ours, drakes = (acrobot(each).ToAutoDiffXd() for each in (with_cables, with_springs))
+    for numbers in np.random.default_rng(1).uniform(-2.0, 2.0, (1000, 5)):
+        rates, gradient = rates_and_gradient(ours, numbers)
+        expected = rates_and_gradient(drakes, numbers)
+        np.testing.assert_allclose(rates, expected[0], rtol=1e-9, atol=1e-9)
+        scale = np.abs(expected[1]).max()
+        np.testing.assert_allclose(gradient, expected[1], rtol=0.0, atol=1e-6 * scale)
+
+
+def test_drake_linearizes_and_regulates_an_acrobot_with_cables_as_one_with_springs():
+    found = []
+    for diagram in (acrobot(with_springs), acrobot(with_cables), acrobot(with_cables, shown=True)):
+        context = diagram.CreateDefaultContext()
+        context.SetContinuousState(UPRIGHT)
+        diagram.get_input_port().FixValue(context, [0.0])
+        linear = Linearize(diagram, context, equilibrium_check_tolerance=1e-3)
+        regulator = LinearQuadraticRegulator(linear.A(), linear.B(), np.eye(4), np.eye(1))
+        found.append(np.concatenate([linear.A().ravel(), linear.B().ravel(), regulator[0].ravel()]))
+    for each in found[1:]:
+        np.testing.assert_allclose(each, found[0], rtol=1e-5, atol=1e-5)
+
+
+def test_a_winch_follows_its_command_with_its_lag_in_the_derivatives_as_well():
+    # d(drive)/dt = (l0 - signal / k - drive) / lag; the tension is k (l - drive).
+    builder = DiagramBuilder()
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    ball: RigidBody = plant.AddRigidBody("ball", SpatialInertia.SolidSphereWithMass(0.5, 0.1))
+    cable = Cable("rope", plant.world_frame(), ball.body_frame(), LAW._replace(damping=0.0))
+    plant.Finalize()
+    plant.SetDefaultPositions([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.5])
+    winch = Winch(max_force=1e6, max_speed=1e3, time_constant=0.05)
+    cables = AddCables(builder, plant, cables=[cable], actuated={"rope": ["rope"]}, actuation=winch)
+    builder.ExportInput(cables.GetInputPort("signals"))
+    builder.ExportOutput(cables.GetOutputPort("tensions"))
+    diagram = builder.Build()
+    start = diagram.CreateDefaultContext().get_continuous_state_vector().CopyToVector()
+    numbers = np.append(start, 3.0)
+    _, gradient = rates_and_gradient(diagram.ToAutoDiffXd(), numbers)
+    expected = np.zeros(numbers.size)
+    expected[-2:] = -1.0 / 0.05, -1.0 / (LAW.stiffness * 0.05)
+    np.testing.assert_allclose(gradient[-1], expected, atol=1e-5)
+    fall = np.zeros(numbers.size)
+    fall[[6, -2]] = -LAW.stiffness / 0.5  # the ball hangs below the world's origin
+    np.testing.assert_allclose(gradient[12], fall, atol=1e-5)
+
+
+def test_the_rates_of_oscillators_have_the_derivatives_of_their_law():
+    generator = np.random.default_rng(2)
+    weights = generator.uniform(0.0, 2.0, (6, 6))
+    network = Network.of(weights, tau_a=0.3, tau_b=0.6, self_inhibition_weight=1.1)
+    cpg = MatsuokaCpg(network, tonic=0.5, initial_state=np.zeros(12)).ToAutoDiffXd()
+    unit = np.eye(6)
+    for numbers in generator.uniform(-1.0, 1.0, (1000, 18)):  # u, v, tonic input
+        _, gradient = rates_and_gradient(cpg, numbers)
+        fires = np.diag(numbers[:6] > 0.0)
+        expected = np.block(
+            [
+                [(-unit - weights @ fires) / 0.3, -1.1 * unit / 0.3, unit / 0.3],
+                [fires / 0.6, -unit / 0.6, np.zeros((6, 6))],
+            ]
+        )
+        near_a_kink = np.abs(numbers[:6]).min() < 1e-5
+        np.testing.assert_allclose(gradient, expected, atol=10.0 if near_a_kink else 1e-6)
+
+
+def doubled(turn: np.ndarray) -> np.ndarray:
+    return np.array([2.0 * turn, 0.0])
+
+
+@pytest.mark.parametrize("turn", [-1.0, 0.3, 1.0])
+def test_steering_has_derivatives_up_to_the_limits_of_the_turn(turn):
+    steering = Steering(doubled, turn=0.0).ToAutoDiffXd()
+    context = steering.CreateDefaultContext()
+    steering.get_input_port().FixValue(context, InitializeAutoDiff(np.array([turn])).ravel())
+    tonic = steering.get_output_port().Eval(context)
+    np.testing.assert_allclose(ExtractGradient(tonic), [[2.0], [0.0]], atol=1e-9)
+
+
+def walking(changes: dict[str, object]) -> tuple[Diagram, Simulator]:
+    """Diagram of a robot on the ground, and its simulator after a fifth of a second."""
+    scenario = load_scenario("thesis").with_changes(changes)
+    diagram = MakeTensegrityDiagram(Robot.of(scenario), seeded_gait(scenario, 1))
+    simulator = Simulator(diagram)
+    simulator.AdvanceTo(0.2)
+    return diagram, simulator
+
+
+LIVE = {"cpg.signals": "live", "cpg.feedback": ["length"]}
+
+
+@pytest.mark.parametrize("changes", [{}, LIVE], ids=["listing", "live"])
+def test_a_robot_converts_with_its_ground_in_the_modes_of_the_state(changes):
+    diagram, simulator = walking(changes)
+    context, converted = simulator.get_context(), diagram.ToAutoDiffXd()
+    state = context.get_continuous_state_vector().CopyToVector()
+    given, size = converted.CreateDefaultContext(), state.size
+    given.SetTimeStateAndParametersFrom(context)
+    directions = np.random.default_rng(3).normal(size=(size, 2))
+    given.SetContinuousState(InitializeAutoDiff(state, directions).ravel())
+    rates = converted.EvalTimeDerivatives(given).CopyToVector()
+    expected = diagram.EvalTimeDerivatives(context).CopyToVector()
+    np.testing.assert_allclose(ExtractValue(rates).ravel(), expected, rtol=1e-9, atol=1e-9)
+    moved, step = context.Clone(), 1e-7
+    for column, direction in enumerate(directions.T):
+        sides = []
+        for side in (-step, step):
+            moved.SetContinuousState(state + side * direction)
+            sides.append(diagram.EvalTimeDerivatives(moved).CopyToVector())
+        slope, found = (sides[1] - sides[0]) / (2.0 * step), ExtractGradient(rates)[:, column]
+        np.testing.assert_allclose(found, slope, atol=1e-5 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("changes", [{}, LIVE], ids=["listing", "live"])
+def test_a_clone_moves_as_its_original_and_apart_from_it(changes):
+    diagram, simulator = walking(changes)
+    clone = diagram.Clone()
+    kinds, same = ([type(each) for each in one.GetSystems()] for one in (clone, diagram))
+    assert [each.__name__ for each in kinds] == [
+        "Diagram" if each.__name__ == "StartUpGate" else each.__name__ for each in same
+    ]
+    other = Simulator(clone)  # a clone of Drake's plant loses default poses of free bodies
+    start = diagram.CreateDefaultContext()
+    other.get_mutable_context().SetTimeStateAndParametersFrom(start)
+    other.AdvanceTo(0.2)
+    ends = [
+        each.get_context().get_continuous_state_vector().CopyToVector()
+        for each in (simulator, other)
+    ]
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
+def test_a_robot_for_autodiff_is_not_simulated_because_its_modes_would_stay(refused):
+    diagram, _ = walking({})
+    simulator = Simulator_[AutoDiffXd](diagram.ToAutoDiffXd())
+    with refused("AutoDiffXd", "timer", "discrete state"):
+        simulator.Initialize()
+
+
+def test_inputs_with_unequal_numbers_of_derivatives_are_refused(refused):
+    builder = DiagramBuilder()
+    steering = builder.AddNamedSystem("steers", Steering(doubled, turn=0.0))
+    builder.ExportInput(steering.get_input_port())
+    builder.ExportOutput(steering.get_output_port())
+    diagram = builder.Build().ToAutoDiffXd()
+    context = diagram.CreateDefaultContext()
+    context.SetTime(AutoDiffXd(0.0, [1.0, 0.0]))
+    diagram.get_input_port().FixValue(context, InitializeAutoDiff(np.zeros(1)).ravel())
+    with refused("AutoDiffXd", "steers", "[1, 2] derivatives"):
+        diagram.get_output_port().Eval(context)
