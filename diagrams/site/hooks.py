@@ -36,8 +36,6 @@ TUTORIALS = "diagrams/tutorials"
 RUNS = ROOT / "out/tutorials"
 """What tutorials print and draw, kept for the next build with the same sources."""
 PACKAGE, STUB = "tetra_drake", "tetra_drake/__init__.pyi"
-NO_PAGE = re.compile(r"\.template\.md$|^runs/paper/|^\.github/ISSUE_TEMPLATE/")
-"""Markdown that is no page of the site."""
 BESIDE = "runs/meshcat.js"
 """What replays load."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".cff": "yaml"}
@@ -98,8 +96,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Adds the pages, and all to which they lead."""
     names = tracked()
     folders = {str(folder) for name in names for folder in Path(name).parents}
-    todo = [name for name in names if name.endswith(".md") and not NO_PAGE.search(name)]
-    todo.append(BESIDE)
+    no_pages = {name for rest in config.extra["no_pages"] for name in fnmatch.filter(names, rest)}
+    todo = [name for name in names if name.endswith(".md") and name not in no_pages] + [BESIDE]
     for name in todo:  # which grows
         if name.endswith(".md"):
             text = (ROOT / name).read_text(encoding="utf-8")
