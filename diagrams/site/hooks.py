@@ -111,7 +111,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         output = run(script, config.extra["tutorials"])
         files.append(File.generated(config, page_of(name), content=tutorial_page(script, output)))
         if output.picture:
-            files.remove(files.src_uris[picture])
+            if kept := files.get_file_from_path(picture):
+                files.remove(kept)
             files.append(File.generated(config, picture, abs_src_path=str(output.picture)))
     for page, module in (("api", PACKAGE), ("api_systems", f"{PACKAGE}.systems")):
         files.append(File.generated(config, f"{page}.md", content=api_page(module)))
@@ -120,7 +121,6 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Leads links to sources and folders to their pages."""
-
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]
 
