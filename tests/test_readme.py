@@ -58,6 +58,15 @@ def test_the_commands_of_all_pages_are_commands_with_their_options() -> None:
         make_parser().parse_args(arguments)  # ends the process if it cannot be parsed
 
 
+def test_the_plugin_of_the_page_is_the_example() -> None:
+    folder = CHECKOUT / "tests/data/plugin"
+    (*_, law) = snippets("python", SCENARIOS)
+    assert law in (folder / "tetra_example/__init__.py").read_text(encoding="utf-8")
+    (entries,) = snippets("toml", SCENARIOS)
+    declared = (folder / "pyproject.toml").read_text(encoding="utf-8").splitlines()
+    assert {*entries.splitlines()} <= {*declared}
+
+
 def test_the_files_of_other_kinds_are_read(work: Path) -> None:
     texts = snippets("yaml", SCENARIOS)
     [tower] = [text for text in texts if "pair_groups:" in text]
@@ -114,7 +123,7 @@ def test_libraries_find_gaits(library: str, number: int, monkeypatch: pytest.Mon
 
 
 def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: None) -> None:
-    (_, snippet) = snippets("python", SCENARIOS)
+    (_, snippet, _) = snippets("python", SCENARIOS)
     names: dict[str, Any] = {}
     exec(compile(snippet, "scenario/README.md", "exec"), names)
     assert names["result"].duration == names["simulator"].get_context().get_time() == 1.0
@@ -130,7 +139,7 @@ def test_winches_wind_a_structure_to_its_rest(work: Path, monkeypatch: pytest.Mo
     floats = {"robot.gravity": "0 m/s^2", "terrain": "!Nothing"}
     floating = td.load_scenario("six_bar").with_changes(floats)
     monkeypatch.setattr(td, "load_scenario", lambda name: floating, raising=False)
-    (snippet, _) = snippets("python", SCENARIOS)
+    (snippet, _, _) = snippets("python", SCENARIOS)
     names: dict[str, Any] = {}
     exec(compile(snippet, "scenario/README.md", "exec"), names)
     robot, trajectory = names["robot"], names["result"].trajectory

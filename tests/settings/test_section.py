@@ -82,7 +82,7 @@ def test_a_section_from_python_is_checked_and_does_not_change(refused):
 BAD = [
     ("terrain: !Flat 5", "", "!Flat"),
     ("terrain: !Incline {slop: 1 rad}", "terrain.slop", "'slope'"),  # which is missing, too
-    ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
+    ("terrain: !Inclin {slope: 1 rad}", "terrain", "!Incline; a plug-in may be missing"),
     ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
     ("terrain: !Incline", "terrain.slope", "missing"),
     ("inner: {slope: 300 deg}", "inner.slope", "less than or equal to 4 rad"),

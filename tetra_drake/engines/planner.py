@@ -20,7 +20,7 @@ from tetra_drake.engines.batch import checked_numbers
 from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, check_type, check_whole
-from tetra_drake.laws.actuator import Limits
+from tetra_drake.laws.actuator import limits_of
 from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
@@ -285,7 +285,7 @@ class Planner:
         amplitude = usual_amplitude(scenario.cpg) * np.array([[-1.0], [1.0]])
         signals = np.broadcast_to(amplitude, (2, robot.driven.size))
         ends = scenario.actuation.commands(cables._replace(signal=signals))
-        least = Limits(*scenario.actuation.actuator().limits).least_length
+        least = limits_of(scenario.actuation.actuator()).least_length
         return np.sort(ends if math.isnan(least) else np.maximum(ends, least), axis=0)
 
 

@@ -46,6 +46,7 @@ from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import AnyGait, ParameterSpace, Vector
 from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.settings.plugins import check_plugins, plugins_of
 from tetra_drake.settings.section import Section
 from tetra_drake.settings.units import chosen_units, shown_in
 
@@ -76,7 +77,7 @@ class Method:
     ) -> Method:
         """The method of a run. By default objective and optimiser are the scenario's."""
         name = FITNESS if objective is None else _name(objective)
-        return cls(name, _name(scenario.optimizer if optimizer is None else optimizer))
+        return cls(name, scenario.optimizer.tag if optimizer is None else _name(optimizer))
 
     def __str__(self) -> str:
         return f"optimiser {self.optimizer}, objective {self.objective}"
@@ -126,7 +127,7 @@ class Manifest:
     @property
     def other_versions(self) -> list[str]:
         """Recorded versions that are not installed here, such as "numpy 1.26"."""
-        now = versions(self.scenario.engine.packages)
+        now = versions(self.scenario.engine.packages) | plugins_of(self.scenario)
         recorded = {name: self.versions.get(name) for name in now}
         return [f"{name} {then}" for name, then in recorded.items() if then != now[name]]
 
@@ -173,11 +174,13 @@ class _File(Section):
 
 
 def read_manifest(directory: Path) -> Manifest:
-    """Reads the manifest of a run; raises InputError if it is missing or damaged."""
+    """Reads the manifest of a run. Raises InputError if it is missing or damaged, or if a plug-in
+    is missing that the run used."""
     path = directory / MANIFEST
     if not os.path.exists(path):
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
     file = _File.from_tree(read_json(path, "manifest of a run"), path)
+    check_plugins(file.versions, directory)
     scenario_file = directory / SCENARIO
     scenario = load_scenario(scenario_file)
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
@@ -240,7 +243,8 @@ class RunRecord(contextlib.AbstractContextManager["RunRecord"]):
         """A new run in a new or empty directory. With `overwrite` the directory may hold another
         run, unless a process is working on it. begin() writes the first file. Raises InputError if
         the directory cannot be used."""
-        method, installed = method or Method.of(scenario), versions(scenario.engine.packages)
+        method = method or Method.of(scenario)
+        installed = versions(scenario.engine.packages) | plugins_of(scenario)
         definition = json.dumps((dump_scenario(scenario), seed, installed, vars(method)))
         name = _sha256(definition)[:_NAME]
         manifest = Manifest(

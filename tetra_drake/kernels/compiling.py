@@ -10,6 +10,7 @@ import inspect
 import logging
 import math
 import pickle
+import re
 import sys
 import threading
 import time
@@ -20,6 +21,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, NullCache
+from numba.core.errors import NumbaError
 from numba.core.serialize import dumps
 from numba.extending import overload
 
@@ -35,6 +37,8 @@ _OPTIONS: dict[str, Any] = {
     "fastmath": {"contract"},
     "no_cfunc_wrapper": True,  # only C code would call the wrapper
 }
+INLINED: Any = _OPTIONS | {"forceinline": True}
+"""Numba's options of functions that become part of the machine code of their callers."""
 _MOMENT, _MINUTE = 2.0, 60.0
 """Time (s) after which a compilation is announced, and least time (s) between announcements."""
 _told = -math.inf
@@ -75,9 +79,8 @@ def inlined(function: F) -> F:
     A call from Python runs the plain Python function, because another compilation for such calls
     would take as long again.
     """
-    options: Any = _OPTIONS | {"forceinline": True}
 
-    @overload(function, jit_options=options)
+    @overload(function, jit_options=INLINED)
     @functools.wraps(function)
     def implementation(*_: object) -> F:
         return function
@@ -89,11 +92,18 @@ def machine_code(kernel: F, *arguments: object) -> F:
     """Machine code of a kernel for arguments of the same types as `arguments`: a function that
     Python calls like the kernel. If compilation is switched off, the kernel itself.
 
-    A call does not check types: with other types it fails or computes nonsense.
+    A call does not check types: with other types it fails or computes nonsense. Raises InputError
+    with the place if a function cannot be compiled, as one of a plug-in may be.
     """
     if not hasattr(kernel, "compile"):  # compilation is switched off
         return kernel
-    return cast(F, kernel.compile(tuple(numba.typeof(argument) for argument in arguments)))
+    try:
+        return cast(F, kernel.compile(tuple(numba.typeof(argument) for argument in arguments)))
+    except NumbaError as error:
+        # Of numba's nested errors, the innermost tells the cause. Its place comes first.
+        cause = [str(error), *re.findall(r"frontend\)\n\s*(.+)", str(error))][-1]
+        place = [*re.findall(r"During: .* at (\S+ \(\d+\))", str(error)), kernel.__name__][0]
+        raise InputError(place, "", f"cannot be compiled by numba: {cause}") from error
 
 
 def _kernel(function: F, **options: Any) -> F:

@@ -30,7 +30,7 @@ from typing import Annotated, Any, Generic, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import typeof, types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
@@ -120,6 +120,8 @@ def _words(kind: types.Type) -> int:
 class Packed(Generic[Values]):
     """A nested tuple of arrays, fields, integers and booleans, as one argument of a kernel.
 
+    Another value, such as None, is in the numba type alone; its word is 0.
+
     The kernel gets one address in place of all values; unpacked() gives the values back. The arrays
     are not copied, so a kernel sees later changes. Packing takes half a millisecond.
     Raises ValueError for an array that cannot be a Field.
@@ -144,8 +146,10 @@ def _pack(value: Any, words: list[int]) -> types.Type:
     if isinstance(value, FieldArray):
         words += [value.address, *value.shape]
         return value.kind
-    words.append(int(value))
-    return types.boolean if isinstance(value, bool) else types.intp
+    is_number = hasattr(value, "__int__")
+    words.append(int(value) if is_number else 0)
+    number: types.Type = types.boolean if isinstance(value, bool) else types.intp
+    return number if is_number else typeof(value)
 
 
 def unpacked(values: Packed[Values] | Values) -> Values:

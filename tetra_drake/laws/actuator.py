@@ -8,14 +8,17 @@
 The state of an actuator is called its *drive*: the free length (m) of a winch, or the tension (N)
 of a tension motor. A direct force has no drive.
 
-To add a kind with a drive, write its number, its force function, a line in actuator_force(), and a
+To add a kind with a drive, write its number, its force function, a line in shipped_force(), and a
 settings section. The force function also returns the tension that the cable's own spring and damper
-exert beside the actuator.
+exert beside the actuator. A kind of a plug-in has its force function in an ActuatorFunctions, and
+the number of the kind that has the same state: WINCH or TENSION_MOTOR.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -23,6 +26,7 @@ from pydantic import Field
 
 from tetra_drake.kernels.compiling import inlined
 from tetra_drake.kernels.lanes import Real, Table, maximum, minimum, named, select
+from tetra_drake.kernels.own import OwnFunctions, with_own
 from tetra_drake.laws.cable import (
     CableLaw,
     cable_tension,
@@ -61,8 +65,10 @@ class Actuator(NamedTuple):
     """Kind and limits of a robot's actuators; all driven cables have the same."""
 
     kind: int
-    limits: Table
-    """The fields of Limits as an array."""
+    constants: Table
+    """The fields of Limits, or of the constants of `own`, as an array."""
+    own: ActuatorFunctions | None = None
+    """Functions of a plug-in's actuators."""
 
 
 class ActuatorForce(NamedTuple):
@@ -97,6 +103,22 @@ class Exertion(NamedTuple):
     """1 if a limit of the actuator binds, otherwise 0."""
 
 
+@dataclass(frozen=True)
+class ActuatorFunctions(OwnFunctions):
+    """Functions of the actuators of a plug-in. Constants with the names of Limits are limits."""
+
+    force: Callable[..., ActuatorForce]
+    """Tension and rate of the state, like winch_force(); arguments: drive, length, rate, signal,
+    law of the cable, constants."""
+
+
+def limits_of(actuator: Actuator) -> Limits:
+    """Limits of actuators; NaN without a limit."""
+    names = actuator.own.constants._fields if actuator.own else Limits._fields
+    numbers = zip(names, actuator.constants.tolist(), strict=True)
+    return Limits(**{name: number for name, number in numbers if name in Limits._fields})
+
+
 @inlined
 def has_drive(actuator: Actuator) -> bool:
     """True if the actuators have a state (drive): winches and tension motors."""
@@ -127,25 +149,6 @@ def exertion(
         return Exertion(load=tension, pull=signal, left=length, limited=0.0 * length)
     load, left = tension - drives[drive, BESIDE], wound(actuator, drives[drive, DRIVE], length)
     return Exertion(load=load, pull=load, left=left, limited=drives[drive, LIMITED])
-
-
-@inlined
-def actuator_force(
-    actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
-) -> ActuatorForce:
-    """Tension that a winch or tension motor gives a cable with a length (m) that grows at a rate
-    (m/s), and the rate of its state.
-
-    `drive` is the actuator's state: the free length (m) of a winch, the tension (N) of a motor.
-    `signal` (N) is the actuation that the controller wants, `law` has the constants of the cable.
-    Raises ValueError for ideal actuators (kind DIRECT), which have no state.
-    """
-    limits = named(Limits, actuator.limits)
-    if actuator.kind == WINCH:
-        return winch_force(drive, length, rate, signal, law, limits)
-    if actuator.kind == TENSION_MOTOR:
-        return motor_force(drive, length, rate, signal, law, limits)
-    raise ValueError("unknown kind of actuators")
 
 
 @inlined
@@ -214,6 +217,26 @@ def motor_force(
     )
 
 
+@inlined
+def shipped_force(law: Any, *more: Any) -> Any:
+    """The function actuator_force() for an Actuator of this module, `law`."""
+    limits = named(Limits, law.constants)
+    if law.kind == WINCH:
+        return winch_force(*more, limits)  # type: ignore[call-arg]
+    if law.kind == TENSION_MOTOR:
+        return motor_force(*more, limits)  # type: ignore[call-arg]
+    raise ValueError("unknown kind of actuators")
+
+
+actuator_force = with_own("force", shipped_force)
+"""Tension that an actuator gives a cable, and the rate of the actuator's state: an ActuatorForce.
+
+Arguments: Actuator; its state, which is the free length (m) of a winch or the tension (N) of a
+tension motor; length (m) of the cable and its rate (m/s); actuation (N) that the controller wants;
+constants of the cable. Raises ValueError for ideal actuators (kind DIRECT), which have no state.
+"""
+
+
 # Settings: a section for each kind of actuator.
 
 
@@ -260,10 +283,14 @@ class ActuatorKind(Section):
     """True if software imitates the spring and damper of the cable. A command then contains their
     effect."""
 
+    own: ClassVar[ActuatorFunctions | None] = None
+    """Functions of a plug-in's actuators; None for the actuators of this module."""
+
     def actuator(self) -> Actuator:
         """Kind and limits of the actuators for the kernels. The limits are the settings of this
         section: their names are the fields of Limits."""
-        return Actuator(self.kind, np.array(Limits(**dict(self))))
+        constants = self.own.table(self) if self.own else np.array(Limits(**dict(self)))
+        return Actuator(self.kind, constants, self.own)
 
     def excess(self, signal: float, *, free_length: float) -> str:
         """Text for a message if signals up to `signal` (N) exceed the actuator's limits, such as
@@ -362,5 +389,5 @@ class TensionMotor(LimitedActuator):
         return np.clip(cable_tension(length, rate, signal, law), 0.0, self.max_force)
 
 
-Actuation = Annotated[Force | Winch | TensionMotor, Kinds()]
+Actuation = Annotated[Force | Winch | TensionMotor, Kinds(ActuatorKind)]
 """Settings of the actuators, of any kind. Without a YAML tag such as !Winch they are a Force."""

@@ -32,12 +32,13 @@ stiction, nodes always stick.
 
 Both laws have the same functions of a Slide: force, damping, next mode, margin, and time to the
 next change. by_law() chooses between them. A further law needs settings, constants, these
-functions, and its line in by_law().
+functions, and its line in by_law(). A law of a plug-in has them in a FrictionFunctions.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, cast
 
@@ -57,6 +58,7 @@ from tetra_drake.kernels.lanes import (
     not_,
     select,
 )
+from tetra_drake.kernels.own import OwnFunctions, with_own
 from tetra_drake.settings.quantities import (
     Damping,
     DampingPerLength,
@@ -68,8 +70,8 @@ from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section, Varied, settings_text
 from tetra_drake.settings.units import INCH, POUND_FORCE
 
-RESET_INTEGRATOR, COULOMB = range(2)
-"""Numbers of the friction laws in kernels."""
+RESET_INTEGRATOR, COULOMB, OWN = range(3)
+"""Numbers of the friction laws in kernels. OWN is a law with a FrictionFunctions."""
 
 STICK = 0.0
 """Friction mode of a node that sticks."""
@@ -100,9 +102,12 @@ class FrictionKind(Section):
     """Description of the law that MuJoCo uses in place of this one, for pages; empty if it is the
     same."""
 
+    own: ClassVar[FrictionFunctions]
+    """Functions of a plug-in's law for the kernels. The laws of this module override law()."""
+
     def law(self) -> FrictionLaw:
         """The law of friction with these settings as constants, as an argument of kernels."""
-        raise NotImplementedError
+        return FrictionLaw(OWN, self.own.table(self), self.own)
 
     def without_bristles(self) -> FrictionKind:
         """This law with a bristle stiffness of 0, for MuJoCo: nodes that stick creep."""
@@ -112,7 +117,7 @@ class FrictionKind(Section):
     def text(self) -> str:
         """Description of the law for pages that show a robot or its results, such as "the thesis's
         friction"."""
-        raise NotImplementedError
+        return f"{self.tag} friction{settings_text(self)}"
 
     def cone(self, source: object) -> Cone:
         """MuJoCo's friction in place of this law. Raises InputError, naming `source` (the scenario)
@@ -126,9 +131,12 @@ class FrictionLaw(NamedTuple):
     kernels."""
 
     kind: int
-    """RESET_INTEGRATOR or COULOMB."""
+    """RESET_INTEGRATOR, COULOMB or OWN."""
     constants: Table
-    """The fields of ResetConstants or CoulombConstants as an array."""
+    """The fields of ResetConstants or CoulombConstants, or of the constants of `own`, as an
+    array."""
+    own: FrictionFunctions | None = None
+    """Functions of the law OWN."""
 
 
 class TangentSlide(NamedTuple):
@@ -599,48 +607,89 @@ def time_to_coulomb_change(
     return first_zero(sign * reserve, sign * reserve_rate, 0.0, horizon)
 
 
-# Functions of the ground's law: each calls the function of the reset integrator or of Coulomb.
+# Laws of plug-ins.
 
 
-def by_law(reset: F, coulomb: F) -> F:
-    """Combines the functions of the two friction laws into one function whose first argument is a
+@inlined
+def always_sticks(slide: Slide, law: Any) -> NextMode:
+    """Mode of a law without stiction: the node never begins to slip."""
+    zero, never = 0.0 * slide.normal, slide.normal < -math.inf
+    return NextMode((zero, zero), (never, never), (zero, zero))
+
+
+@inlined
+def endless_margin(slide: Slide, law: Any) -> float:
+    """Mode margin of a law without stiction: infinite."""
+    return math.inf
+
+
+@inlined
+def no_change(slide: Slide, acceleration: Vector2, rate: Real, horizon: Real, law: Any) -> Real:
+    """Time (s) to the next mode change of a law without stiction: the horizon."""
+    return horizon
+
+
+@dataclass(frozen=True)
+class FrictionFunctions(OwnFunctions):
+    """Functions of a plug-in's law of friction. The last three have defaults for laws without
+    stiction, whose force is a smooth function of velocity and normal force."""
+
+    force: Callable[..., Vector2]
+    """Friction (N) along both tangents, like reset_force(); arguments: slide, constants."""
+    damping: Callable[..., tuple[Real, Real, Real]]
+    """Damping matrix, like reset_damping(); arguments: slide, time (s), constants."""
+    next_mode: Callable[..., NextMode] = always_sticks
+    """Mode after a step, like next_reset_mode(); arguments: slide, constants."""
+    margin: Callable[..., float] = endless_margin
+    """Mode margin, like reset_margin(); arguments: slide, constants."""
+    time_to_change: Callable[..., Real] = no_change
+    """Time (s) to the next mode change, like time_to_reset_change(); arguments: slide,
+    acceleration, rate of the normal force, horizon, constants."""
+
+
+# Functions of the ground's law: each calls the function of the law that the ground has.
+
+
+def by_law(name: str, reset: F, coulomb: F) -> F:
+    """Combines the functions of all friction laws into one function whose first argument is a
     FrictionLaw.
 
     It calls the function of this law with the remaining arguments, then the law's constants.
-    `reset` is for the reset integrator, `coulomb` for Coulomb friction.
+    `reset` is for the reset integrator, `coulomb` for Coulomb friction; `name` is the function's
+    name in a FrictionFunctions.
     """
 
     @inlined
-    def call(friction: FrictionLaw, *more: Any) -> Any:
-        if friction.kind == COULOMB:
-            return coulomb(*more, named(CoulombConstants, friction.constants))
-        if friction.kind == RESET_INTEGRATOR:
-            return reset(*more, named(ResetConstants, friction.constants))
+    def shipped(law: Any, *more: Any) -> Any:
+        if law.kind == COULOMB:
+            return coulomb(*more, named(CoulombConstants, law.constants))
+        if law.kind == RESET_INTEGRATOR:
+            return reset(*more, named(ResetConstants, law.constants))
         raise ValueError("unknown law of friction")
 
-    return cast(F, call)
+    return cast(F, with_own(name, shipped))
 
 
-friction_force = by_law(reset_force, coulomb_force)
+friction_force = by_law("force", reset_force, coulomb_force)
 """Friction (N) along both tangents on a node that touches the ground; arguments: slide."""
 
-friction_damping = by_law(reset_damping, coulomb_damping)
+friction_damping = by_law("damping", reset_damping, coulomb_damping)
 """Damping matrix of the friction for an implicit step: components 11, 12 and 22 of the stiff part
 of -(time d/dv + time² d/dx); arguments: slide, time (s)."""
 
-next_mode = by_law(next_reset_mode, next_coulomb_mode)
+next_mode = by_law("next_mode", next_reset_mode, next_coulomb_mode)
 """Friction mode (NextMode) at the end of a step, for a node that stays on the ground; arguments:
 slide."""
 
-friction_margin = by_law(reset_margin, coulomb_margin)
+friction_margin = by_law("margin", reset_margin, coulomb_margin)
 """Mode margin of a node on the ground: positive until its friction mode changes, zero at the
 change. Only the sign has a meaning. Arguments: slide."""
 
-time_to_friction_change = by_law(time_to_reset_change, time_to_coulomb_change)
+time_to_friction_change = by_law("time_to_change", time_to_reset_change, time_to_coulomb_change)
 """Time (s) to the next change of the friction mode of a node, at most a horizon; arguments: slide,
 acceleration along the tangents, rate of the normal force (N/s), horizon (s)."""
 
 
-Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]
-"""Settings of friction, of either kind. Without a YAML tag such as !Coulomb they are a
+Friction = Annotated[ResetIntegrator | Coulomb, Kinds(FrictionKind)]
+"""Settings of friction, of any kind. Without a YAML tag such as !Coulomb they are a
 ResetIntegrator."""

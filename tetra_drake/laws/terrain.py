@@ -410,7 +410,9 @@ class HeightField(Relief):
         return Grid(heights, (x, y), (self.cell, self.cell))
 
 
-Terrain = Annotated[Flat | Nothing | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
+Terrain = Annotated[
+    Flat | Nothing | Incline | Steps | Rough | Obstacles | HeightField, Kinds(Relief)
+]
 
 
 def _check_size(cell: tuple[float, float], scale: float, source: object, key: str) -> None:

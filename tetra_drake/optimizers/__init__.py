@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+import importlib
 
 from tetra_drake.machine import check_package
 from tetra_drake.optimizers.base import MakeOptimizer
-from tetra_drake.optimizers.cma_es import CmaEsOptimizer
-from tetra_drake.optimizers.generational import Generational
-from tetra_drake.optimizers.quality_diversity import QualityDiversityOptimizer
-from tetra_drake.optimizers.steady_state import SteadyStateOptimizer
-from tetra_drake.scenario import optimizer_kinds as kinds
-
-OPTIMIZERS: dict[type, Any] = {
-    kinds.SteadyState: SteadyStateOptimizer,
-    kinds.CmaEs: CmaEsOptimizer,
-    kinds.RandomSearch: Generational,
-    kinds.QualityDiversity: QualityDiversityOptimizer,
-}
-"""Class of optimiser by kind. Its constructor takes the arguments of MakeOptimizer and
-`settings`."""
+from tetra_drake.optimizers.cma_es import CmaEsOptimizer as CmaEsOptimizer
+from tetra_drake.optimizers.generational import Generational as RandomSearchOptimizer  # noqa: F401
+from tetra_drake.optimizers.quality_diversity import (
+    QualityDiversityOptimizer as QualityDiversityOptimizer,
+)
+from tetra_drake.optimizers.steady_state import SteadyStateOptimizer as SteadyStateOptimizer
+from tetra_drake.scenario.optimizer_kinds import OptimizerSettings, QualityDiversity
 
 
-def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
-    """Function that makes an optimiser of the scenario's kind.
+def optimizer_of(kind: OptimizerSettings) -> MakeOptimizer:
+    """Function that makes an optimiser of the scenario's kind. Its module is imported on demand.
 
     Raises InputError if pyribs is missing.
     """
-    if isinstance(kind, kinds.QualityDiversity):
+    if isinstance(kind, QualityDiversity):
         check_package("ribs", extra="qd", source="optimizer")
-    return functools.partial(OPTIMIZERS[type(kind)], settings=kind)
+    make = getattr(importlib.import_module(kind.module), f"{kind.tag}Optimizer")
+    return functools.partial(make, settings=kind)

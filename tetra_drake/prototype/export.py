@@ -129,7 +129,7 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     """Loads on the actuators in a simulated motion, from its recorded `trajectory`: forces, speeds,
     travel and power of each driven cable, and at which times a limit of the actuator binds."""
     kind, constants = robot.scenario.actuation, robot.model.actuator
-    cables, limits = robot.structure.cables[robot.driven], actuator.Limits(*constants.limits)
+    cables, limits = robot.structure.cables[robot.driven], actuator.limits_of(constants)
     walk = trajectory.isel(cable=robot.driven)
     law, length, tension = CableLaw.of(cables), walk.length.values, walk.tension.values
     signal = trajectory.signal.values[:, cables["signal"]]

@@ -41,6 +41,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.metrics import METRICS, UNITS, Metrics, wrong_metric
+from tetra_drake.settings.plugins import check_plugins, plugins_of
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Section
 from tetra_drake.settings.units import INCH
@@ -83,6 +84,7 @@ class ResultFile(Section):
     wall_time_s: float = Field(gt=0)
     engine: str
     integrator: IntegratorWork
+    versions: dict[str, str]
     gait: Any
     """Gait in the form of GaitFile; None if the robot followed a command."""
     spread: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(default={})
@@ -134,7 +136,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
         "real_time_factor": result.duration / result.wall_time,
         "engine": result.engine,
         "integrator": result.integrator.model_dump(),
-        "versions": versions(scenario.engine.packages),
+        "versions": versions(scenario.engine.packages) | plugins_of(scenario),
         "gait": gait and gait.to_json(scenario),
         **({"spread": dict(result.spread)} if result.spread else {}),
         "path": {
@@ -162,11 +164,13 @@ def load_result(folder: str | Path) -> SimulationResult:
         if not os.path.isfile(folder / name):
             problem = f"holds no {name}, so it was not written by `simulate`"
             raise InputError(folder, name, problem)
-    scenario, path = load_scenario(folder / SCENARIO), folder / RESULT
+    path = folder / RESULT
     content = read_json(path, "result")
     if isinstance(content, dict):
         content = {name: content[name] for name in ResultFile.model_fields if name in content}
     file = ResultFile.from_tree(content, path)
+    check_plugins(file.versions, folder)
+    scenario = load_scenario(folder / SCENARIO)
     metrics = dict.fromkeys([*METRICS, "lifted_shares"], "") | file.metrics
     if wrong := wrong_metric(metrics):
         raise InputError(path, f"metrics.{wrong}", "is missing, or of a wrong type")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.laws.actuator import Limits
+from tetra_drake.laws.actuator import limits_of
 from tetra_drake.laws.cable import CableLaw, elastic_energy, elastic_tension
 from tetra_drake.robot.signals import DrivenRobot
 from tetra_drake.robot.structure import node_positions
@@ -38,7 +38,7 @@ def speed_limit(driven: DrivenRobot) -> float:
     stretch = length - law.free_length
     if structure.slack:
         stretch = np.maximum(stretch, 0.0)
-    pull = Limits(*robot.model.actuator.limits).max_force
+    pull = limits_of(robot.model.actuator).max_force
     if math.isnan(pull):  # actuators without limits
         pull = max(abs(cpg.gain * cpg.external_input), np.abs(driven.samples).max(initial=0.0))
     # A pull is at most the force that stretches the cable by its whole length.

@@ -78,5 +78,5 @@ class Mujoco(EngineSettings):
     """Time step. A simulation fails at once if it is too long for springs and dampers."""
 
 
-EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds()]
+EngineKind = Annotated[Drake | Compiled | Mujoco, Kinds(EngineSettings)]
 """Engine of a scenario, with its settings. A mapping without a tag is a Drake."""

@@ -1,6 +1,7 @@
 """JSON Schemas of scenario files and structure files, and the page of all keys made from them.
 
-`python -m tetra_drake.scenario.keys` writes all three.
+`python -m tetra_drake.scenario.keys` writes all three. Kinds of plug-ins that are installed are
+among the others.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Optimisers that a scenario can choose, and their settings."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metrics import UNITS
+from tetra_drake.settings.plugins import OPTIMIZERS
 from tetra_drake.settings.quantities import Time, by_name
 from tetra_drake.settings.refusals import refuse
 from tetra_drake.settings.section import Kinds, Section
@@ -13,7 +14,15 @@ MOST_GAITS = 100_000
 """Largest number of gaits in a population or a sample."""
 
 
-class SteadyState(Section):
+class OptimizerSettings(Section):
+    """Base class of the settings of an optimiser. A scenario chooses the optimiser by its kind."""
+
+    module: ClassVar[str] = "tetra_drake.optimizers"
+    """Module of the optimiser: a class that has the name of the kind and "Optimizer", such as
+    CmaEsOptimizer. It takes the arguments of optimizers.base.MakeOptimizer, and `settings`."""
+
+
+class SteadyState(OptimizerSettings):
     """Settings of the thesis's evolutionary algorithm (its Table 6, section 2.3, appendix A)."""
 
     population: int = Field(default=50, ge=2, le=MOST_GAITS)
@@ -40,7 +49,7 @@ class SteadyState(Section):
     """Iteration before which no trial ends early."""
 
 
-class CmaEs(Section):
+class CmaEs(OptimizerSettings):
     """Settings of covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
 
     Vectors of gait parameters are drawn from a normal distribution that adapts to the fittest. A
@@ -60,14 +69,14 @@ class CmaEs(Section):
     take at most half of the evaluations, so there may be fewer."""
 
 
-class RandomSearch(Section):
+class RandomSearch(OptimizerSettings):
     """Random search, a baseline for other optimisers: all gaits are random. It has no settings."""
 
 
 CellCount = Annotated[int, Field(ge=2, le=1000)]
 
 
-class QualityDiversity(Section):
+class QualityDiversity(OptimizerSettings):
     """Settings of a search for a map of two metrics with the fittest gait in each cell.
 
     It needs the package's extra `qd`. The method is CMA-MAE by pyribs (Fontaine and Nikolaidis,
@@ -97,5 +106,7 @@ class QualityDiversity(Section):
         return self
 
 
-OptimizerKind = Annotated[SteadyState | CmaEs | RandomSearch | QualityDiversity, Kinds()]
+OptimizerKind = Annotated[
+    SteadyState | CmaEs | RandomSearch | QualityDiversity, Kinds(OptimizerSettings, OPTIMIZERS)
+]
 """Optimiser of a scenario, with its settings. A mapping without a tag is a SteadyState."""

@@ -249,7 +249,7 @@ class PythonPolicy(PolicyKind):
         return np.asarray(robots.actuation.signals(actions, robots.cables.law), dtype=float)
 
 
-Policy = Annotated[RollingPolicy | LinearPolicy | NetworkPolicy | PythonPolicy, Kinds()]
+Policy = Annotated[RollingPolicy | LinearPolicy | NetworkPolicy | PythonPolicy, Kinds(PolicyKind)]
 """A policy of any kind, with its settings. A mapping without a tag is a !Rolling."""
 
 

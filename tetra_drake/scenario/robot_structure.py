@@ -7,13 +7,14 @@ up), near a static equilibrium. FORMAT.md describes the format of the files.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import operator
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import pydantic
@@ -22,7 +23,7 @@ from pydantic import Field
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_stretch
 from tetra_drake.laws.model import WORLD
 from tetra_drake.scenario.blueprint import LONGEST, Blueprint, GivenInertia
-from tetra_drake.scenario.metrics import ROW
+from tetra_drake.scenario.robot_settings import RobotSettings
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.structure_graph import (
     Member,
@@ -32,7 +33,7 @@ from tetra_drake.scenario.structure_graph import (
     struts_by_name,
     with_joints,
 )
-from tetra_drake.scenario.tolerances import Tolerances, check_tolerances, split_tolerances
+from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
     Density,
@@ -49,7 +50,6 @@ from tetra_drake.settings.refusals import described, hint, refuse
 from tetra_drake.settings.section import (
     Kinds,
     Section,
-    Tree,
     Varied,
     mapped,
     parts_of,
@@ -233,13 +233,11 @@ class JoinedBody(Section):
         return GivenInertia(self.mass, centre, inertia)
 
 
-class StructureFile(Section):
+class StructureFile(RobotSettings):
     """A tensegrity: nodes, struts, cables and the oscillators that actuate cables."""
 
     tag: ClassVar[str] = "Structure"
     keys_of_files: ClassVar = {"file": "Name or file of a structure; the other keys change it."}
-    lacking: ClassVar[tuple[str, ...]] = (ROW,)
-    """Properties that some metrics need and this robot does not have."""
 
     format: Literal[1] = Field(default=1, exclude=True)
     """Version of the format of the file."""
@@ -289,24 +287,6 @@ class StructureFile(Section):
     """Tolerances of numbers of the robot by key, such as `cables.side.stiffness: 2 %`,
     `struts.bar.length: 1 mm` or `nodes: 1 mm`; or in the text of a number, such as `200 N/m ± 2
     %`. They do not change the robot; td.predict and td.fit use them."""
-
-    _split = pydantic.model_validator(mode="before")(split_tolerances)
-
-    @property
-    def body_count(self) -> int:
-        """Number of rigid bodies."""
-        return len(self._nodes_of_bodies())
-
-    @property
-    def size(self) -> float:
-        """Length (m) of the shortest strut, or of the shortest cable if there are no struts; the
-        unit of `disturbances.start`."""
-        return self.blueprint().shortest
-
-    def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """Further changes that follow from `changes` to the robot `base`: none for structures, so
-        the mapping is empty. Rows of tetrahedra adapt their spacing."""
-        return {}
 
     def blueprint(self) -> Blueprint:
         """The robot with its nodes at the positions of the file.
@@ -622,12 +602,37 @@ class StructureFile(Section):
                 drivers[cable] = oscillator
 
 
-RobotKind = Annotated[Tetrahedra | StructureFile, Kinds()]
-"""Robot of a scenario: a row of tetrahedra or a structure. A mapping without a tag is a Tetrahedra.
+class ParametricRobot(RobotSettings):
+    """Base class for the settings of a robot of a plug-in: numbers from which a structure is
+    made."""
 
-All have `gravity`, `offsets` (one for each body), `body_count`, `size`, `lacking` (see
-scenario.metrics), `unit`, `blueprint()` and `implied_changes()`.
-"""
+    unit: ClassVar[None] = None
+
+    gravity: Acceleration = Field(default=9.80665, ge=0)
+    """Acceleration of gravity."""
+    offsets: list[Position] = Field(default=[])
+    """Displacement [x, y, z] of each body at t = 0; none if empty."""
+    tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
+    """Tolerances of numbers of the robot by key."""
+
+    def structure(self) -> StructureFile:
+        """The structure for these settings. Its gravity, offsets and tolerances are not used."""
+        raise NotImplementedError
+
+    def blueprint(self) -> Blueprint:
+        """The robot with its nodes at the positions of the structure."""
+        made = self.structure().blueprint()
+        return dataclasses.replace(made, offsets=np.array(self.offsets or made.offsets))
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Self:
+        self.blueprint().check_sizes()
+        return check_tolerances(self)
+
+
+RobotKind = Annotated[Tetrahedra | StructureFile, Kinds(RobotSettings)]
+"""Robot of a scenario: a row of tetrahedra or a structure. A mapping without a tag is a
+Tetrahedra."""
 
 
 def cable_numbers(names: Iterable[str]) -> dict[str, int]:

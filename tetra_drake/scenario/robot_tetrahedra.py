@@ -12,7 +12,8 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tetra_drake.laws.cable import CableConstants, CableLaw, elastic_tension
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.tolerances import Tolerances, check_tolerances, split_tolerances
+from tetra_drake.scenario.robot_settings import RobotSettings
+from tetra_drake.scenario.tolerances import Tolerances, check_tolerances
 from tetra_drake.settings.quantities import (
     Acceleration,
     Density,
@@ -79,14 +80,12 @@ class RowCables(CableConstants):
 Spacing = Annotated[float, *quantity("m", balanced=0.0)]
 
 
-class Tetrahedra(Section):
+class Tetrahedra(RobotSettings):
     """Row of nested tetrahedra with its initial positions (thesis section 2.1, appendix C.1)."""
 
     unit: ClassVar[None] = None
     """Unit of bare coordinates in a file; this robot has no coordinates."""
-
-    lacking: ClassVar[tuple[str, ...]] = ()
-    """Properties that some metrics need and this robot does not have."""
+    lacking = ()
 
     tetrahedra: int = Field(ge=2, le=200)
     """Number of tetrahedra; T1 is the rearmost."""
@@ -119,13 +118,7 @@ class Tetrahedra(Section):
     tolerances: Tolerances = Field(default={}, exclude_if=operator.not_)
     """Tolerances of numbers of the robot by key, such as `cables.outer_stiffness: 2 %`."""
 
-    _split = model_validator(mode="before")(split_tolerances)
     _check_known = model_validator(mode="after")(check_tolerances)
-
-    @property
-    def body_count(self) -> int:
-        """Number of rigid bodies."""
-        return self.tetrahedra
 
     @property
     def size(self) -> float:

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
@@ -83,6 +83,8 @@ MOST_SAMPLES = 2_000_000
 
 class Scenario(Section):
     """Scenario: all settings of an experiment except the gait."""
+
+    model_config = ConfigDict(defer_build=True)
 
     keys_of_files: ClassVar = {"base": "Name or file of a scenario that has the other values."}
 

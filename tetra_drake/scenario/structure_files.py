@@ -15,7 +15,7 @@ from tetra_drake.scenario.mjcf_file import is_mjcf
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.ntrt_file import NtrtFile
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.shipped import STRUCTURES, shipped_scenarios, shipped_structures
+from tetra_drake.scenario.shipped import named_structure, shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_graph import members
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 from tetra_drake.settings.refusals import TAG, described, no_such
@@ -33,15 +33,15 @@ any."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
-    """Reads a structure: a shipped one by name, or a structure file, file of NTRT or MJCF file by
-    path.
+    """Reads a structure: one of the package or of a plug-in by name, or a structure file, file of
+    NTRT or MJCF file by path.
 
     `unit`, such as "dm", is the unit of length of coordinates without a unit. A file of NTRT (NASA
     Tensegrity Robotics Toolkit) needs it. Raises InputError that names file and key.
     """
     file = structure_file(str(name_or_file), Path())
     if not os.path.exists(file):
-        problem = no_such("structure file", str(name_or_file), shipped_structures())
+        problem = no_such("structure file", str(name_or_file), structure_names())
         raise InputError(name_or_file, "", problem)
     content = _tree_of_file(file, unit, source=file, key="unit")
     return _structure(content | ({"unit": unit} if unit else {}), file)
@@ -59,8 +59,8 @@ def names_scenario(name_or_file: str | Path) -> bool:
     """True if a name or a file means a scenario. A name that a scenario and a structure share means
     the structure."""
     name = str(name_or_file)
-    if name in shipped_structures() or not os.path.isfile(name):
-        return name in shipped_scenarios() and name not in shipped_structures()
+    if name in structure_names() or not os.path.isfile(name):
+        return name in shipped_scenarios() and name not in structure_names()
     if is_mjcf(name):
         return False
     keys = [*keys_of(StructureFile), *keys_of(NtrtFile), *SCENARIO_KEYS]
@@ -69,8 +69,9 @@ def names_scenario(name_or_file: str | Path) -> bool:
 
 
 def structure_file(name: str, folder: Path) -> Path:
-    """The file of a shipped structure; for another name, the path relative to `folder`."""
-    return STRUCTURES / f"{name}.yaml" if name in shipped_structures() else folder / name
+    """The file of a structure of the package or of a plug-in; for another name, the path relative
+    to `folder`."""
+    return named_structure(name) if name in structure_names() else folder / name
 
 
 def with_structure(tree: Tree, source: object) -> Tree:
@@ -87,7 +88,7 @@ def with_structure(tree: Tree, source: object) -> Tree:
     changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
     name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
-        problem = no_such("structure file", str(name), shipped_structures())
+        problem = no_such("structure file", str(name), structure_names())
         raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")

@@ -143,7 +143,9 @@ def _in_words(error: ErrorDetails, value: Any, members: list[Tree]) -> tuple[str
     if kind == "list_type":
         return "", f"{found}, expected a list" + (f", [{value}]" if isinstance(value, str) else "")
     if kind.startswith("union_tag"):
-        return "", f"{found}; {hint(found, [one['title'] for one in members if 'title' in one])}"
+        tags = [one["title"] for one in members if "title" in one]
+        known = f"expected {' or '.join(tags)}; a plug-in may be missing"
+        return "", f"{found}; {known if isinstance(value, dict) else hint(found, tags)}"
     expected = re.sub(".* should (be|have) ", "", error["msg"]).replace(" after validation", "")
     expected = re.sub("(a valid dict|Extra inputs).*", "a mapping of keys", expected)
     unit = next((member["unit"] for member in members if "unit" in member), "")

@@ -25,6 +25,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema
 
 from tetra_drake.errors import InputError
+from tetra_drake.settings.plugins import KINDS, entries, loaded, refusal
 from tetra_drake.settings.quantities import EMPTY, Quantity
 from tetra_drake.settings.refusals import TAG, Tree, input_error, joined
 from tetra_drake.settings.units import plainest
@@ -63,18 +64,18 @@ def _complete_schema(schema: Tree, section: type[Section]) -> None:
 @functools.cache
 def attribute_docstrings(owner: type) -> dict[str, str]:
     """Docstrings of the attributes of a class and of its bases, by the attribute's name: the texts
-    below annotated attributes in the source. Empty for classes outside tetra_drake.
+    below annotated attributes in the source. Empty for classes of a notebook or script.
 
     The source is parsed only when this is called. pydantic's use_attribute_docstrings would parse
     it at every import of the package, which takes 0.15 s.
     """
-    if not owner.__module__.startswith("tetra_drake"):
+    if owner.__module__.startswith(("builtins", "pydantic", "typing", "__main__")):
         return {}
     texts: dict[str, str] = {}
     for base in reversed(owner.__bases__):
         texts |= attribute_docstrings(base)
-    (node,) = [node for node in _classes_of(owner.__module__) if node.name == owner.__name__]
-    for attribute, text in itertools.pairwise(node.body):
+    bodies = [node.body for node in _classes_of(owner.__module__) if node.name == owner.__name__]
+    for attribute, text in itertools.pairwise(bodies[0] if bodies else []):
         if isinstance(attribute, ast.AnnAssign) and isinstance(text, ast.Expr):
             words = inspect.cleandoc(ast.literal_eval(text.value))
             texts[ast.unparse(attribute.target)] = words
@@ -180,14 +181,28 @@ SI."""
 
 
 class Kinds:
-    """Annotation of a union of sections, such as Annotated[Force | Winch, Kinds()]. In a file, a
-    tag such as `!Winch` chooses the type of a mapping; a mapping without a tag is of the first type
-    of the union."""
+    """Annotation of a union of sections, such as Annotated[Force | Winch, Kinds(ActuatorKind)]. In
+    a file, a tag such as `!Winch` chooses the type of a mapping; a mapping without a tag is of the
+    first type of the union.
+
+    With a `base` class, installed plug-ins can add types that derive from it, by entry points of a
+    `group`. A section with such a union is built when it is first used (defer_build), because
+    plug-ins import this package.
+    """
+
+    bases: ClassVar[dict[str, tuple[type, ...]]] = {}
+    """Base classes of the kinds that plug-ins can add to, by group."""
+
+    def __init__(self, base: type[Section] | None = None, group: str = KINDS) -> None:
+        self.base, self.group = base, group
+        self.bases[group] = *self.bases.get(group, ()), *([base] if base else ())
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
     ) -> CoreSchema:
         kinds = typing.get_args(source)
+        if self.base:
+            kinds += (*self._added({kind.tag for kind in kinds}, self.base),)
 
         def tag_of(value: Any) -> str | None:
             if isinstance(value, dict | None):
@@ -198,6 +213,19 @@ class Kinds:
         union: Any = Union[tuple(tagged)]  # noqa: UP007
         write = pydantic.WrapSerializer(lambda kind, dump: {TAG: kind.tag} | dump(kind))
         return handler.generate_schema(Annotated[union, Discriminator(tag_of), write])
+
+    def _added(self, tags: set[str], base: Any) -> Iterator[type]:
+        """Kinds of plug-ins that derive from `base`. Raises InputError for a class that no union
+        takes, or whose tag is not the name of its entry point, or is one of `tags`."""
+        for name, entry in entries(self.group).items():
+            kind: Any = loaded(entry)
+            if not (isinstance(kind, type) and issubclass(kind, self.bases[self.group])):
+                expected = " or ".join(one.__name__ for one in self.bases[self.group])
+                raise refusal(entry, f"found {kind!r:.60}, expected a class of {expected}")
+            if issubclass(kind, base) and (kind.tag in tags or kind.tag != name):
+                raise refusal(entry, f"found !{kind.tag}, expected !{name}, which no kind here has")
+            if issubclass(kind, base):
+                yield kind
 
 
 def _hashable(value: Any) -> Any:

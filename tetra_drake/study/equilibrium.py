@@ -36,7 +36,7 @@ from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.robot.struts import MEETING, condensed, overlaps
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import GivenScenario, given_scenario, load_scenario
-from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
+from tetra_drake.scenario.shipped import shipped_scenarios, structure_names
 from tetra_drake.scenario.structure_files import names_scenario, read_structure
 from tetra_drake.settings.refusals import no_such
 from tetra_drake.study.linearization import (
@@ -198,9 +198,9 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     struts meet, as in plane models, all struts pass through each other. Raises InputError that
     names file and key.
     """
-    shipped = [*dict.fromkeys([*shipped_structures(), *shipped_scenarios()])]
-    if name_or_file not in shipped and not os.path.exists(name_or_file):
-        problem = no_such("structure or scenario", name_or_file, shipped)
+    known = [*dict.fromkeys([*structure_names(), *shipped_scenarios()])]
+    if name_or_file not in known and not os.path.exists(name_or_file):
+        problem = no_such("structure or scenario", name_or_file, known)
         raise InputError(name_or_file, "", problem)
     is_scenario = names_scenario(name_or_file)
     if is_scenario:

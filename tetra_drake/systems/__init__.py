@@ -1,4 +1,7 @@
-"""LeafSystems of the diagram: ports, state and events. The laws are in `laws`."""
+"""LeafSystems of the diagram: ports, state and events. The laws are in `laws`.
+
+Diagrams of these systems convert to AutoDiffXd and can be cloned; see `scalar_conversion`.
+"""
 
 from tetra_drake.robot.structure import AddFrame as AddFrame
 from tetra_drake.systems.attachment import Attach as Attach

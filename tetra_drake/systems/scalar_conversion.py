@@ -5,6 +5,10 @@ The laws are compiled for floats, so there is no second version of them for Auto
 a system takes values from the system itself, and derivatives from central differences (relative
 errors of about 1e-9). Where a law has a kink, as where a cable goes slack, a derivative is the mean
 of both sides.
+
+Drake's plants lose the default poses of free bodies in a conversion, so a context of a converted or
+cloned robot needs SetTimeStateAndParametersFrom(). Drake's Linearize refuses diagrams with discrete
+states beside continuous ones, as a ground has.
 """
 
 from __future__ import annotations

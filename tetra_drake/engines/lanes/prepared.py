@@ -13,7 +13,7 @@ from tetra_drake.engines.lanes.dynamics import Solver
 from tetra_drake.engines.lanes.loop import Constants, LaneState
 from tetra_drake.engines.lanes.tables import shared
 from tetra_drake.kernels.packed import allocate
-from tetra_drake.laws.actuator import DRIVE, Limits
+from tetra_drake.laws.actuator import DRIVE, limits_of
 from tetra_drake.laws.forces import sizes_of
 from tetra_drake.laws.oscillator import make_neurons
 from tetra_drake.results.result import motion_times
@@ -65,7 +65,7 @@ class Prepared:
         }
 
         # Heun's method is stable for an actuator up to its time constant (NaN if it has none).
-        max_step = np.fmin(engine.max_step, Limits(*model.actuator.limits).time_constant)
+        max_step = np.fmin(engine.max_step, limits_of(model.actuator).time_constant)
         ground = model.ground._replace(heights=None)  # lanes have different numbers of heights
         constants = Constants(
             robot=solver.oriented(model)._replace(ground=ground),

@@ -1,0 +1,212 @@
+"""Plug-ins: what they add, and one line for each that is damaged or missing."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import pytest
+from helpers.plugin import declare, install_example
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import read_manifest
+from tetra_drake.laws.friction import Coulomb, FrictionKind, ResetIntegrator
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.settings import plugins
+from tetra_drake.settings.refusals import TAG
+from tetra_drake.settings.section import Kinds, Section, parts_in
+
+SCENARIO = """\
+format: 1
+base: prism
+name: all-added
+robot: !Scaled {factor: 1.2}
+friction: !Viscous {damping: 5 N*s/m}
+terrain: !Waves {height: 2 mm, wavelength: 30 cm}
+actuation: !Servo {max_force: 20 N, max_speed: 0.2 m/s}
+policy: !Sine {}
+optimizer: !HillClimb {step: 0.2}
+engine: !Drake {}
+simulation: {duration: 4 ms, steady_from: 1 ms, sample_period: 1 ms}
+evolution: {trials: 1, evaluations: 2}
+"""
+TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Sine", "HillClimb"]
+
+USE = """\
+import json, sys
+import tetra_drake as td
+from tetra_drake.report.result_folder import save_result
+from tetra_drake.scenario.keys import keys_page, schema_text
+from tetra_drake.scenario.structure_files import read_structure
+
+if __name__ == "__main__":
+    scenario = td.load_scenario(sys.argv[1])
+    save_result("result.json", td.simulate(scenario, td.seeded_gait(scenario)))
+    run = td.evolve(scenario, "run", report=False, reevaluate=False)
+    print(json.dumps({
+        "page": keys_page(),
+        "schema": schema_text(),
+        "bodies": read_structure("hanging_bar").blueprint().bodies,
+        "read back": td.load_run("run").scenario == scenario,
+        "evaluations": len(run.evaluations),
+    }))
+"""
+
+
+def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> dict:
+    """Runs a program in a folder where the file scenario.yaml uses the plug-ins of `site`; returns
+    the JSON that it prints."""
+    (folder / "scenario.yaml").write_text(SCENARIO)
+    (folder / "use.py").write_text(program)
+    paths = [str(site), str(Path(plugins.__file__).parents[2])]
+    settings = {"PYTHONPATH": os.pathsep.join(paths), "NUMBA_DISABLE_JIT": str(int(not jit))}
+    command = [sys.executable, "use.py", "scenario.yaml"]
+    done = subprocess.run(
+        command, cwd=folder, env=os.environ | settings, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_a_plugin_adds_one_of_each_and_records_name_it(tmp_path):
+    site = tmp_path / "site"
+    install_example(site)
+    found = run_with(site, tmp_path, USE)
+    assert found["read back"] and found["evaluations"] == 2
+    assert found["bodies"] == ["bar"]
+    titles = {
+        part["title"]
+        for part in parts_in(json.loads(found["schema"]))
+        if isinstance(part, dict) and isinstance(part.get("title"), str)
+    }
+    for tag in TAGS:
+        assert f"!{tag}`" in found["page"] and f"!{tag}" in titles
+    assert "Friction divided by velocity." in found["page"]
+
+    for file in (tmp_path / "result.json", tmp_path / "run/manifest.json"):
+        assert json.loads(file.read_text())["versions"]["plug-in tetra-example"] == "0.1"
+    with pytest.raises(InputError, match=r"plug-in tetra-example 0\.1, which is not") as refused:
+        read_manifest(tmp_path / "run")
+    assert refused.value.key == "versions"
+    with pytest.raises(InputError, match="!Structure; a plug-in may be missing") as refused:
+        load_scenario(tmp_path / "scenario.yaml")
+    assert refused.value.key == "robot"
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    """A folder where Python looks for packages; plug-ins are searched anew."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "odd", raising=False)
+    plugins.entries.cache_clear()
+    yield tmp_path
+    plugins.entries.cache_clear()
+
+
+def build() -> type[Section]:
+    """A section with a union that plug-ins can add to. Building it imports all kinds."""
+
+    class Floor(Section):
+        friction: Annotated[ResetIntegrator | Coulomb, Kinds(FrictionKind)] = Coulomb()
+
+    return Floor
+
+
+KIND = "from tetra_drake.laws.friction import Coulomb\nclass {}(Coulomb): pass\n"
+
+
+def test_a_kind_of_a_plugin_is_one_of_the_union(site):
+    (site / "sticky.py").write_text(KIND.format("Sticky"))
+    declare(site, "sticky", "2.0", {plugins.KINDS: {"Sticky": "sticky:Sticky"}})
+    friction = build().from_tree({"friction": {TAG: "Sticky", "static": 0.7}}, "mine").friction
+    assert (friction.tag, friction.static) == ("Sticky", 0.7)
+    assert plugins.plugins_of([("friction", friction)]) == {"plug-in sticky": "2.0"}
+    assert plugins.plugins_of([("friction", Coulomb())]) == {}
+
+
+DAMAGED = {
+    "missing": ("", "nowhere:Odd", "No module named 'nowhere'"),
+    "without the class": ("", "odd:Odd", "has no attribute 'Odd'"),
+    "fails": ("1 / 0", "odd:Odd", "ZeroDivisionError: division by zero"),
+    "ends Python": ("import sys; sys.exit(3)", "odd:Odd", "SystemExit: 3"),
+    "no Python": ("class", "odd:Odd", "SyntaxError"),
+    "no reference": ("", "odd odd", "odd odd"),
+    "a number": ("Odd = 3", "odd:Odd", "found 3, expected a class of "),
+    "another class": (
+        "class Odd: pass",
+        "odd:Odd",
+        "expected a class of ",
+    ),
+    "another tag": (KIND.format("Even"), "odd:Even", "found !Even, expected !Odd"),
+    "imports itself": ("import tetra_drake as td; td.load_scenario()", "odd:Odd", "cannot import"),
+}
+
+
+@pytest.mark.parametrize(("text", "value", "problem"), DAMAGED.values(), ids=DAMAGED)
+def test_a_damaged_plugin_is_one_line_that_names_it(site, text, value, problem):
+    (site / "odd.py").write_text(text + "\n")
+    declare(site, "odd-kinds", "0.3", {plugins.KINDS: {"Odd": value}})
+    for _ in range(2):  # and again at the next use
+        with pytest.raises(InputError, match=r"\.") as refused:
+            build()
+        assert str(refused.value).startswith("plug-in odd-kinds 0.3: tetra_drake.kinds.Odd: ")
+        assert problem in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_name_belongs_to_one_kind(site):
+    (site / "odd.py").write_text(KIND.format("Coulomb"))
+    declare(site, "one", "1", {plugins.KINDS: {"Coulomb": "odd:Coulomb"}})
+    with pytest.raises(InputError, match="found !Coulomb, expected !Coulomb, which no kind here"):
+        build()
+    declare(site, "two", "1", {plugins.KINDS: {"Coulomb": "odd:Coulomb"}})
+    plugins.entries.cache_clear()
+    with pytest.raises(InputError, match=r"plug-in (one|two) 1 as well"):
+        build()
+
+
+@pytest.mark.parametrize("file", ["METADATA", "entry_points.txt"])
+def test_damaged_metadata_is_one_line(site, file):
+    declare(site, "odd-kinds", "0.3", {plugins.KINDS: {"Odd": "odd:Odd"}})
+    (site / "odd_kinds-0.3.dist-info" / file).write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="damaged metadata of a package") as refused:
+        build()
+    assert refused.value.key == plugins.KINDS
+
+
+def test_a_structure_of_a_plugin_without_its_file_is_one_line(site):
+    (site / "bars.py").write_text("")
+    declare(site, "bars", "1", {plugins.STRUCTURES: {"lost_bar": "bars"}})
+    tree = {"robot": {TAG: "Structure", "file": "lost_bar"}}
+    with pytest.raises(InputError, match=r"plug-in bars 1: .*found no file lost_bar\.yaml"):
+        load_scenario("prism").with_file(tree, "mine")
+
+
+def test_plugins_are_not_searched_by_an_import():
+    program = "import tetra_drake.cli, tetra_drake.experiment\n"
+    program += (
+        "from tetra_drake.settings.plugins import entries; print(entries.cache_info().misses)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.split() == ["0"]
+
+
+COMPARE = """\
+import json, sys
+import tetra_drake as td
+
+if __name__ == "__main__":
+    scenario = td.load_scenario(sys.argv[1]).with_changes({"simulation.duration": "0.5 s"})
+    gait = td.seeded_gait(scenario)
+    results = [td.simulate(scenario.on_engine(name), gait) for name in ("drake", "compiled")]
+    print(json.dumps([result.metrics.to_json() for result in results]))
+"""
+
+
+@pytest.mark.slow
+def test_laws_of_a_plugin_are_compiled_for_every_engine(tmp_path):
+    install_example(tmp_path / "site")
+    drake, lanes = run_with(tmp_path / "site", tmp_path, COMPARE, jit=True)
+    for name in ("distance", "tension", "peak_actuator_force"):
+        assert lanes[name] == pytest.approx(drake[name], rel=0.02), name

@@ -1,0 +1,90 @@
+"""Laws with functions of their own, which plug-ins bring along.
+
+All kernels contain all laws of this package, and choose between them by a number. A law of a
+plug-in has an OwnFunctions. Its numba type contains the functions. So kernels are compiled anew for
+the robots that have this law, and its functions become part of their machine code, as fast as the
+package's own. Kernels for all other robots stay as they are.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+import sys
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numba import types
+from numba.extending import overload, typeof_impl
+
+from tetra_drake.kernels.compiling import INLINED, F
+from tetra_drake.kernels.lanes import Table, named
+
+
+@dataclass(frozen=True)
+class OwnFunctions:
+    """Base class of the functions of a law that kernels call. Fields are functions decorated with
+    `inlined`, whose last argument is the law's constants."""
+
+    constants: Any
+    """Class of the law's constants: a NamedTuple of numbers."""
+
+    def table(self, settings: object) -> Table:
+        """Constants from settings, whose attributes have the same names, as an array."""
+        return np.array([getattr(settings, name) for name in self.constants._fields], dtype=float)
+
+
+class OwnType(types.Type):
+    """Numba type of the functions of one law. Its name, by which machine code is cached, contains a
+    digest of the source of their package."""
+
+    def __init__(self, functions: OwnFunctions) -> None:
+        self.functions = functions
+        given = [getattr(functions, field.name) for field in fields(functions)]
+        names = [f"{one.__module__}.{one.__qualname__}" for one in given]
+        sources = {path for one in given for path in _sources(one.__module__)}
+        digest = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(sources)))
+        super().__init__(name=f"Own({', '.join(names)}, {digest.hexdigest()})")
+
+
+def _sources(module: str) -> list[Path]:
+    """Source files of the package that a module belongs to; its own file if it is in none."""
+    file = Path(inspect.getfile(sys.modules[module])).resolve()
+    depth = module.count(".") + (file.stem == "__init__")
+    return [*file.parents[depth - 1].rglob("*.py")] if depth else [file]
+
+
+_own_type = functools.cache(OwnType)
+
+typeof_impl.register(OwnFunctions)(lambda functions, context: _own_type(functions))
+
+
+def with_own(name: str, shipped: F) -> F:
+    """Function of a law, which is its first argument.
+
+    If the law has an OwnFunctions in the attribute `own`, it calls the function `name` of them with
+    the remaining arguments, then the law's constants. Otherwise it calls `shipped` with all
+    arguments. Numba wants equal signatures: (law: Any, *more: Any).
+    """
+
+    def call(law: Any, *more: Any) -> Any:
+        if law.own is None:
+            return shipped(law, *more)
+        return getattr(law.own, name)(*more, named(law.own.constants, law.constants))
+
+    @overload(call, jit_options=INLINED)
+    def implementation(law: Any, *more: Any) -> Any:
+        kind = law.members[law.names.index("own")]  # law is a PackedKind
+        if not isinstance(kind, OwnType):
+            return shipped
+        function, constants = getattr(kind.functions, name), kind.functions.constants
+
+        def own(law: Any, *more: Any) -> Any:
+            return function(*more, named(constants, law.constants))
+
+        return own
+
+    return cast(F, call)
