@@ -35,8 +35,6 @@ PAGE, TEMPLATE = HERE / "paper/paper.md", HERE / "paper.md.jinja"
 SIZES = (1, 4, 7, 13)
 """Least numbers of bodies of the rows of the table by size."""
 MICRO = 1e6
-FAR = 0.1
-"""Difference of distances (in) on two engines that the paper counts."""
 
 
 def corpus_rows() -> pandas.DataFrame:
@@ -95,20 +93,30 @@ def agreement(runs: tables.Runs) -> dict[str, str | int]:
         "gaits": len(apart),
         "median": fixed(np.median(apart), 4),
         "largest": fixed(apart.max(), 2),
-        "far": int(np.sum(apart > FAR)),
+        "apart": fixed(tables.APART / INCH, 1),
+        "far": int(np.sum(apart > tables.APART / INCH)),
     }
 
 
+def released(citation: Path = CITATION) -> datetime.date:
+    """Day of the release that CITATION.cff names. Raises InputError if it names none."""
+    fields, key = parse_yaml(read_text(citation, "citation"), citation), "date-released"
+    given = fields.get(key) if isinstance(fields, dict) else None
+    try:
+        return datetime.date.fromisoformat(str(given))
+    except ValueError:
+        raise InputError(citation, key, f"is {given!r}, expected a day as 2026-01-31") from None
+
+
 def paper() -> str:
-    """Text of the paper. Its date is the day of the release that CITATION.cff names."""
-    released = parse_yaml(read_text(CITATION, "citation"), CITATION)["date-released"]
+    """Text of the paper, whose date is the day of the last release."""
     rows, runs = corpus_rows(), tables.load_all()
     measured, blind = measured_totals()
     trials = runs["thesis"].best_gaits
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     template = environment.from_string(read_text(TEMPLATE, "template"))
     return template.render(
-        date=f"{datetime.date.fromisoformat(str(released)):%-d %B %Y}",
+        date=f"{released():%-d %B %Y}",
         experiments=len(runs),
         evaluations=f"{trials['evaluations'].sum():,.0f}",
         corpus={

@@ -36,8 +36,6 @@ TUTORIALS = "diagrams/tutorials"
 RUNS = ROOT / "out/tutorials"
 """What tutorials print and draw, kept for the next build with the same sources."""
 PACKAGE, STUB = "tetra_drake", "tetra_drake/__init__.pyi"
-NO_PAGE = re.compile(r"\.template\.md$|^runs/paper/|^\.github/ISSUE_TEMPLATE/")
-"""Markdown that is no page of the site."""
 BESIDE = "runs/meshcat.js"
 """What replays load."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".cff": "yaml"}
@@ -88,6 +86,8 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         return [pages(part) for parts in each for part in parts]
 
     config.nav = pages(config.nav)
+    if address := config.extra["repository"]:
+        config.nav.append({"Repository": address})
     config.markdown_extensions.append(DoctestExtension())
     return config
 
@@ -96,8 +96,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Adds the pages, and all to which they lead."""
     names = tracked()
     folders = {str(folder) for name in names for folder in Path(name).parents}
-    todo = [name for name in names if name.endswith(".md") and not NO_PAGE.search(name)]
-    todo.append(BESIDE)
+    no_pages = {name for rest in config.extra["no_pages"] for name in fnmatch.filter(names, rest)}
+    todo = [name for name in names if name.endswith(".md") and name not in no_pages] + [BESIDE]
     for name in todo:  # which grows
         if name.endswith(".md"):
             text = (ROOT / name).read_text(encoding="utf-8")
@@ -111,7 +111,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         output = run(script, config.extra["tutorials"])
         files.append(File.generated(config, page_of(name), content=tutorial_page(script, output)))
         if output.picture:
-            files.remove(files.src_uris[picture])
+            if kept := files.get_file_from_path(picture):
+                files.remove(kept)
             files.append(File.generated(config, picture, abs_src_path=str(output.picture)))
     for page, module in (("api", PACKAGE), ("api_systems", f"{PACKAGE}.systems")):
         files.append(File.generated(config, f"{page}.md", content=api_page(module)))
@@ -120,7 +121,6 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Leads links to sources and folders to their pages."""
-
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]
 
@@ -215,6 +215,7 @@ def run(script: Path, wanted: str) -> Output:
         _log.info("Running %s", script.name)
         RUNS.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=RUNS) as work:
+            Path(work, "runs").symlink_to(ROOT / "runs")  # which tutorials read
             done = subprocess.run(
                 [sys.executable, script], cwd=work, capture_output=True, text=True
             )
@@ -223,6 +224,8 @@ def run(script: Path, wanted: str) -> Output:
                 if last.startswith("ModuleNotFoundError"):
                     return Output(reason=last)
                 raise PluginError(f"{script.name} failed: {last}")
+            if not Path(work, drawn).is_file():
+                raise PluginError(f"{script.name} drew no {drawn}")
             kept = Path(work, "kept")
             kept.mkdir()
             (kept / "printed.txt").write_text(done.stdout, encoding="utf-8")
@@ -244,6 +247,6 @@ def tutorial_page(script: Path, output: Output) -> str:
     text += ["## What it draws", f"![Picture of {script.name}]({script.stem}.png)"]
     if output.reason:
         text.append(
-            f"The picture is from the repository. This build did not run the script: {output.reason}"
+            f"The picture is the repository's. This build did not run the script: {output.reason}"
         )
     return "\n\n".join(text)

@@ -1,4 +1,4 @@
-"""The paper: it is as its records say, in the form that the journal wants, and cites what exists."""
+"""The paper: it is as its records say, in the form that the journal wants, and cites entries."""
 
 import re
 
@@ -13,6 +13,14 @@ ENTRIES = (paper.PAGE.parent / "paper.bib").read_text(encoding="utf-8")
 
 def test_the_paper_is_as_its_records_say():
     assert paper.paper() == TEXT
+
+
+@pytest.mark.parametrize("text", ["", "- 1", "version: 1.0", "date-released: soon"])
+def test_a_citation_without_a_day_is_refused(text, tmp_path, refused):
+    citation = tmp_path / "CITATION.cff"
+    citation.write_text(text)
+    with refused(citation, "date-released", "expected a day"):
+        paper.released(citation)
 
 
 def test_what_is_cited_is_in_the_bibliography_and_nothing_else():
