@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import jinja2
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
@@ -52,7 +53,8 @@ from tetra_drake.study.statistics import (
 )
 
 HERE = Path(__file__).parent / "bench"
-ENTRIES, RECORDS, PAGE_NAME, FIGURE = HERE / "entries", "records.jsonl", "README.md", "scores"
+TEMPLATE, ENTRIES = HERE.parent / "bench.md.jinja", HERE / "entries"
+RECORDS, PAGE_NAME, FIGURE = "records.jsonl", "README.md", "scores"
 SEEDS, EPISODES = 10, 250
 """Number of solutions of each entry to each task, and the budget of one in episodes."""
 DECIMALS = 6
@@ -428,8 +430,8 @@ def scores_figure(records: Sequence[Record]) -> Figure:
 def page(records: Sequence[Record]) -> str:
     """Text of the page, from the records."""
     about = "\n".join(f"- `{t.name}`: {t.about}; score in {t.unit}" for t in TASKS)
-    template = (HERE / "page.md").read_text("utf-8")
-    return template.format(
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
+    return environment.from_string(TEMPLATE.read_text("utf-8")).render(
         about=about,
         overall=overall_table(records).markdown(),
         tasks=task_table(records).markdown(),
