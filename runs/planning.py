@@ -619,10 +619,9 @@ work evenly.
 
 {costs}
 
-Wall times were measured for {walled} of the goals, on two cores of an AMD EPYC that were not free:
-the load average was {load}. So they tell how long a decision waits for others, and not what a
-planner alone on two cores keeps, which was not measured. *Deadlines kept* counts the decisions
-within half a second.
+Wall times were measured for {walled} of the goals, on two cores of an AMD EPYC without other work:
+the load average was {load}, the planner's own threads included. *Deadlines kept* counts the
+decisions within half a second of wall time.
 
 {walls}
 
