@@ -174,7 +174,7 @@ FOLDERS = (
     "diagrams",
     "runs",
     *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
-    *("runs/damage", "runs/measured", "runs/planning", "runs/rolling", "tetra_drake"),
+    *("runs/bench", "runs/damage", "runs/measured", "runs/planning", "runs/rolling", "tetra_drake"),
     *(f"tetra_drake/{name}" for name in ("engines", "evolution", "scenario")),
 )
 """Runs of one's own may lie beside the recorded ones."""
