@@ -149,7 +149,7 @@ TASKS = (
         "a driven cable breaks after 5 s; the speed after 6 s counts",
         "coulomb",
         {
-            "events": [{"at": "5 s", "cut": ["T2-T3 outer bottom_left"]}],
+            "events": [{"at": "5 s", "cut": ["T4-T5 outer bottom_left"]}],
             "simulation.steady_from": "6 s",
         },
     ),
