@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tetra_drake.engines.planner import Planner
 from tetra_drake.robot.readings import Readings
+from tetra_drake.robot.robot import Robot
 
 if TYPE_CHECKING:
     from bench import Problem, Solution
 
 HORIZON, DECISION_PERIOD, CONTROL_PERIOD = 1.5, 0.5, 0.1
-EFFORT = 0.3
+EFFORT = 0.03
 """Weight of the work per weight, in m, beside the way."""
 
 
@@ -29,14 +31,10 @@ def left(readings: Readings) -> np.ndarray:
     return np.asarray(headings[0] - headings[-1])
 
 
-def cheaply_ahead(readings: Readings) -> np.ndarray:
+def cheaply_ahead(readings: Readings, *, weight: float) -> np.ndarray:
     """The way along x, and the work of the cables that shorten."""
     power = np.maximum(0.0, -readings.tensions * readings.rates).sum(axis=-1)
-    weight = readings.normal_forces.sum(axis=-1).mean()
     return ahead(readings) + EFFORT * CONTROL_PERIOD * power.sum(axis=0) / weight
-
-
-COSTS = {"turn": left, "efficient": cheaply_ahead}
 
 
 def solve(problem: Problem, seed: int) -> Solution:
@@ -44,9 +42,11 @@ def solve(problem: Problem, seed: int) -> Solution:
     decisions = round(scenario.simulation.duration / DECISION_PERIOD)
     samples = int(problem.left / (decisions * HORIZON))
     problem.spend(samples * decisions * HORIZON)
+    cheaply = functools.partial(cheaply_ahead, weight=Robot.of(scenario).weight)
+    costs = {"turn": left, "efficient": cheaply}
     return Planner(
         scenario,
-        COSTS.get(problem.task.name, ahead),
+        costs.get(problem.task.name, ahead),
         samples=samples,
         horizon=HORIZON,
         knots=6,
