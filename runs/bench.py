@@ -413,16 +413,15 @@ def scores_figure(records: Sequence[Record]) -> Figure:
     """Scores of all seeds by task and entry, as shares of the best interquartile mean."""
     names, of_entries = entry_names(records), shares(records)
     figure = Figure(figsize=(8.0, 4.0), layout="constrained")
-    axes = figure.subplots(2, math.ceil(len(TASKS) / 2), sharex=True, sharey=True).flat
-    for axis, task in zip(axes, TASKS, strict=False):
+    axes = figure.subplots(2, math.ceil(len(TASKS) / 2), sharex=True, sharey=True)
+    for axis, task in zip(axes.flat, TASKS, strict=False):
         for place, name in enumerate(names):
             values = of_entries[name].get(task.name, np.zeros(0))
             axis.plot(values, np.full(values.shape, place), "o", color=f"C{place}", alpha=0.6, ms=4)
         axis.set_title(task.name)
         axis.axvline(1.0, color="0.7", linewidth=0.8)
         axis.set_yticks(range(len(names)), names)
-        axis.set_ylim(len(names) - 0.5, -0.5)
-        axis.set_xlim(left=min(0.0, axis.get_xlim()[0]))
+    axes.flat[0].set_ylim(len(names) - 0.5, -0.5)
     figure.supxlabel("score as a share of the best interquartile mean")
     return figure
 
