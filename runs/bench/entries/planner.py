@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.engines.planner import Planner
+from tetra_drake.engines.planner import Cost, Planner
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
 
@@ -43,7 +43,7 @@ def solve(problem: Problem, seed: int) -> Solution:
     samples = int(problem.left / (decisions * HORIZON))
     problem.spend(samples * decisions * HORIZON)
     cheaply = functools.partial(cheaply_ahead, weight=Robot.of(scenario).weight)
-    costs = {"turn": left, "efficient": cheaply}
+    costs: dict[str, Cost] = {"turn": left, "efficient": cheaply}
     return Planner(
         scenario,
         costs.get(problem.task.name, ahead),
