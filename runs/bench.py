@@ -13,10 +13,9 @@ from __future__ import annotations
 import argparse
 import functools
 import importlib.util
-import json
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +25,7 @@ import jinja2
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from records import append, read
 
 from tetra_drake.engines.planner import Planner
 from tetra_drake.engines.queue import SimulationQueue
@@ -259,17 +259,6 @@ class Entry:
         return cls(file.stem, about, solve, tasks)
 
 
-def read(file: Path) -> list[Record]:
-    """Records of a file. A last line that was cut off does not count."""
-    lines = file.read_text("utf-8").splitlines(keepends=True) if file.exists() else []
-    return [json.loads(line) for line in lines if line.endswith("\n")]
-
-
-def append(file: Path, records: Iterable[Record]) -> None:
-    """Adds records to a file, whole or not at all."""
-    write_whole(file, "".join(f"{json.dumps(one)}\n" for one in [*read(file), *records]))
-
-
 def solved(
     entry: Entry, task: Task, seeds: Sequence[int], *, episodes: int = EPISODES
 ) -> list[Record]:
@@ -450,9 +439,9 @@ def main() -> None:
     arguments = parser.parse_args()
     files = arguments.entries or sorted(ENTRIES.glob("*.py"))
     entries = [] if arguments.page else [Entry.of(file) for file in files]
+    done = {(one["task"], one["entry"], one["seed"]) for one in read(HERE / RECORDS)}
     for task in TASKS:
         for entry in entries:
-            done = {(one["task"], one["entry"], one["seed"]) for one in read(HERE / RECORDS)}
             seeds = [seed for seed in range(SEEDS) if (task.name, entry.name, seed) not in done]
             if not seeds or task.name not in entry.tasks or arguments.task not in (None, task.name):
                 continue

@@ -12,10 +12,9 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
-import json
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from typing import Any
 import numpy as np
 import pandas
 from matplotlib.figure import Figure
+from records import append, read
 
 from tetra_drake.engines.planner import Planner
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -187,22 +187,6 @@ def place_of(result: SimulationResult | Exception) -> Row:
 
 
 # Records
-
-
-def read(file: Path) -> list[Row]:
-    """Rows of a record. A last line that was cut off does not count."""
-    if not file.exists():
-        return []
-    lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
-    return [json.loads(line) for line in lines if line.endswith("\n")]
-
-
-def append(file: Path, rows: Iterable[Row]) -> None:
-    """Adds rows to a record, after its last whole line."""
-    file.parent.mkdir(exist_ok=True)
-    old = file.read_text(encoding="utf-8") if file.exists() else ""
-    whole = old[: old.rfind("\n") + 1]
-    write_whole(file, whole + "".join(f"{json.dumps(row)}\n" for row in rows))
 
 
 # Trial and error

@@ -10,7 +10,6 @@ script writes the page README.md and its pictures from the records.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 import time
@@ -27,6 +26,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from PIL import Image
 from record import load_times
+from records import append, read
 from scipy.ndimage import map_coordinates
 
 from tetra_drake.engines.planner import Planner
@@ -375,23 +375,17 @@ def recorded(
 def load_records(folder: Path) -> dict[tuple[str, str], Record]:
     """Records in a folder by group and name of the episode. A line that an interruption has cut
     off does not count."""
-    file = folder / RECORDS
-    text = file.read_text(encoding="utf-8") if file.exists() else ""
-    lines = text[: text.rfind("\n") + 1].splitlines()
-    records = [json.loads(line) for line in lines]
-    return {(record["group"], record["name"]): record for record in records}
+    return {(record["group"], record["name"]): record for record in read(folder / RECORDS)}
 
 
 def run_all(episodes: Sequence[Episode], folder: Path) -> None:
     """Runs the episodes that have no record in a folder, and writes their records."""
-    folder.mkdir(parents=True, exist_ok=True)
+    known = load_records(folder)
     for episode in episodes:
-        records = load_records(folder)
-        if (episode.group, episode.name) in records:
+        if (episode.group, episode.name) in known:
             continue
         record, _ = run_episode(episode)
-        lines = [json.dumps(each) for each in [*records.values(), record]]
-        write_whole(folder / RECORDS, "\n".join(lines) + "\n")
+        append(folder / RECORDS, [record])
         cost = float(np.mean(record["cpu"]))
         done = "done" if record["is_done"] else "not done"
         print(f"{episode.group}, {episode.name}: {done}, {record['time']:.1f} s, {cost:.2f} s CPU")

@@ -57,14 +57,6 @@ def test_what_is_no_entry_is_refused(tmp_path, text, key):
     assert caught.value.key == key and "\n" not in str(caught.value)
 
 
-def test_records_go_on_after_a_line_that_was_cut_off(tmp_path):
-    file = tmp_path / "records.jsonl"
-    bench.append(file, [{"score": 1.0}])
-    file.write_text(file.read_text() + '{"sco')
-    bench.append(file, [{"score": 2.0}])
-    assert bench.read(file) == [{"score": 1.0}, {"score": 2.0}]
-
-
 def test_shares_are_of_the_best_interquartile_mean():
     values = {"good": [0.0, 2.0, 2.0, 100.0], "bad": [1.0, 1.0, 1.0, 1.0]}
     records = [

@@ -40,14 +40,6 @@ def test_a_strong_trial_pulls_harder_in_the_same_rhythm_without_the_cable():
     assert [event.cut for event in robots[0].events] == [[cable]]
 
 
-def test_a_record_goes_on_after_a_line_that_was_cut_off(tmp_path):
-    file = tmp_path / "walks.jsonl"
-    damage.append(file, [{"speed": 0.25}])
-    file.write_text(file.read_text() + '{"speed": 0.')
-    damage.append(file, [{"speed": 0.5}])
-    assert damage.read(file) == [{"speed": 0.25}, {"speed": 0.5}]
-
-
 def test_the_page_is_made_from_the_records():
     records = map(damage.read, (damage.WALKS, damage.PLANS, damage.CANDIDATES))
     assert damage.page(*records) == (damage.HERE / "README.md").read_text("utf-8")

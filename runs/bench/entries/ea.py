@@ -11,4 +11,4 @@ if TYPE_CHECKING:
 
 
 def solve(problem: Problem, seed: int) -> Solution:
-    return problem.search(SteadyState(stop_window=2000), seed)
+    return problem.search(SteadyState(), seed)
