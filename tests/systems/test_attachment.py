@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from helpers.springs import with_springs
 from pydrake.geometry import Meshcat, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import Frame, LinearSpringDamper, RevoluteJoint, SpatialInertia
+from pydrake.multibody.tree import Frame, RevoluteJoint, SpatialInertia
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
@@ -118,15 +119,6 @@ def test_tendons_of_an_arm_of_drakes_are_its_linear_spring_dampers():
         diagram = builder.Build()
         plant.SetDefaultPositions(state)
         return state_at(diagram, 0.5)
-
-    def with_springs(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
-        for cable in cables:
-            ends: list[object] = []
-            for frame in (cable.frame_a, cable.frame_b):
-                ends += [frame.body(), frame.GetFixedPoseInBodyFrame().translation()]
-            law = [cable.law.free_length, cable.law.stiffness, cable.law.damping]
-            plant.AddForceElement(LinearSpringDamper(*ends, *law))
-        plant.Finalize()
 
     def with_cables(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
         plant.Finalize()

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from helpers.springs import with_springs
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import LinearSpringDamper, RigidBody, SpatialInertia
+from pydrake.multibody.tree import RigidBody, SpatialInertia
 from pydrake.systems.analysis import Simulator, Simulator_
 from pydrake.systems.controllers import LinearQuadraticRegulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, System
@@ -53,16 +54,6 @@ def with_cables(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cab
         builder.GetSubsystemByName("scene_graph") if plant.geometry_source_is_registered() else None
     )
     AddCables(builder, plant, cables=cables, slack=False, scene_graph=scene_graph)
-
-
-def with_springs(builder: DiagramBuilder, plant: MultibodyPlant, cables: list[Cable]) -> None:
-    for cable in cables:
-        ends: list[object] = []
-        for frame in (cable.frame_a, cable.frame_b):
-            ends += [frame.body(), frame.GetFixedPoseInBodyFrame().translation()]
-        law = [cable.law.free_length, cable.law.stiffness, cable.law.damping]
-        plant.AddForceElement(LinearSpringDamper(*ends, *law))
-    plant.Finalize()
 
 
 def rates_and_gradient(diagram: System, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
