@@ -10,8 +10,10 @@ script writes the page README.md and its pictures from the records.
 from __future__ import annotations
 
 import argparse
+import functools
 import math
 import os
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -30,11 +32,18 @@ from records import append, read
 from scipy.ndimage import map_coordinates
 
 from tetra_drake.engines.planner import Planner
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.simulation import Simulation
+from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.experiment import evolve
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import TextTable, fixed, listed
+from tetra_drake.prototype.command_file import load_command
+from tetra_drake.prototype.export import COMMAND, export
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.command import Command
+from tetra_drake.robot.gait import AnyGait
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
@@ -76,12 +85,44 @@ SLALOM_WAY = [(1.2, 0.8), (3.0, -0.8), (4.8, 0.8), (6.0, 0.0)]
 """Points that the rover has to pass, the last one the goal."""
 SLOPES = ((0, 0.5), (10, 0.5), (15, 0.5), (20, 0.5), (24, 0.5), (20, 0.8), (28, 0.8), (32, 0.8))
 """Slopes in degrees, and the coefficients of friction there. The scenario has 0.5."""
+UPHILL = {"terrain": "!Incline {slope: 20 deg}"}
+"""Change of the scenario for an incline."""
+CLIMBING: Mapping[str, Any] = {
+    **UPHILL,
+    "friction.static": 0.8,
+    "friction.kinetic": 0.8,
+    "cpg.gain": "4 lbf",
+    "require": {},
+    "simulation.duration": "10 s",
+    "optimizer": "!CmaEs {starts: 2}",
+    "evolution.trials": 1,
+    "evolution.evaluations": 600,
+    "name": "uphill",
+}
+"""Changes of the scenario `motors` for which a gait is evolved that climbs an incline."""
+SCRATCH = Path("out/planning")
+"""Folder for the run of this gait."""
+FROM_GAIT: Mapping[str, Any] = {
+    "samples": 100,
+    "horizon": 1.0,
+    "temperature": 0.3,
+    "noise": 0.1,
+    "control_period": 0.05,
+    "decision_period": 0.1,
+    "delayed": False,
+}
+"""Arguments of a planner that changes the commands of a gait."""
+CLIMBS: Mapping[float, Sequence[str]] = {
+    0.8: ("compiled", "MuJoCo", "diagram"),
+    0.5: ("compiled",),
+}
+"""Coefficients of friction uphill with this planner, and the robot's engines."""
 FRAME, COLOURS = 0.2, 12
 """Time between the film's pictures in s, and number of their colours."""
 VIEW, TALL = math.radians(40.0), 0.6
 """Angle (rad) from the horizontal at which the film looks down, and height (m) of its pillars."""
-SEEDS = 3
-"""Number of seeds of the planner's noise on level ground; the slow diagram has one."""
+SEEDS, LONG = 6, 40.0
+"""Number of seeds of the planner's noise on level ground, and time (s) of these episodes."""
 GROUPS = (
     "goals, compiled",
     "courses",
@@ -219,6 +260,13 @@ class Episode:
     """Time (s) after which the episode ends."""
     planning: Mapping[str, Any] = field(default_factory=dict)
     """Arguments of the planner that differ from PLANNING."""
+    make_command: Callable[[], Command] | None = None
+    """Makes the command that the plans change; None without one."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Arguments of the planner after the cost, without the command."""
+        return {**PLANNING, **self.planning}
 
     def scenarios(self) -> tuple[Scenario, Scenario]:
         """Scenarios of the robot and of the planner's model."""
@@ -277,26 +325,72 @@ def speeds() -> list[Episode]:
         if degrees:
             changes["terrain"] = f"!Incline {{slope: {degrees} deg}}"
         for plant in PLANTS:
-            for seed in range(1 if degrees or plant == "diagram" else SEEDS):
-                name = f"{degrees} degrees, friction {friction:g}, {plant}"
-                name += f", seed {seed}" if seed else ""
+            slope = f"{degrees} degrees, friction {friction:g}, {plant}"
+            for seed in range(1 if degrees else SEEDS):
+                name = slope if degrees else f"{slope}, seed {seed}"
+                most = 10.0 if degrees else LONG
                 given: dict[str, Any] = {"changes": changes, "planning": {"seed": seed}}
-                episodes.append(Episode("speeds", name, Ahead, plant=plant, most=10.0, **given))
+                episodes.append(Episode("speeds", name, Ahead, plant=plant, most=most, **given))
+    return episodes
+
+
+def climbing_gait() -> tuple[Scenario, AnyGait]:
+    """The thesis's row with motors on an incline, and an evolved gait that climbs it."""
+    scenario = load_scenario("motors").with_changes(CLIMBING)
+    is_there = (SCRATCH / MANIFEST).exists()
+    run = evolve(scenario, SCRATCH, resume=is_there, reevaluate=False, report=False)
+    return scenario, run.best_gait()
+
+
+@functools.cache
+def climbing_command() -> Command:
+    """Commands of the evolved gait that climbs, one per control period."""
+    scenario, gait = climbing_gait()
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "uphill"
+        export(scenario, gait, out, rate=1.0 / FROM_GAIT["control_period"])
+        return load_command(out / COMMAND, scenario)
+
+
+def climb_name(friction: float, plant: str) -> str:
+    """Name of the episode with a coefficient of friction and an engine."""
+    return f"row, up 20 degrees, friction {friction:g}, from a gait, {plant}"
+
+
+def climbs() -> list[Episode]:
+    """The thesis's row with motors up an incline, by changes of a gait's commands."""
+    episodes = []
+    for friction, plants in CLIMBS.items():
+        changes = {**UPHILL, "cpg.gain": CLIMBING["cpg.gain"]}
+        changes |= dict.fromkeys(("friction.static", "friction.kinetic"), friction)
+        for plant in plants:
+            climb = Episode(
+                group="others",
+                name=climb_name(friction, plant),
+                make_task=Ahead,
+                base="motors",
+                changes=changes,
+                plant=plant,
+                most=10.0,
+                planning=FROM_GAIT,
+                make_command=climbing_command,
+            )
+            episodes.append(climb)
     return episodes
 
 
 def others() -> list[Episode]:
     """The thesis's row with motors and the six-bar: turns, and up an incline."""
-    uphill = {"terrain": "!Incline {slope: 20 deg}"}
     episodes = []
     for degrees in (45, 90, -90, 180):
         make_task = lambda degrees=degrees: Turn(math.radians(degrees))  # noqa: E731
         episodes.append(Episode("others", f"row, turns by {degrees} degrees", make_task, "motors"))
     return [
         *episodes,
-        Episode("others", "row, up 20 degrees", Ahead, "motors", uphill, most=5.0),
+        Episode("others", "row, up 20 degrees", Ahead, "motors", UPHILL, most=5.0),
+        *climbs(),
         Episode("others", "six-bar, ahead", Ahead, "six_bar", most=10.0),
-        Episode("others", "six-bar, up 20 degrees", Ahead, "six_bar", uphill, most=10.0),
+        Episode("others", "six-bar, up 20 degrees", Ahead, "six_bar", UPHILL, most=10.0),
     ]
 
 
@@ -311,9 +405,10 @@ def all_episodes() -> list[Episode]:
 def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
     """Runs an episode. Returns its record, and the result of the same actions up to its end."""
     scenario, model = episode.scenarios()
-    task = episode.make_task()
-    planner = Planner(model, task, **{**PLANNING, **episode.planning})
-    plant = Simulation(scenario, control_period=PLANNING["control_period"])
+    task, settings = episode.make_task(), episode.settings
+    command = episode.make_command() if episode.make_command else None
+    planner = Planner(model, task, **settings, command=command)
+    plant = Simulation(scenario, control_period=settings["control_period"])
     actions, cpu, is_done, load = [], [], False, os.getloadavg()[0]
     while not (is_done or plant.ended[0]):
         readings = plant.state.rows(0)
@@ -325,15 +420,18 @@ def run_episode(episode: Episode) -> tuple[Record, SimulationResult]:
         is_done = task.is_done(readings)
     if failure := plant.failures[0]:
         raise failure
-    result = play(scenario, actions)
+    result = play(scenario, actions, period=settings["control_period"])
     record = recorded(episode, task, result, cpu, is_done=is_done)
     wall = [round(each, 3) for each in planner.wall_times]
-    return record | {"wall": wall, "load": round(load, 1)}, result
+    record |= {"wall": wall, "load": round(load, 1)}
+    if command is not None:
+        alone = simulate(scenario, command=command)
+        record["command_speed"] = alone.metrics.relative_speed
+    return record, result
 
 
-def play(scenario: Scenario, actions: Sequence[np.ndarray]) -> SimulationResult:
-    """Result of a robot after actions, each for a control period of the planner."""
-    period = PLANNING["control_period"]
+def play(scenario: Scenario, actions: Sequence[np.ndarray], *, period: float) -> SimulationResult:
+    """Result of a robot after actions, each for a period (s)."""
     short = scenario.with_changes({"simulation.duration": f"{period * len(actions):.6g} s"})
     plant = Simulation(short, control_period=period, record=True)
     for each in actions:
@@ -347,7 +445,8 @@ def recorded(
     """Record of an episode, in SI units."""
     nodes, metrics = result.trajectory.p_WN.values, result.metrics
     times = result.trajectory.time.values
-    steps = centre_of(nodes)[:: round(PLANNING["control_period"] / float(times[1] - times[0]))]
+    period = episode.settings["control_period"]
+    steps = centre_of(nodes)[:: round(period / float(times[1] - times[0]))]
     centre = result.path.centre
     away = float(np.linalg.norm((centre[-1] - centre[0])[:2]))
     record = {
@@ -519,9 +618,11 @@ def speeds_table(records: Sequence[Record]) -> TextTable:
 
 
 def others_table(records: Sequence[Record]) -> TextTable:
-    """What the other robots do."""
+    """What the other robots do from rest."""
     rows = []
     for record in records:
+        if "command_speed" in record:  # climbs_table() has it
+            continue
         angle = math.degrees(record["error"]) if "error" in record else math.nan
         speed = math.nan if "error" in record else record["relative_speed"]
         cpu = float(np.mean(record["cpu"]))
@@ -529,6 +630,18 @@ def others_table(records: Sequence[Record]) -> TextTable:
         rows.append([record["name"], *cells])
     headings = ["robot and task", "time, s", "body lengths/s", "angle left, degrees"]
     return TextTable([*headings, "CPU per decision, s"], rows)
+
+
+def climbs_table(records: Sequence[Record]) -> TextTable:
+    """Body lengths per second uphill, by changes of a gait's commands and by the commands alone."""
+    rows = []
+    for friction in CLIMBS:
+        for plant in PLANTS:
+            for each in records:
+                if each["name"] == climb_name(friction, plant):
+                    speeds = [fixed(each[key], 3) for key in ("relative_speed", "command_speed")]
+                    rows.append([f"{friction:g}", plant, *speeds])
+    return TextTable(["friction", "robot on", "planned", "commands alone"], rows)
 
 
 def costs_table(groups: Mapping[str, Sequence[Record]]) -> TextTable:
@@ -660,10 +773,24 @@ the same settings. A turn ends within 5 degrees of the heading, moving or not. U
 
 The row is not planned in real time: a decision takes 2.7 s of CPU and more, three times the limit.
 
-Neither robot climbs 20 degrees. The row stays where it is: every motion of the samples slides down,
-so the best plan is to stand still. Its best evolved gait climbs 15 degrees and slides down on 20.
-The six-bar slides down. On level ground the planned six-bar is much faster than its evolved gait,
-which goes 0.027 body lengths per second.
+From rest the planner takes neither robot up 20 degrees. The row stays where it is: every motion of
+the samples slides down, so the best plan is to stand still. The six-bar slides down; with friction
+0.8 it stands (not recorded). On level ground the planned six-bar is much faster than its evolved
+gait, which goes 0.027 body lengths per second.
+
+## Uphill from a gait
+
+A planner can begin with the commands of a gait, and change them: the argument `command`. Here
+CMA-ES evolves a gait of the row in 600 evaluations, on 20 degrees, with friction 0.8 and a gain of
+4 lbf. `td.export` writes its commands, 20 per second. The planner decides ten times per second, and
+each plan acts at once. Body lengths per second in 10 s from rest:
+
+{climbs}
+
+With friction 0.8 the row climbs 20 degrees on all three engines, 40 to 50 % faster than by the
+commands alone. With the scenario's friction, 0.5, the commands slide down; the planner holds the
+row, but hardly climbs. There CMA-ES found no gait that climbs, either (3,000 evaluations, not
+recorded).
 """
 
 
@@ -690,6 +817,7 @@ def write_page(folder: Path) -> None:
         load=fixed(median(groups["real time"], "load"), 0),
         speeds=speeds_table(groups["speeds"]).markdown(),
         others=others_table(groups["others"]).markdown(),
+        climbs=climbs_table(groups["others"]).markdown(),
         samples=PLANNING["samples"],
         film=FILM,
         evolved=evolved,

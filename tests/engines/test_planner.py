@@ -1,5 +1,7 @@
 """The planner: a lifted mass whose best plan is known, delay, and wrong arguments."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from helpers.anchored import HUNG, scenario_of
@@ -45,6 +47,27 @@ def test_a_plan_comes_near_the_best_one_that_is_known(hung, engine, delayed):
     assert 0.0 <= planner.deadlines_kept <= 1.0 and "10 decisions" in str(planner)
     again = simulate(plant, controller=planner, control_period=0.01)
     assert again.metrics.distance == result.metrics.distance and planner.decisions == 10
+
+
+@pytest.mark.parametrize("delayed", [False, True])
+def test_plans_are_changes_of_a_command(hung, delayed):
+    samples = np.linspace(0.5, 2.5, 5)[:, np.newaxis]
+    command, state = Command("given", 0.02, samples), Simulation(hung).state.rows(0)
+    own = SMALL | {"limits": None, "decision_period": 0.02, "delayed": delayed}
+
+    def planned(**options: Any) -> list[float]:
+        planner = Planner(hung, UP, command=command, **own | options)
+        times = 0.01 * np.arange(14)
+        return [planner(time, state._replace(time=time)).item() for time in times]
+
+    followed, changed = planned(noise=1e-9), planned(noise=0.1)
+    held = [0.5, 0.5, 1.0, 1.0, 1.5, 1.5, 2.0, 2.0, 2.5, 2.5, 2.5, 2.5, 2.5, 2.5]
+    assert followed == pytest.approx(held, abs=1e-6)
+    first = 2 if delayed else 0  # a plan acts late
+    assert changed[:first] == followed[:first] and changed[first] > followed[first] + 0.01
+    usual = Planner(hung, UP, **own).limits
+    assert usual[1] < max(changed) <= 2.5
+    assert planned(noise=1e-9, limits=[[0.0], [1.2]]) == pytest.approx(np.minimum(held, 1.2))
 
 
 def test_more_samples_find_a_cheaper_plan(hung):
@@ -112,6 +135,7 @@ def test_a_plan_stays_while_all_samples_fail(hung):
         ({"samples": 1}, "samples", "found 1"),
         ({"decision_period": 0.015}, "decision_period", "multiple of the control period"),
         ({"limits": [[1.0], [-1.0]]}, "limits", "least"),
+        ({"command": np.zeros((3, 1))}, "command", "Command"),
         ({"cost": lambda readings: np.nan * readings.time}, "cost", "found nan"),
         ({"cost": lambda readings: -np.inf + readings.time}, "cost", "found -inf"),
         ({"cost": lambda readings: readings.p_WN}, "cost", "the shape (1, 32, 3, 3)"),
@@ -126,3 +150,10 @@ def test_wrong_arguments_are_told_in_a_line(hung, refused, options, key, fact):
         Planner(hung, given.pop("cost"), **given)
     with refused("Planner", "scenario", "no driven cables"):
         Planner(scenario_of(HUNG), UP, **SMALL)
+    for samples, fact in (
+        ([[0.0, 0.0]], "(1, 2)"),
+        (np.zeros((0, 1)), "none"),
+        ([[np.nan]], "nan"),
+    ):
+        with refused("command given", "samples", fact):
+            Planner(hung, UP, command=Command("given", 0.1, np.array(samples)), **SMALL)

@@ -11,6 +11,7 @@ import math
 import numbers
 import time
 from collections.abc import Callable, Mapping, Sequence
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from tetra_drake.engines.simulation import Simulation
 from tetra_drake.engines.states import States
 from tetra_drake.errors import InputError, check_type, check_whole
 from tetra_drake.laws.actuator import limits_of
+from tetra_drake.robot.command import Command
 from tetra_drake.robot.network import usual_amplitude
 from tetra_drake.robot.readings import Readings
 from tetra_drake.robot.robot import Robot
@@ -51,8 +53,8 @@ class Planner:
     of the actuators are those that the model has reached with the same actions.
 
     A plan has a value at each of a few knots, evenly spaced over the horizon, for each driven
-    cable. Actions are linear between knots, and held for a control period. For another robot of the
-    same scenario, reset() it.
+    cable. Plans are linear between knots, and actions are held for a control period. For another
+    robot of the same scenario, reset() it.
 
     Attributes:
         model: the simulation of the samples. `model.damage(0, cables=[...])` tells the planner of
@@ -74,6 +76,7 @@ class Planner:
         knots: int = 10,
         temperature: float = 0.3,
         noise: float = 0.3,
+        command: Command | None = None,
         limits: npt.ArrayLike | None = None,
         control_period: float | None = None,
         decision_period: float | None = None,
@@ -92,9 +95,12 @@ class Planner:
             temperature: how far worse samples count: a sample that is worse than the best by this
                 share of the costs' standard deviation has a weight of 1/e.
             noise: standard deviation of the samples' knots, as a share of half the actions' range.
+            command: setpoints over time, such as the commands of a gait (see td.export and
+                td.load_command). The first plan is to follow them. Later plans change them by up to
+                half the actions' range. Without a command, the first plan is to stay at rest.
             limits: least and greatest action of each cable in SI units, (2, actions) or (2, 1). By
                 default the actions for signals with the usual amplitude of a network, within the
-                limits of the actuators.
+                limits of the actuators, and the command.
             control_period: time (s) between the model's actions; by default the scenario's.
             decision_period: time (s) between decisions, a multiple of the control period, which is
                 its default.
@@ -113,6 +119,7 @@ class Planner:
         self._seed = check_whole(source, "seed", seed, least=0)
         check_type(source, "delayed", delayed, bool)
         check_type(source, "cost", cost, Callable, Mapping)
+        check_type(source, "command", command, Command, NoneType)
         step = scenario.simulation.control_period if control_period is None else control_period
         pause = step if decision_period is None else decision_period
         given = {"horizon": horizon, "temperature": temperature, "noise": noise}
@@ -138,7 +145,11 @@ class Planner:
         if not robot.driven.size:
             raise InputError(source, "scenario", f"{scenario.name} has no driven cables to plan")
         self.model = Simulation(model, count=samples, control_period=step, workers=workers)
-        self.limits = self._usual_limits(robot)
+        self.limits, self._command = self._usual_limits(robot), command
+        if command is not None:
+            command.check(robot)
+            known = np.vstack([self.limits, command.samples])
+            self.limits = np.stack([known.min(axis=0), known.max(axis=0)])
         if limits is not None:
             shape = self.limits.shape
             own = checked_numbers(limits, shape, (2, 1), source=source, key="limits")
@@ -158,9 +169,12 @@ class Planner:
         self.model.reset()
         if cut:
             self.model.damage(0, cables=cut)
-        self._middle, self._half = self.limits.mean(axis=0), 0.5 * np.ptp(self.limits, axis=0)
-        rest = (self.model.rest[0] - self._middle) / np.where(self._half > 0.0, self._half, 1.0)
-        self._plan = self._next_plan = np.tile(np.clip(rest, -1.0, 1.0), (self._knots, 1))
+        middle, self._half = self.limits.mean(axis=0), 0.5 * np.ptp(self.limits, axis=0)
+        self._base = self._command or Command("middle", self._period, middle[np.newaxis])
+        first = np.zeros_like(middle)
+        if self._command is None:
+            first = (self.model.rest[0] - middle) / np.where(self._half > 0.0, self._half, 1.0)
+        self._plan = self._next_plan = np.tile(np.clip(first, -1.0, 1.0), (self._knots, 1))
         self._random = np.random.default_rng(self._seed)
         self._begins, self._next, self._latest = 0.0, -math.inf, -math.inf
         self.wall_times: list[float] = []
@@ -200,11 +214,13 @@ class Planner:
             self.wall_times.append(time.perf_counter() - started)
             self._begins, self._next = now, now + self._decision_period
         step = int((now - self._begins) / self._period + 1e-6)
-        return np.asarray(self._actions(self._plan)[min(step, self._steps - 1)])
+        return np.asarray(self._actions(self._plan, self._begins)[min(step, self._steps - 1)])
 
-    def _actions(self, plans: np.ndarray) -> np.ndarray:
-        """Actions (..., control periods, actions) of plans (..., knots, actions)."""
-        return self._middle + self._half * (self._between @ plans)
+    def _actions(self, plans: np.ndarray, begin: float) -> np.ndarray:
+        """Actions (..., control periods, actions) of plans (..., knots, actions) that begin at a
+        time (s)."""
+        base = self._base.at(begin + self._period * np.arange(self._steps))
+        return np.clip(base + self._half * (self._between @ plans), *self.limits)
 
     def _decide(self, now: float, readings: Readings) -> None:
         """Makes the plan from now on, or, if it is delayed, from the next decision on. The model's
@@ -212,27 +228,30 @@ class Planner:
         self.model.assume(readings._replace(time=self._period))
         if self._delayed:
             self._plan = self._next_plan
-            self._go_on()
+            self._go_on(now)
             state = self.model.save([0])
-            self._next_plan = self._improved(self._shift @ self._plan, state, now)
+            begin = now + self._decision_period
+            self._next_plan = self._improved(self._shift @ self._plan, state, now, begin=begin)
             self.model.restore(state, [0])
             return
         state, first = self.model.save([0]), not self.decisions
-        self._plan = self._improved(self._plan if first else self._shift @ self._plan, state, now)
+        plan = self._plan if first else self._shift @ self._plan
+        self._plan = self._improved(plan, state, now, begin=now)
         self.model.restore(state, [0])
-        self._go_on()
+        self._go_on(now)
 
-    def _go_on(self) -> None:
+    def _go_on(self, now: float) -> None:
         """Moves the robot's twin by the plan until the next decision."""
-        for actions in self._actions(self._plan)[: self._ahead]:
+        for actions in self._actions(self._plan, now)[: self._ahead]:
             self.model.step(np.tile(actions, (self._samples, 1)), indices=[0])
 
-    def _improved(self, plan: np.ndarray, state: States, now: float) -> np.ndarray:
-        """Weighted mean of noisy copies of a plan; the first copy has no noise."""
+    def _improved(self, plan: np.ndarray, state: States, now: float, *, begin: float) -> np.ndarray:
+        """Weighted mean of noisy copies of a plan that begins at a time (s); the first copy has no
+        noise."""
         noise = self._random.normal(0.0, self._noise, (self._samples, *plan.shape))
         noise[0] = 0.0
         candidates = np.clip(plan + noise, -1.0, 1.0)
-        actions = self._actions(candidates)
+        actions = self._actions(candidates, begin)
         self.model.restore(state)
         moments = [self.model.step(actions[:, step]) for step in range(self._steps)]
         costs = self._costs(moments, now - self._period)

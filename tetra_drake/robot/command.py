@@ -35,6 +35,22 @@ class Command:
     """Setpoints (samples, driven cables) in SI units: forces, free lengths or tensions. The kind of
     `actuation` in the scenario defines which."""
 
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Setpoints (times, driven cables) at `times` (s)."""
+        latest = np.floor(times / self.period + 1e-6).astype(int)
+        return np.asarray(self.samples[np.clip(latest, 0, len(self.samples) - 1)])
+
+    def check(self, robot: Robot) -> None:
+        """Raises InputError if the command does not fit the driven cables of a robot."""
+        driven = robot.driven
+        problem = "" if len(self.samples) else "has none, expected one at least"
+        if self.samples.shape[1:] != driven.shape:
+            problem = f"is of shape {self.samples.shape}, expected {driven.size} driven cables"
+        if not problem and not np.isfinite(self.samples).all():
+            problem = "found nan or inf, expected finite numbers"
+        if problem:
+            raise InputError(f"command {self.name}", "samples", problem)
+
 
 Driver = AnyGait | Command
 """A gait, a policy's parameters or a command: what drives the actuators without a controller."""
@@ -73,17 +89,11 @@ def driven_robot(
             raise InputError(f"gait {driver.name}", "", f"found a gait, {expected}")
         return DrivenRobot.of(robot, driver, steering=steering)
     robot = robot.without_network()
-    driven = robot.driven
-    problem = "" if len(driver.samples) else "has none, expected one at least"
-    if driver.samples.shape[1:] != driven.shape:
-        problem = f"is of shape {driver.samples.shape}, expected {driven.size} driven cables"
-    if problem:
-        raise InputError(f"command {driver.name}", "samples", problem)
+    driver.check(robot)
     step = scenario.cpg.listing_step
     times = step * (np.arange(math.ceil(scenario.simulation.duration / step) + 2) - 1)
-    latest = np.floor(times / driver.period + 1e-6).astype(int)
-    held = driver.samples[np.clip(latest, 0, len(driver.samples) - 1)]
-    signals = scenario.actuation.signals(held, CableLaw.of(robot.structure.cables[driven]))
+    law = CableLaw.of(robot.structure.cables[robot.driven])
+    signals = scenario.actuation.signals(driver.at(times), law)
     robot = dataclasses.replace(robot, first_signals=signals[0])
     return DrivenRobot(robot=robot, name=driver.name, samples=signals)
 
