@@ -6,6 +6,8 @@ import numpy as np
 import planning
 import pytest
 
+from tetra_drake.robot.command import Command
+
 
 def test_an_interrupted_script_runs_what_is_left_and_writes_its_page(tmp_path, monkeypatch):
     short = {"samples": 4, "horizon": 0.5, "knots": 2}
@@ -22,6 +24,13 @@ def test_an_interrupted_script_runs_what_is_left_and_writes_its_page(tmp_path, m
     assert records.read_text().startswith(first) and len(records.read_text().splitlines()) == 2
     done, late = map(json.loads, records.read_text().splitlines())
     assert done["is_done"] and done["time"] == pytest.approx(0.1) and not late["is_done"]
+    held = Command("held", 0.1, np.linspace(0.1, 0.3, 24)[np.newaxis])  # lengths in m
+    name = planning.climb_name(0.8, "compiled")
+    options = {"most": 0.2, "make_command": lambda: held, "planning": {"noise": 1e-9}}
+    planning.run_all([planning.Episode("others", name, planning.Ahead, **options)], tmp_path)
+    record = planning.load_records(tmp_path)["others", name]
+    assert abs(record["command_speed"]) > 1e-3
+    assert record["command_speed"] == pytest.approx(record["relative_speed"], rel=0.02)
     planning.write_page(tmp_path)
     assert "1 of 10 (courses)" in (tmp_path / planning.PAGE_NAME).read_text()
     nodes = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
