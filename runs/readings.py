@@ -193,30 +193,35 @@ gaits that go backward ("nearly half"), and best evolved over best initial dista
 the trials and in the trial with the best gait."""
 
 
-def results(trials: pandas.DataFrame) -> dict[str, float]:
-    """Results of our trials, by the names in THESIS."""
-    rise = trials["best_in"] / trials["initial_best_in"]
+def results(trials: pandas.DataFrame, drawn: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Results (...) of our trials, by the names in THESIS. `drawn` (..., trials) has the rows that
+    count, with repetitions; by default each row counts once."""
+    rows = np.arange(len(trials)) if drawn is None else drawn
+    initial, best = (trials[name].to_numpy()[rows] for name in ("initial_best_in", "best_in"))
+    rise, longest = best / initial, best.argmax(axis=-1)[..., np.newaxis]
     return {
-        "initial": trials["initial_best_in"].max(),
-        "backward": trials["backward"].mean(),
-        "evolved": trials["best_in"].max(),
-        "rise": rise.mean(),
-        "best_rise": rise.iloc[trials["best_in"].to_numpy().argmax()],
+        "initial": initial.max(axis=-1),
+        "backward": trials["backward"].to_numpy()[rows].mean(axis=-1),
+        "evolved": best.max(axis=-1),
+        "rise": rise.mean(axis=-1),
+        "best_rise": np.take_along_axis(rise, longest, axis=-1)[..., 0],
     }
 
 
-def factor(trials: pandas.DataFrame, keys: Iterable[str] = THESIS) -> float:
-    """Factor by which our results differ from THESIS: the exponential of the root mean square of
-    the logarithms of their ratios."""
-    ours = results(trials)
-    ratios = [max(ours[key], 1e-3) / THESIS[key] for key in keys]
-    return math.exp(math.sqrt(np.mean(np.square(np.log(ratios)))))
+def factor(
+    trials: pandas.DataFrame, keys: Iterable[str] = THESIS, drawn: np.ndarray | None = None
+) -> np.ndarray:
+    """Factor (...) by which our results differ from THESIS: the exponential of the root mean square
+    of the logarithms of their ratios. `drawn` is as for results()."""
+    ours = results(trials, drawn)
+    ratios = [np.maximum(ours[key], 1e-3) / THESIS[key] for key in keys]
+    return np.asarray(np.exp(np.sqrt(np.mean(np.square(np.log(ratios)), axis=0))))
 
 
 def factor_interval(trials: pandas.DataFrame) -> tuple[float, float]:
     """95 % interval of the factor, by bootstrap over the trials."""
     drawn = resampled(np.arange(len(trials)), np.random.default_rng(0))[:500]
-    return interval_of_resamples(np.array([factor(trials.iloc[rows]) for rows in drawn]))
+    return interval_of_resamples(factor(trials, drawn=drawn))
 
 
 def load_record(path: Path) -> Record:
@@ -237,7 +242,7 @@ def tables_of(record: Record) -> dict[str, pandas.DataFrame]:
 
 def off_by(trials: pandas.DataFrame) -> str:
     """Text of the factor by which our results differ from THESIS, with its interval."""
-    return ranged(factor(trials), *factor_interval(trials))
+    return ranged(float(factor(trials)), *factor_interval(trials))
 
 
 def mean_of(values: pandas.Series) -> str:

@@ -59,7 +59,8 @@ def test_a_linear_policy_without_weights_is_a_command_of_its_biases(name, engine
         pytest.skip("slow, and the others show it")
     scenario = brief(name, engine=engine, friction="!Coulomb {stiffness: 0 N/m}")
     cut = driven_names(scenario.robot.blueprint())[0]
-    scenario = scenario.with_changes({"events": [{"at": "0.21 s", "cut": [cut]}]})
+    events = [{"at": "0.11 s", "cut": [cut]}]
+    scenario = scenario.with_changes({"events": events, "simulation.duration": "0.16 s"})
     robot = Simulation(scenario).robot
     biases = np.linspace(-0.3, 0.6, robot.driven.size)
     values = {key: 0.0 for key in scenario.policy_parameters}

@@ -56,7 +56,7 @@ def go(simulation: Simulation, actions: np.ndarray) -> list:
 @pytest.mark.parametrize(
     ("engine", "count"), [("!Compiled", 1), ("!Compiled", LANES), ("!Drake", 1), ("!Mujoco", 1)]
 )
-@pytest.mark.parametrize(("actuation", "steps"), [(FORCE, 7), (WINCH, 40), (MOTOR, 1)])
+@pytest.mark.parametrize(("actuation", "steps"), [(FORCE, 7), (WINCH, 12), (MOTOR, 1)])
 def test_steps_with_the_samples_of_a_command_give_its_motion(
     short, actuation, steps, engine, count
 ):

@@ -33,7 +33,7 @@ def bounce(robot: StructureFile) -> float:
 def test_a_mass_on_a_spring_has_the_interval_and_the_shares_of_its_formula():
     frequencies = [f"frequency {mode}" for mode in range(1, 6)]
     both = hung(**{"cables.line.stiffness": "2 %", "masses.b": "4 % uniform"})
-    found = predict(both, frequencies, draws=150)
+    found = predict(both, frequencies, draws=100)
     is_bounce = np.isclose(found.quantities["nominal"], bounce(both.robot), rtol=1e-6)
     (mode,) = found.quantities.index[is_bounce]
     mass = sum(both.robot.masses.values()) + BAR_MASS
@@ -42,7 +42,7 @@ def test_a_mass_on_a_spring_has_the_interval_and_the_shares_of_its_formula():
     assert shares[STIFFNESS] == pytest.approx(parts[0] / parts.sum(), abs=5e-3)
     assert shares[MASS] == pytest.approx(parts[1] / parts.sum(), abs=5e-3)
     assert shares["rest"] < 1e-3
-    alone = predict(hung(**{"cables.line.stiffness": "2 %"}), [mode], draws=150)
+    alone = predict(hung(**{"cables.line.stiffness": "2 %"}), [mode], draws=100)
     median, low, high = alone.quantities.loc[mode, ["median", "low", "high"]]
     assert median == pytest.approx(bounce(both.robot), rel=1e-3)
     assert (high - low) / (2.0 * WIDTH_90 * median) == pytest.approx(0.01, rel=0.02)
@@ -59,7 +59,7 @@ def test_nine_of_ten_robots_that_are_built_within_the_tolerances_are_in_the_inte
     free_length = line.free_length + generator.uniform(-1e-3, 1e-3, robots)
     weight = 9.81 * mass
     built = {"tension line": weight, "length line": free_length + weight / stiffness}
-    found = predict(scenario, [*built], draws=60).quantities
+    found = predict(scenario, [*built], draws=100).quantities
     for name, values in built.items():
         low, high = found.loc[name, ["low", "high"]]
         assert 0.8 < np.mean((low < values) & (values < high)) < 0.97

@@ -116,6 +116,10 @@ class _DiagramRobot(LoneRobot):
         self.wall_time, self._speed_limit = 0.0, speed_limit(driven)
         self._marks, self._changes = driven.marks.tolist(), driven.changes
         self._held, self._change_end = robot.first_signals, 0.0
+        self._monitor()
+
+    def _monitor(self) -> None:
+        """Lets _after_step() follow the simulation."""
         # A bound method in place of the lambda would keep the diagram alive for ever.
         this = weakref.proxy(self)
         self._simulator.set_monitor(lambda context: this._after_step(context))
@@ -218,7 +222,9 @@ class _DiagramRobot(LoneRobot):
         self._aimer.restore(numbers["aim"])
         parameters = InitializeParams()
         parameters.suppress_initialization_events = True
+        self._simulator.clear_monitor()  # it would aim the next step anew
         self._simulator.Initialize(parameters)
+        self._monitor()
 
     def result(self) -> SimulationResult:
         accuracy = self._simulator.get_integrator().get_target_accuracy()
