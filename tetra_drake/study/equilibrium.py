@@ -69,14 +69,29 @@ class EquilibriumStudy:
     of a robot at rest without actuation; SI units."""
 
     robot: Robot
-    statics: Statics
-    """Statics of the robot without weight and loads, away from the ground."""
     nodes: pandas.DataFrame
     """A row per node, by its name: body, x, y, z, load (normal force of the ground), and the force
     of its anchor on the structure, anchor_x, anchor_y, anchor_z."""
     cables: pandas.DataFrame
     """A row per cable, by its name: group, length, free_length, tension, force_density (tension per
     length)."""
+
+    @functools.cached_property
+    def statics(self) -> Statics:
+        """Statics of the robot without weight and loads, away from the ground. Raises InputError if
+        it has no equilibrium there."""
+        scenario, structure = self.robot.scenario, self.robot.structure
+        nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(structure.node_load)
+        lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)
+        weightless = scenario.with_numbers({"robot.gravity": 0.0})
+        alone = equilibrium_of(weightless, lifted, self.robot.equilibrium.state)
+        return find_statics(
+            p_WN=node_positions(lifted, alone.state),
+            body_of_node=structure.carriers,
+            segments=structure.segments,
+            held=structure.held,
+            joints=structure.joints,
+        )
 
     @functools.cached_property
     def frequencies(self) -> np.ndarray:
@@ -157,22 +172,8 @@ def study_equilibrium(given: Robot | GivenScenario) -> EquilibriumStudy:
         "tension": unactuated.forces.cable_forces[:, TENSION],
         "force_density": unactuated.forces.cable_forces[:, TENSION] / equilibrium.lengths,
     }
-    nowhere, no_load = np.array([], dtype=np.int64), np.zeros_like(structure.node_load)
-    lifted = dataclasses.replace(structure, contacts=nowhere, node_load=no_load)
-    weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
-    alone = equilibrium_of(weightless, lifted, equilibrium.state)
-    return EquilibriumStudy(
-        robot=robot,
-        statics=find_statics(
-            p_WN=node_positions(lifted, alone.state),
-            body_of_node=structure.carriers,
-            segments=structure.segments,
-            held=structure.held,
-            joints=structure.joints,
-        ),
-        nodes=nodes,
-        cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-    )
+    table = pandas.DataFrame(cables, index=list(structure.cable_names))
+    return EquilibriumStudy(robot=robot, nodes=nodes, cables=table)
 
 
 def _vibration(robot: Robot, unactuated: Unactuated) -> tuple[np.ndarray, np.ndarray]:
