@@ -788,9 +788,10 @@ On level ground: medians of 40 s, and ranges over six seeds of the planner's noi
 
 {level}
 
-On MuJoCo the rover is slower by {slower:.0f} % of the compiled engine's speed. MuJoCo has no bristles,
-and the planner's model has them. With the same law of friction everywhere, without bristles, the
-medians of the three engines agree to {alike:.0f} %. So the difference is in the law of friction.
+On MuJoCo the rover is slower by {slower:.0f} % of the compiled engine's speed. MuJoCo has no
+bristles, and the planner's model has them. With the same law of friction everywhere, without
+bristles, the medians of the three engines agree to {alike:.0f} %. So the difference is in the law
+of friction.
 
 Uphill, in single episodes of 10 s. With the scenario's coefficient of friction, 0.5, a body slips
 at 26.6 degrees; with 0.8 at 38.7.

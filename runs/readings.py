@@ -10,7 +10,6 @@ finished readings are skipped. `python runs/thesis_page.py` shows the numbers.
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,5 +1,7 @@
 """Commands: samples that are held, and the robot that follows them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from helpers.actuations import MOTOR, WINCH
@@ -75,6 +77,21 @@ def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenari
 
 
 OTHERS = [(7, 3, "expected 8 driven cables"), (24, 3, "expected 8"), (8, 0, "none")]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "fact"),
+    [
+        ({"period": 0.0}, "period", "found 0.0"),
+        ({"period": "1 s"}, "period", "found '1 s'"),
+        ({"samples": [[0.0] * 8]}, "samples", "expected ndarray"),
+        ({"samples": np.full((1, 8), np.nan)}, "samples", "found nan"),
+        ({"samples": np.full((1, 8), "on")}, "samples", "expected numbers"),
+    ],
+)
+def test_a_command_without_times_or_numbers_is_refused(scenario, changes, key, fact, refused):
+    with refused("command counting", key, fact):
+        driven_robot(scenario, dataclasses.replace(counting(), **changes))
 
 
 @pytest.mark.parametrize(("cables", "samples", "fact"), OTHERS)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, check_type
 from tetra_drake.laws.cable import CableLaw
 from tetra_drake.robot.gait import AnyGait, PolicyParameters, with_body
 from tetra_drake.robot.network import SteeringSignal, usual_amplitude
@@ -41,15 +42,25 @@ class Command:
         return np.asarray(self.samples[np.clip(latest, 0, len(self.samples) - 1)])
 
     def check(self, robot: Robot) -> None:
-        """Raises InputError if the command does not fit the driven cables of a robot."""
-        driven = robot.driven
-        problem = "" if len(self.samples) else "has none, expected one at least"
-        if self.samples.shape[1:] != driven.shape:
-            problem = f"is of shape {self.samples.shape}, expected {driven.size} driven cables"
-        if not problem and not np.isfinite(self.samples).all():
+        """Raises InputError if the command does not fit the driven cables of a robot, its period is
+        not positive, or its samples are not finite numbers."""
+        source, driven = f"command {self.name}", robot.driven
+        check_type(source, "period", self.period, numbers.Real)
+        if not 0.0 < self.period < math.inf:
+            raise InputError(source, "period", f"found {self.period}, expected a number above 0")
+        check_type(source, "samples", self.samples, np.ndarray)
+        shape, kind = self.samples.shape, self.samples.dtype
+        if len(shape) != 2 or shape[1] != driven.size:
+            problem = f"is of shape {shape}, expected {driven.size} driven cables"
+        elif not len(self.samples):
+            problem = "has none, expected one at least"
+        elif kind.kind not in "iuf":
+            problem = f"found {kind}, expected numbers"
+        elif not np.isfinite(self.samples).all():
             problem = "found nan or inf, expected finite numbers"
-        if problem:
-            raise InputError(f"command {self.name}", "samples", problem)
+        else:
+            return
+        raise InputError(source, "samples", problem)
 
 
 Driver = AnyGait | Command
