@@ -203,12 +203,10 @@ def pose(scenario: Scenario) -> list[float]:
     return [origin[0], origin[2] - FLOOR, math.atan2(along[2], along[0])]
 
 
-def spine_poses(*, every: int = 1) -> pandas.DataFrame:
+def spine_poses() -> pandas.DataFrame:
     """Poses of the spine's vertebra for each measured set of cable lengths: predicted ones, wanted
-    ones by the authors' statics, and ones that their camera measured; in m and rad. `every` leaves
-    out the sets between."""
-    scenario = in_the_air("spine")
-    table = pandas.read_csv(HERE / "spine_poses.csv").iloc[::every].reset_index(drop=True)
+    ones by the authors' statics, and ones that their camera measured; in m and rad."""
+    table, scenario = pandas.read_csv(HERE / "spine_poses.csv"), in_the_air("spine")
     poses = []
     for lengths in table[["l1_m", "l2_m", "l3_m", "l4_m"]].to_numpy().tolist():
         named = zip(SADDLE, lengths, strict=True)

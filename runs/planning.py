@@ -43,7 +43,6 @@ from tetra_drake.prototype.command_file import load_command
 from tetra_drake.prototype.export import COMMAND, export
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import AnyGait
 from tetra_drake.robot.readings import Readings
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
@@ -85,13 +84,10 @@ SLALOM_WAY = [(1.2, 0.8), (3.0, -0.8), (4.8, 0.8), (6.0, 0.0)]
 """Points that the rover has to pass, the last one the goal."""
 SLOPES = ((10, 0.5), (15, 0.5), (20, 0.5), (24, 0.5), (20, 0.8), (28, 0.8), (32, 0.8))
 """Slopes in degrees, and the coefficients of friction there. The scenario has 0.5."""
-UPHILL = {"terrain": "!Incline {slope: 20 deg}"}
-"""Change of the scenario for an incline."""
+GAIN = {"cpg.gain": "4 lbf"}
+"""Change of the row for climbs from a gait."""
 CLIMBING: Mapping[str, Any] = {
-    **UPHILL,
-    "friction.static": 0.8,
-    "friction.kinetic": 0.8,
-    "cpg.gain": "4 lbf",
+    **GAIN,
     "require": {},
     "simulation.duration": "10 s",
     "optimizer": "!CmaEs {starts: 2}",
@@ -99,7 +95,7 @@ CLIMBING: Mapping[str, Any] = {
     "evolution.evaluations": 600,
     "name": "uphill",
 }
-"""Changes of the scenario `motors` for which a gait is evolved that climbs an incline."""
+"""Changes of the row uphill for the evolution of a gait."""
 SCRATCH = Path("out/planning")
 """Folder for the run of this gait."""
 FROM_GAIT: Mapping[str, Any] = {
@@ -340,35 +336,30 @@ def speeds() -> list[Episode]:
                 )
                 episodes.append(episode)
     for degrees, friction in SLOPES:
-        slope = f"!Incline {{slope: {degrees} deg}}"
-        steep = {"terrain": slope, "simulation.steady_from": "2 s", **of_friction(friction)}
+        steep = {"simulation.steady_from": "2 s", **uphill(degrees, friction)}
         for plant in PLANTS:
             name = f"{degrees} degrees, friction {friction:g}, {plant}"
             episodes.append(Episode("speeds", name, Ahead, changes=steep, plant=plant, most=10.0))
     return episodes
 
 
-def of_friction(coefficient: float) -> dict[str, float]:
-    """Changes of a scenario to a coefficient of friction, at rest and in motion."""
-    return {"friction.static": coefficient, "friction.kinetic": coefficient}
-
-
-def climbing_gait() -> tuple[Scenario, AnyGait]:
-    """The thesis's row with motors on an incline, and an evolved gait that climbs it."""
-    scenario = load_scenario("motors").with_changes(CLIMBING)
-    is_there = (SCRATCH / MANIFEST).exists()
-    run = evolve(scenario, SCRATCH, resume=is_there, reevaluate=False, report=False)
-    return scenario, run.best_gait()
+def uphill(degrees: float, friction: float) -> dict[str, Any]:
+    """Changes of a scenario to an incline with a coefficient of friction, at rest and in motion."""
+    terrain = f"!Incline {{slope: {degrees} deg}}"
+    return {"terrain": terrain, "friction.static": friction, "friction.kinetic": friction}
 
 
 @functools.cache
 def climbing_command() -> Command:
-    """Commands of the evolved gait that climbs, one per control period."""
-    scenario, gait = climbing_gait()
+    """Commands of a gait of the row that climbs 20 degrees, one per control period. Evolves the
+    gait if that is not done."""
+    scenario = load_scenario("motors").with_changes({**uphill(20, 0.8), **CLIMBING})
+    is_there = (SCRATCH / MANIFEST).exists()
+    run = evolve(scenario, SCRATCH, resume=is_there, reevaluate=False, report=False)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "uphill"
-        export(scenario, gait, out, rate=1.0 / FROM_GAIT["control_period"])
-        return load_command(out / COMMAND, scenario)
+        export(run, run, out, rate=1.0 / FROM_GAIT["control_period"])
+        return load_command(out / COMMAND, run)
 
 
 def climb_name(friction: float, plant: str) -> str:
@@ -380,15 +371,13 @@ def climbs() -> list[Episode]:
     """The thesis's row with motors up an incline, by changes of a gait's commands."""
     episodes = []
     for friction, plants in CLIMBS.items():
-        changes = {**UPHILL, "cpg.gain": CLIMBING["cpg.gain"]}
-        changes |= of_friction(friction)
         for plant in plants:
             climb = Episode(
                 group="others",
                 name=climb_name(friction, plant),
                 make_task=Ahead,
                 base="motors",
-                changes=changes,
+                changes={**uphill(20, friction), **GAIN},
                 plant=plant,
                 most=10.0,
                 planning=FROM_GAIT,
@@ -400,16 +389,16 @@ def climbs() -> list[Episode]:
 
 def others() -> list[Episode]:
     """The thesis's row with motors and the six-bar: turns, and up an incline."""
-    episodes = []
+    episodes, steep = [], uphill(20, 0.5)
     for degrees in (45, 90, -90, 180):
         make_task = lambda degrees=degrees: Turn(math.radians(degrees))  # noqa: E731
         episodes.append(Episode("others", f"row, turns by {degrees} degrees", make_task, "motors"))
     return [
         *episodes,
-        Episode("others", "row, up 20 degrees", Ahead, "motors", UPHILL, most=5.0),
+        Episode("others", "row, up 20 degrees", Ahead, "motors", steep, most=5.0),
         *climbs(),
         Episode("others", "six-bar, ahead", Ahead, "six_bar", most=10.0),
-        Episode("others", "six-bar, up 20 degrees", Ahead, "six_bar", UPHILL, most=10.0),
+        Episode("others", "six-bar, up 20 degrees", Ahead, "six_bar", steep, most=10.0),
     ]
 
 
@@ -621,16 +610,14 @@ def courses_table(records: Sequence[Record]) -> TextTable:
     return TextTable(headings, rows)
 
 
-def level_speeds(records: Sequence[Record], ground: str) -> dict[str, list[float]]:
-    """Body lengths per second on a level ground by engine."""
-    return {
-        plant: [
-            each["relative_speed"]
-            for each in records
-            if each["name"].startswith(f"{ground}, {plant}")
-        ]
-        for plant in PLANTS
-    }
+def level_speeds(records: Sequence[Record], ground: str) -> dict[str, np.ndarray]:
+    """Body lengths per second on a level ground by engine: least, median and greatest."""
+    speeds = {}
+    for plant in PLANTS:
+        own = [each for each in records if each["name"].startswith(f"{ground}, {plant}")]
+        numbers = [each["relative_speed"] for each in own] or [math.nan]
+        speeds[plant] = np.percentile(numbers, [0, 50, 100])
+    return speeds
 
 
 def level_table(records: Sequence[Record]) -> TextTable:
@@ -638,8 +625,7 @@ def level_table(records: Sequence[Record]) -> TextTable:
     rows = []
     for ground in GROUNDS:
         rows.append([ground])
-        for speeds in level_speeds(records, ground).values():
-            least, middle, most = np.percentile(speeds or [math.nan], [0, 50, 100])
+        for least, middle, most in level_speeds(records, ground).values():
             rows[-1].append(f"{fixed(middle)} ({fixed(least)} to {fixed(most)})")
     return TextTable(["ground", *PLANTS], rows)
 
@@ -673,13 +659,12 @@ def others_table(records: Sequence[Record]) -> TextTable:
 
 def climbs_table(records: Sequence[Record]) -> TextTable:
     """Body lengths per second uphill, by changes of a gait's commands and by the commands alone."""
-    rows = []
-    for friction in CLIMBS:
-        for plant in PLANTS:
-            for each in records:
-                if each["name"] == climb_name(friction, plant):
-                    speeds = [fixed(each[key], 3) for key in ("relative_speed", "command_speed")]
-                    rows.append([f"{friction:g}", plant, *speeds])
+    rows, known = [], {record["name"]: record for record in records}
+    for friction, plants in CLIMBS.items():
+        for plant in plants:
+            if climb := known.get(climb_name(friction, plant)):
+                speeds = [fixed(climb[key], 3) for key in ("relative_speed", "command_speed")]
+                rows.append([f"{friction:g}", plant, *speeds])
     return TextTable(["friction", "robot on", "planned", "commands alone"], rows)
 
 
@@ -850,9 +835,9 @@ def write_page(folder: Path) -> None:
     evolved = load_times(HERE.parent)["rolling"]["evolution"]["cores_s"]
     cpu = [each for records in goals.values() for record in records for each in record["cpu"]]
     second = float(np.mean(cpu)) / PLANNING["decision_period"]
-    as_it_stands, alike = (
-        {plant: float(np.median(each or [math.nan])) for plant, each in speeds.items()}
-        for speeds in (level_speeds(groups["speeds"], ground) for ground in GROUNDS)
+    usual, alike = (
+        {plant: middle for plant, (_, middle, _) in level_speeds(groups["speeds"], ground).items()}
+        for ground in GROUNDS
     )
     page = PAGE.format(
         run=listed([f"{counts[group]} of {planned[group]} ({group})" for group in GROUPS]),
@@ -863,7 +848,7 @@ def write_page(folder: Path) -> None:
         walled=len(groups["real time"]),
         load=fixed(median(groups["real time"], "load"), 0),
         level=level_table(groups["speeds"]).markdown(),
-        slower=100.0 * (1.0 - as_it_stands["MuJoCo"] / as_it_stands["compiled"]),
+        slower=100.0 * (1.0 - usual["MuJoCo"] / usual["compiled"]),
         alike=100.0 * (max(alike.values()) / min(alike.values()) - 1.0),
         slopes=slopes_table(groups["speeds"]).markdown(),
         others=others_table(groups["others"]).markdown(),

@@ -230,13 +230,11 @@ class Planner:
             self._plan = self._next_plan
             self._go_on(now)
             state = self.model.save([0])
-            begin = now + self._decision_period
-            self._next_plan = self._improved(self._shift @ self._plan, state, now, begin=begin)
+            self._next_plan = self._improved(self._shift @ self._plan, state, now)
             self.model.restore(state, [0])
             return
         state, first = self.model.save([0]), not self.decisions
-        plan = self._plan if first else self._shift @ self._plan
-        self._plan = self._improved(plan, state, now, begin=now)
+        self._plan = self._improved(self._plan if first else self._shift @ self._plan, state, now)
         self.model.restore(state, [0])
         self._go_on(now)
 
@@ -245,12 +243,12 @@ class Planner:
         for actions in self._actions(self._plan, now)[: self._ahead]:
             self.model.step(np.tile(actions, (self._samples, 1)), indices=[0])
 
-    def _improved(self, plan: np.ndarray, state: States, now: float, *, begin: float) -> np.ndarray:
-        """Weighted mean of noisy copies of a plan that begins at a time (s); the first copy has no
-        noise."""
+    def _improved(self, plan: np.ndarray, state: States, now: float) -> np.ndarray:
+        """Weighted mean of noisy copies of a plan; the first copy has no noise."""
         noise = self._random.normal(0.0, self._noise, (self._samples, *plan.shape))
         noise[0] = 0.0
         candidates = np.clip(plan + noise, -1.0, 1.0)
+        begin = now + self._decision_period if self._delayed else now
         actions = self._actions(candidates, begin)
         self.model.restore(state)
         moments = [self.model.step(actions[:, step]) for step in range(self._steps)]

@@ -59,7 +59,7 @@ def stepper(scenario: Scenario) -> FrozenStepper:
 
 def test_half_the_step_has_a_quarter_of_the_error(stepper):
     duration = 4e-3
-    exact, _ = stepper.walk(duration, 1024)
+    exact, _ = stepper.walk(duration, 4096)
     errors = [np.abs(stepper.walk(duration, steps)[0] - exact) for steps in (32, 64)]
     # Positions, turns, velocities and spins each converge, at order 2.
     for part in (slice(0, 35), slice(35, 65)):
