@@ -18,9 +18,17 @@ Refused = Callable[..., contextlib.AbstractContextManager[None]]
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compiles all kernels, before worker processes start."""
-    if not hasattr(session.config, "workerinput"):
+    """Compiles all kernels before worker processes start, as each would compile them. With `-n 0`
+    a test compiles what it calls."""
+    option = session.config.option
+    if getattr(option, "numprocesses", 0) and not option.collectonly:
         prepare()
+
+
+@pytest.fixture(scope="session")
+def prepared() -> None:
+    """All kernels are compiled, for tests of what compiles nothing more."""
+    prepare()
 
 
 @pytest.fixture(scope="session")

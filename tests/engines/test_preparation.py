@@ -18,7 +18,7 @@ from tetra_drake.scenario.shipped import shipped_scenarios, shipped_structures
 
 
 @pytest.fixture
-def compiled() -> Iterator[list[str]]:
+def compiled(prepared: None) -> Iterator[list[str]]:
     """Names of the kernels of this package that are compiled during a test."""
     recorder = event.RecordingListener()
     names: list[str] = []

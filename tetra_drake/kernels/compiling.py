@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import functools
 import hashlib
@@ -10,6 +9,7 @@ import inspect
 import logging
 import math
 import pickle
+import platform
 import re
 import sys
 import threading
@@ -21,12 +21,14 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, NullCache
+from numba.core.codegen import get_host_cpu_features
 from numba.core.errors import NumbaError
 from numba.core.serialize import dumps
 from numba.extending import overload
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
+from tetra_drake.kernels.stamp import stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -46,6 +48,30 @@ _told = -math.inf
 _SEAL_SIZE = hashlib.sha256().digest_size
 _TIMES = event.TimingListener()
 event.register("numba:compile", _TIMES)
+_V3 = {"+avx2", "+bmi", "+bmi2", "+f16c", "+fma", "+lzcnt", "+movbe"}
+_V4 = _V3 | {"+avx512bw", "+avx512cd", "+avx512dq", "+avx512f", "+avx512vl"}
+_LEVELS = {"x86-64-v4": _V4, "x86-64-v3": _V3}
+"""Levels of x86-64 with the features that a processor needs for them; the higher level first."""
+
+
+def _aim_at_level() -> None:
+    """Makes numba compile for the level of this processor, not for its exact model.
+
+    The code is as fast. All processors of a level share it, and the levels v3 and v4 of x86-64
+    round alike. The environment variable NUMBA_CPU_NAME can name a level or a model instead.
+    """
+    config: Any = numba.config
+    if config.CPU_NAME is None:
+        has = set(get_host_cpu_features().split(","))
+        levels = [name for name, needed in _LEVELS.items() if needed <= has]
+        if platform.machine() in ("arm64", "aarch64"):
+            levels = ["generic"]
+        config.CPU_NAME = next(iter(levels), None)
+    if config.CPU_NAME in (*_LEVELS, "generic") and config.CPU_FEATURES is None:
+        config.CPU_FEATURES = ""  # those of the level
+
+
+_aim_at_level()
 
 
 def compiling_time() -> float:
@@ -135,7 +161,7 @@ class KernelCache(NullCache):
     def __init__(self, function: Callable[..., object]) -> None:
         file = inspect.getfile(function)
         self._kernel = f"{Path(file).stem}.{function.__qualname__}"
-        self._origin = f"{self._kernel} {numba.__version__} {sys.version} {source_stamp(file)} "
+        self._function = function
         self._content: CompileResultCacheImpl | None = None
         if not function.__closure__:  # the machine code would contain the closure's values
             with contextlib.suppress(RuntimeError):  # no folder can be written to
@@ -146,6 +172,12 @@ class KernelCache(NullCache):
     def cache_path(self) -> str | None:
         """Folder of the cache files; None if no folder can be written to."""
         return str(self._content.locator.get_cache_path()) if self._content else None
+
+    @functools.cached_property
+    def _stamp(self) -> str:
+        """Digest of what the kernel is made from. All modules that it uses are imported by the time
+        of its first call."""
+        return stamp(self._function)
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """The machine code for a signature `sig` from the cache; None if it must be compiled.
@@ -182,7 +214,8 @@ class KernelCache(NullCache):
         content depends on."""
         variant = f"{sig} {codegen.magic_tuple()} {sys.implementation.cache_tag}"
         digest = hashlib.sha256(variant.encode()).hexdigest()[:16]
-        return Path(str(self.cache_path), f"{self._kernel}.{digest}.nbc"), self._origin + variant
+        key = f"{self._kernel} {numba.__version__} {sys.version} {self._stamp} {variant}"
+        return Path(str(self.cache_path), f"{self._kernel}.{digest}.nbc"), key
 
 
 def _seal(key: str, content: bytes) -> bytes:
@@ -201,37 +234,3 @@ def announce(kept: bool) -> None:
     logging.getLogger(LOGGER).warning(
         "tetra_drake is compiling for this processor, which may take a minute%s", often
     )
-
-
-def source_stamp(file: str) -> str:
-    """Digest (hexadecimal) of the source of a module and of all modules of this package that it
-    imports, also indirectly. `file` is the path of the module's source."""
-    sources: set[Path] = set()
-    pending = [Path(file).resolve()]
-    while pending:
-        path = pending.pop()
-        if path not in sources:
-            sources.add(path)
-            pending += _imported(path)
-    return hashlib.sha256(b"".join(sorted(path.read_bytes() for path in sources))).hexdigest()
-
-
-@functools.cache
-def _imported(path: Path) -> tuple[Path, ...]:
-    """Files of the modules of this package that the module in the file `path` imports directly.
-
-    A name imported from a package may be a module: `from tetra_drake.laws import contact`.
-    """
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names.add(node.module)
-            names.update(f"{node.module}.{alias.name}" for alias in node.names)
-    package = __name__.partition(".")[0]
-    root = Path(__file__).resolve().parents[__name__.count(".")]
-    modules = [root.joinpath(*name.split(".")) for name in names if name.startswith(f"{package}.")]
-    files = [module.with_suffix(".py") for module in modules]
-    files += [module / "__init__.py" for module in modules]
-    return tuple(file for file in files if file.is_file())

@@ -9,11 +9,7 @@ package's own. Kernels for all other robots stay as they are.
 from __future__ import annotations
 
 import functools
-import hashlib
-import inspect
-import sys
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -22,6 +18,7 @@ from numba.extending import overload, typeof_impl
 
 from tetra_drake.kernels.compiling import INLINED, F
 from tetra_drake.kernels.lanes import Table, named
+from tetra_drake.kernels.stamp import stamp
 
 
 @dataclass(frozen=True)
@@ -39,22 +36,13 @@ class OwnFunctions:
 
 class OwnType(types.Type):
     """Numba type of the functions of one law. Its name, by which machine code is cached, contains a
-    digest of the source of their package."""
+    digest of what they are made from."""
 
     def __init__(self, functions: OwnFunctions) -> None:
         self.functions = functions
         given = [getattr(functions, field.name) for field in fields(functions)]
-        names = [f"{one.__module__}.{one.__qualname__}" for one in given]
-        sources = {path for one in given for path in _sources(one.__module__)}
-        digest = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(sources)))
-        super().__init__(name=f"Own({', '.join(names)}, {digest.hexdigest()})")
-
-
-def _sources(module: str) -> list[Path]:
-    """Source files of the package that a module belongs to; its own file if it is in none."""
-    file = Path(inspect.getfile(sys.modules[module])).resolve()
-    depth = module.count(".") + (file.stem == "__init__")
-    return [*file.parents[depth - 1].rglob("*.py")] if depth else [file]
+        names = ", ".join(f"{one.__module__}.{one.__qualname__}" for one in given)
+        super().__init__(name=f"Own({names}, {stamp(*given)})")
 
 
 _own_type = functools.cache(OwnType)
