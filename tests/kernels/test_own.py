@@ -76,17 +76,19 @@ def test_a_function_that_numba_cannot_compile_is_one_line_with_its_place():
     assert "test_own.py (" in refused.value.source and "\n" not in str(refused.value)
 
 
-def test_changed_sources_of_a_plugin_are_compiled_anew(tmp_path, monkeypatch):
+def test_a_changed_law_of_a_plugin_is_compiled_anew(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     package = tmp_path / "oily"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    (package / "law.py").write_text("def force(slide, law): return 0.0, 0.0\n")
+    text = "from oily import other\ndef force(slide, law): return other.a, other.a  # {}\n"
     names = []
-    for text in ("a = 1\n", "a = 1\n", "a = 2\n"):  # of another module of the package
-        (package / "other.py").write_text(text)
-        for module in ("oily", "oily.law"):
+    for value, comment in ((1.0, "once"), (1.0, "twice"), (2.0, "twice")):
+        (package / "law.py").write_text(text.format(comment))
+        (package / "other.py").write_text(f"a = {value}\n")
+        for module in ("oily", "oily.law", "oily.other"):
             monkeypatch.delitem(sys.modules, module, raising=False)
+        importlib.invalidate_caches()
         force = importlib.import_module("oily.law").force
         names.append(Packed((law_of(force, force),)).kind.name)
     assert names[0] == names[1] != names[2]

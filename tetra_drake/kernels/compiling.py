@@ -9,7 +9,6 @@ import inspect
 import logging
 import math
 import pickle
-import platform
 import re
 import sys
 import threading
@@ -21,7 +20,6 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, NullCache
-from numba.core.codegen import get_host_cpu_features
 from numba.core.errors import NumbaError
 from numba.core.serialize import dumps
 from numba.extending import overload
@@ -29,6 +27,7 @@ from numba.extending import overload
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.kernels.stamp import stamp
+from tetra_drake.machine import LEVELS, code_target
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -42,36 +41,24 @@ _OPTIONS: dict[str, Any] = {
 INLINED: Any = _OPTIONS | {"forceinline": True}
 """Numba's options of functions that become part of the machine code of their callers."""
 _MOMENT, _MINUTE = 2.0, 60.0
-"""Time (s) after which a compilation is announced, and least time (s) between announcements."""
+"""Time (s) after which a compilation is announced, and time (s) without one after which the next is
+announced again."""
 _told = -math.inf
-"""Time of the last announcement."""
+"""Time of the last compilation that took longer than a moment."""
 _SEAL_SIZE = hashlib.sha256().digest_size
 _TIMES = event.TimingListener()
 event.register("numba:compile", _TIMES)
-_V3 = {"+avx2", "+bmi", "+bmi2", "+f16c", "+fma", "+lzcnt", "+movbe"}
-_V4 = _V3 | {"+avx512bw", "+avx512cd", "+avx512dq", "+avx512f", "+avx512vl"}
-_LEVELS = {"x86-64-v4": _V4, "x86-64-v3": _V3}
-"""Levels of x86-64 with the features that a processor needs for them; the higher level first."""
 
 
-def _aim_at_level() -> None:
-    """Makes numba compile for the level of this processor, not for its exact model.
-
-    The code is as fast. All processors of a level share it, and the levels v3 and v4 of x86-64
-    round alike. The environment variable NUMBA_CPU_NAME can name a level or a model instead.
-    """
+def _aim_at_target() -> None:
+    """Makes numba compile for code_target(), unless the user chose other features."""
     config: Any = numba.config
-    if config.CPU_NAME is None:
-        has = set(get_host_cpu_features().split(","))
-        levels = [name for name, needed in _LEVELS.items() if needed <= has]
-        if platform.machine() in ("arm64", "aarch64"):
-            levels = ["generic"]
-        config.CPU_NAME = next(iter(levels), None)
-    if config.CPU_NAME in (*_LEVELS, "generic") and config.CPU_FEATURES is None:
+    config.CPU_NAME = code_target()
+    if config.CPU_NAME in (*LEVELS, "generic") and config.CPU_FEATURES is None:
         config.CPU_FEATURES = ""  # those of the level
 
 
-_aim_at_level()
+_aim_at_target()
 
 
 def compiling_time() -> float:
@@ -223,12 +210,13 @@ def _seal(key: str, content: bytes) -> bytes:
 
 
 def announce(kept: bool) -> None:
-    """Logs that kernels are being compiled, at most once in a minute. `kept` is True if the machine
-    code will be cached."""
+    """Logs that kernels are being compiled, once as long as one follows the other within a minute.
+    `kept` is True if the machine code will be cached."""
     global _told
-    if time.monotonic() < _told + _MINUTE:
-        return
+    follows = time.monotonic() < _told + _MINUTE
     _told = time.monotonic()
+    if follows:
+        return
     lost = " each time, as no folder can be written to: set NUMBA_CACHE_DIR"
     often = "; later runs reuse the code" if kept else lost
     logging.getLogger(LOGGER).warning(

@@ -358,8 +358,8 @@ def processor_lanes() -> int:
     depend on it. Eight doubles fill a register of AVX-512. With narrower
     registers, eight lanes would need more registers than there are, so four are faster.
     """
-    features = registry.cpu_target.target_context.codegen().magic_tuple()[2]  # such as "+avx2"
-    return 8 if "+avx512f" in features else 4
+    _, processor, features = registry.cpu_target.target_context.codegen().magic_tuple()
+    return 8 if processor == "x86-64-v4" or "+avx512f" in features else 4
 
 
 class CompiledEngine(Engine):

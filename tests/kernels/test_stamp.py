@@ -1,0 +1,82 @@
+"""What the digest of a kernel depends on."""
+
+import textwrap
+from collections import namedtuple
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from tetra_drake.kernels.compiling import compiled, inlined
+from tetra_drake.kernels.stamp import stamp
+
+USES = {
+    "a global": "return x + VALUE",
+    "an attribute of a module": "return x + other.VALUE",
+    "an array": "return x + TABLE[0]",
+    "a tuple": "return x + PAIR[1]",
+    "a called function": "return called(x)",
+    "a called kernel": "return kernel(x)",
+    "a closure": "return of_closure(x)",
+    "a default": "return with_default(x)",
+    "an inner function": "return [y + VALUE for y in (x,)][0]",
+    "a constant of its own": "return x + {value}",
+    "fields of a NamedTuple": "return Point(x)",
+    "itself": "return outer(x - 1.0) if x > VALUE else x",
+}
+
+
+def function_of(text, value, comment="", doc="", field="a", other=0.0):
+    """The function outer(x) with a text that uses `value`; `other` is a number that it uses not."""
+    source = f"""
+        def called(x):
+            \"\"\"{doc}\"\"\"
+            return x * VALUE  # {comment}
+
+        def make(a):
+            return lambda x: x * a
+
+        def with_default(x, a=VALUE):
+            return x * a
+
+        def outer(x):
+            # {comment}
+            {text.format(value=value)}
+        """
+    space = {
+        "VALUE": value,
+        "TABLE": np.array([value]),
+        "PAIR": (3, value),
+        "UNUSED": other,
+        "Point": namedtuple("Point", field if value == 1.0 else "b"),
+        "other": ModuleType("another"),
+        "__name__": "tetra_drake.of_a_test",
+    }
+    vars(space["other"]).update(VALUE=value, UNUSED=other)
+    exec(textwrap.dedent(source), space)
+    space["kernel"] = compiled(space["called"])
+    space["of_closure"] = space["make"](value)
+    return space["outer"]
+
+
+@pytest.mark.parametrize("text", USES.values(), ids=USES.keys())
+def test_a_digest_changes_with_what_is_used_and_with_nothing_else(text):
+    first = stamp(function_of(text, 1.0))
+    assert first == stamp(function_of(text, 1.0, comment="more", doc="Of it.", other=7.0))
+    assert first != stamp(function_of(text, 2.0))
+
+
+def test_values_that_are_exchanged_change_a_digest():
+    def of(first, second):
+        space = {"a": first, "b": second, "__name__": "tetra_drake.of_a_test"}
+        exec("def outer(x): return a * x + b", space)
+        return stamp(space["outer"])
+
+    assert of(1.0, 2.0) != of(2.0, 1.0)
+
+
+def test_the_way_of_compilation_is_a_part():
+    def twice(x):
+        return 2.0 * x
+
+    assert stamp(compiled(twice)) != stamp(compiled(twice, nogil=True)) != stamp(inlined(twice))
