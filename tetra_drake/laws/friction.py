@@ -9,8 +9,9 @@ each tangent independently:
 A node breaks free at |x| >= p0 if it moves outward. It sticks again, with x = 0, when v changes
 sign. The thesis's bristle has no stiffness k.
 
-Settings change this law. At p0, x can become 0, and the node sticks again at once. When v changes
-sign, x can stay what it is. A node that breaks free along one tangent can break free along both,
+Settings change this law. At p0, x can become 0, and the node sticks again at once. Then, in closed
+form, x is the rest of the deflection by p0: no step has to end at a reset, and at the end of a step
+the stick point moves by whole p0. When v changes sign, x can stay what it is. A node that breaks free along one tangent can break free along both,
 and x stays what it is along the other. F can be proportional to the normal force.
 
 Coulomb friction acts in the plane, regularised by a bristle. The normal force F_N limits it:
@@ -52,6 +53,7 @@ from tetra_drake.kernels.lanes import (
     Table,
     Truth,
     any_lane,
+    floor,
     maximum,
     minimum,
     named,
@@ -170,7 +172,8 @@ class NextMode(NamedTuple):
     begins: tuple[Truth, Truth]
     """For each tangent, True if the node begins to stick along it."""
     bend: Vector2
-    """Deflection (m) of the bristle along each tangent when the node begins to stick."""
+    """Deflection (m) of the bristle along each tangent when the node begins to stick there, or its
+    deflection restarts."""
 
 
 @inlined
@@ -279,10 +282,20 @@ def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
     """Friction (N) of the reset integrator along one tangent, before any factor for the load. In
     slip, the deflection is the stiction range times the mode (+1 or -1)."""
     per_length = law.stiffness + law.proportional_stiction * abs(slide.velocity)
-    bristle = per_length * (1.0 + law.stiction_switch) * slide.deflection
+    bristle = per_length * (1.0 + law.stiction_switch) * (slide.deflection - restarted(slide, law))
     stick = -(bristle + law.stiction_damping * slide.velocity)
     slip = -per_length * law.stiction_range * slide.mode
     return select(slide.mode == STICK, stick, slip)
+
+
+@inlined
+def restarted(slide: TangentSlide, law: ResetConstants) -> Real:
+    """Part of a deflection (m) that has become 0 at the stiction range: whole ranges, if the
+    deflection restarts there; otherwise 0."""
+    if not any_lane(law.restarts != 0.0):
+        return 0.0 * slide.deflection
+    length = law.stiction_range * floor(abs(slide.deflection) / law.stiction_range)
+    return law.restarts * select(slide.deflection < 0.0, -length, length)
 
 
 @inlined
@@ -307,9 +320,7 @@ def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
     """Mode of the reset integrator along each tangent after a step: 0 sticks, otherwise the
     direction of slip. `slide` is the node's motion at the end of the step, with the modes of the
     step."""
-    slips = law.restarts == 0.0
-    ends_1, ends_2 = at_range(slide.t1, law), at_range(slide.t2, law)
-    breaks_1, breaks_2 = ends_1 & slips, ends_2 & slips
+    breaks_1, breaks_2 = breaks_free(slide.t1, law), breaks_free(slide.t2, law)
     share_1 = share_2 = 0.0 * law.joint
     if any_lane(law.joint != 0.0):  # deflections that are held along the other tangent
         per_range = law.joint / law.stiction_range
@@ -317,20 +328,23 @@ def next_reset_mode(slide: Slide, law: ResetConstants) -> NextMode:
         share_2 = select(breaks_1, per_range * slide.t2.deflection, 0.0)
     mode_1 = next_tangent_mode(slide.t1, breaks_1, share_1)
     mode_2 = next_tangent_mode(slide.t2, breaks_2, share_2)
-    begins_1 = (mode_1 == STICK) & ((slide.t1.mode != STICK) | ends_1)
-    begins_2 = (mode_2 == STICK) & ((slide.t2.mode != STICK) | ends_2)
+    moved_1, moved_2 = restarted(slide.t1, law), restarted(slide.t2, law)
+    begins_1 = (mode_1 == STICK) & ((slide.t1.mode != STICK) | (moved_1 != 0.0))
+    begins_2 = (mode_2 == STICK) & ((slide.t2.mode != STICK) | (moved_2 != 0.0))
     kept = law.kept * law.stiction_range
-    bend = kept * slide.t1.mode, kept * slide.t2.mode
-    return NextMode((mode_1, mode_2), (begins_1, begins_2), bend)
+    bend_1 = select(slide.t1.mode == STICK, slide.t1.deflection - moved_1, kept * slide.t1.mode)
+    bend_2 = select(slide.t2.mode == STICK, slide.t2.deflection - moved_2, kept * slide.t2.mode)
+    return NextMode((mode_1, mode_2), (begins_1, begins_2), (bend_1, bend_2))
 
 
 @inlined
-def at_range(slide: TangentSlide, law: ResetConstants) -> Truth:
-    """True if a node that sticks breaks free along this tangent: its bristle is bent by the
-    stiction range or more, and it moves outward, so that the bend grows."""
+def breaks_free(slide: TangentSlide, law: ResetConstants) -> Truth:
+    """True if a node that sticks begins to slip along this tangent: its bristle is bent by the
+    stiction range or more, and it moves outward, so that the bend grows. A deflection that restarts
+    at the range never lets it slip."""
     forward = (slide.deflection >= law.stiction_range) & (slide.velocity > 0.0)
     backward = (slide.deflection <= -law.stiction_range) & (slide.velocity < 0.0)
-    return (slide.mode == STICK) & (forward | backward)
+    return (slide.mode == STICK) & (forward | backward) & (law.restarts == 0.0)
 
 
 @inlined
@@ -357,6 +371,8 @@ def reset_margin(slide: Slide, law: ResetConstants) -> float:
     """
     margin = math.inf
     for tangent in (slide.t1, slide.t2):
+        if tangent.mode == STICK and law.restarts != 0.0:
+            continue
         if tangent.mode == STICK:
             reserve = law.stiction_range - abs(tangent.deflection)
             inward = -tangent.velocity * tangent.deflection
@@ -388,11 +404,12 @@ def time_to_tangent_change(
 ) -> Real:
     """Time (s) to the next mode change of the reset integrator along one tangent, at most `horizon`
     (s). The acceleration (m/s²) along the tangent is taken as constant."""
-    velocity, stuck = slide.velocity, slide.mode == STICK
+    velocity = slide.velocity
+    stuck = (slide.mode == STICK) & (law.restarts == 0.0)
     # first_zero() ignores a value of 0, so 0 stands for no mode change.
     to_front = select(stuck, law.stiction_range - slide.deflection, 0.0)
     to_back = select(stuck, law.stiction_range + slide.deflection, 0.0)
-    to_rest = select(stuck, 0.0, slide.mode * velocity)
+    to_rest = slide.mode * velocity
     time = first_zero(to_front, -velocity, -acceleration, horizon)
     time = minimum(time, first_zero(to_back, velocity, acceleration, horizon))
     return minimum(time, first_zero(to_rest, slide.mode * acceleration, 0.0, horizon))

@@ -93,7 +93,6 @@ class GroundContact(ConvertibleSystem):
         if parameters:
             self.DeclareNumericParameter(BasicVector(self._constants))
         bodies, count = model.bodies.mass.size, model.ground.contacts.size
-        self._is_round = model.ground.is_round
         # The kernels write to these arrays at every call.
         self._forces, self._force = Forces.of(model), np.empty(6 * bodies)
         self._parts = Packed((model, self._forces))
@@ -193,8 +192,9 @@ class GroundContact(ConvertibleSystem):
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         modes = values.get_mutable_value().reshape(-1, contact.MODE_COLUMNS)
-        changed = self._update_modes(self._parts_in(context), self._state.Eval(context), modes)
-        if changed or (self._is_round and modes[:, contact.CONTACT].any()):
+        before = modes.tobytes()
+        self._update_modes(self._parts_in(context), self._state.Eval(context), modes)
+        if modes.tobytes() != before:
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # Drake keeps the values cached at this state
 
