@@ -30,7 +30,8 @@ _NOWHERE = subprocess.DEVNULL
 
 
 def prepare(tell: Callable[[], None] = lambda: None) -> None:
-    """Compiles the package's kernels for this processor. Later runs reuse the machine code.
+    """Compiles the package's kernels for the level of this processor. Later runs reuse the machine
+    code.
 
         >>> td.prepare()
 
