@@ -9,10 +9,11 @@ each tangent independently:
 A node breaks free at |x| >= p0 if it moves outward. It sticks again, with x = 0, when v changes
 sign. The thesis's bristle has no stiffness k.
 
-Settings change this law. At p0, x can become 0, and the node sticks again at once. Then, in closed
-form, x is the rest of the deflection by p0: no step has to end at a reset, and at the end of a step
-the stick point moves by whole p0. When v changes sign, x can stay what it is. A node that breaks free along one tangent can break free along both,
-and x stays what it is along the other. F can be proportional to the normal force.
+Settings change this law. At p0, x can become 0, and the node sticks again at once. Then x is known
+in closed form: the distance from the stick point less whole p0. So no step has to end at a reset;
+at its end the stick point moves by whole p0. When v changes sign, x can stay what it is. A node
+that breaks free along one tangent can break free along both, and x stays what it is along the
+other. F can be proportional to the normal force.
 
 Coulomb friction acts in the plane, regularised by a bristle. The normal force F_N limits it:
 

@@ -12,7 +12,7 @@ y_extensor - y_flexor.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from pydantic import Field, model_validator
 
 from tetra_drake.kernels.compiling import compiled, inlined
 from tetra_drake.kernels.lanes import Real, Table, Truth, maximum, select
+from tetra_drake.kernels.packed import Packed, unpacked
 from tetra_drake.laws.feedback import Pathway
 from tetra_drake.settings.quantities import ForceQuantity, Time
 from tetra_drake.settings.refusals import refuse
@@ -117,6 +118,10 @@ class Network(NamedTuple):
         )
 
 
+Parts: TypeAlias = Packed[tuple[Network, Table]]
+"""Network and table `neurons`, packed for kernels."""
+
+
 def make_neurons(state: np.ndarray) -> np.ndarray:
     """New table `neurons` (2n, 9) for the kernels. `state` (4n,) is the inner states u of all
     neurons, then their self-inhibitions v. The other columns are 0."""
@@ -164,6 +169,30 @@ def oscillator_output(neurons: Table, output: Table) -> None:
     for k in range(output.size):
         extensor, flexor = neurons[2 * k, U], neurons[2 * k + 1, U]
         output[k] = maximum(extensor, 0.0) - maximum(flexor, 0.0)
+
+
+@compiled
+def network_rates(parts: Parts, state: Table, inputs: Table, rates: Table) -> None:
+    """Writes the rates (1/s) of all u, then of all v, to `rates` (4n,). `state` (4n,) is u, then v.
+
+    `inputs` (2n,) is the sum of tonic input u0 and feedback f. `parts` is a Network and a table
+    `neurons` (2n, 10), which is overwritten.
+    """
+    network, neurons = unpacked(parts)
+    count = neurons.shape[0]
+    for i in range(count):
+        neurons[i, U], neurons[i, V] = state[i], state[count + i]
+    neuron_rates(network, inputs, neurons)
+    for i in range(count):
+        rates[i], rates[count + i] = neurons[i, U_RATE], neurons[i, V_RATE]
+
+
+@compiled
+def network_signals(state: Table, gain: Real, signals: Table) -> None:
+    """Writes gain (y_extensor - y_flexor) of each oscillator to `signals` (n,), in the unit of
+    `gain`. `state` (4n,) is u of all neurons, then v."""
+    for k in range(signals.size):
+        signals[k] = gain * (maximum(state[2 * k], 0.0) - maximum(state[2 * k + 1], 0.0))
 
 
 @inlined

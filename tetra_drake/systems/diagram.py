@@ -71,7 +71,7 @@ def MakeTensegrityDiagram(
     - cpg: only with a gait. With `cpg.signals: live` in the scenario, it is the network, integrated
       with the robot (a live network); otherwise its signals, computed beforehand. A robot without
       oscillators has no cpg.
-    - steering: only for a live network
+    - steering: only for a live network with oscillators on the left or right
     - feedback: only if the scenario's `cpg.feedback` is not empty
     - cables_actuators: only if the kind of actuators has states, as winches have
     - state_forces: only if struts touch, or nodes of bodies are held, joined or loaded
@@ -85,7 +85,7 @@ def MakeTensegrityDiagram(
 
     `steering`, a function from the time (s) to the turn, replaces the gait's turn, -1 to 1.
 
-    Input ports of the diagram: turn of a live network; signals (m,) in N without gait and
+    Input ports of the diagram: turn of steering; signals (m,) in N without gait and
     controller, one for each of the structure's m `oscillators`; ports of the controller. Output
     ports, with their subsystems in parentheses: state (plant), signals (start_up, controller or
     signals), drives (cables_actuators), tensions and lengths (cables), normal_forces,
@@ -317,10 +317,11 @@ def _AddSignals(
             gain=cpg.gain,
         )
         oscillators = builder.AddNamedSystem("cpg", network)
-        turn = gait.turn if steering is None else steering
-        steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))
-        builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
-        builder.ExportInput(steers.GetInputPort("turn"), "turn")
+        if robot.structure.sides.any():
+            turn = gait.turn if steering is None else steering
+            steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))
+            builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
+            builder.ExportInput(steers.GetInputPort("turn"), "turn")
     else:
         samples = signal_samples(robot, gait, steering)
         times = cpg.listing_step * np.arange(len(samples))

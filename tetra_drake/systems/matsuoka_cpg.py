@@ -6,6 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, ContinuousState
 
+from tetra_drake.kernels.compiling import machine_code
+from tetra_drake.kernels.packed import Packed
 from tetra_drake.laws import oscillator
 from tetra_drake.systems.attachment import DeclareOutput
 from tetra_drake.systems.scalar_conversion import ConvertibleSystem
@@ -42,37 +44,40 @@ class MatsuokaCpg(ConvertibleSystem):
         `initial_state` (4n,) is u of all neurons, then v. `gain` is the force (N) per unit of y."""
         super().__init__()
         neurons = len(network.inhibition)
-        self._network, self._gain = network, gain
-        self._default_tonic = np.full(neurons, tonic, dtype=float)
-        self._tonic = self.DeclareVectorInputPort("tonic", neurons)
-        self._feedback = self.DeclareVectorInputPort("feedback", neurons)
         state = np.array(initial_state, dtype=float)
         if state.shape != (2 * neurons,):
             expected = f"({2 * neurons},) for {neurons} neurons"
             raise ValueError(f"found initial_state of shape {state.shape}, expected {expected}")
+        self._gain, self._default_tonic = float(gain), np.full(neurons, tonic, dtype=float)
+        # The kernel writes to these arrays at every call.
+        self._parts, self._rates = Packed((network, oscillator.make_neurons(state))), state.copy()
+        self._compute_rates = machine_code(
+            oscillator.network_rates, self._parts, state, self._default_tonic, self._rates
+        )
+        self._compute_signals = machine_code(
+            oscillator.network_signals, state, self._gain, np.empty(neurons // 2)
+        )
+        self._tonic = self.DeclareVectorInputPort("tonic", neurons)
+        self._feedback = self.DeclareVectorInputPort("feedback", neurons)
         self.DeclareContinuousState(BasicVector(state))
-        sources = {self.xc_ticket()}
+        outputs, sources = MatsuokaCpg._outputs, {self.xc_ticket()}
         self.DeclareVectorOutputPort("signals", neurons // 2, self._calc_signals, sources)
-        u = oscillator.U
-        DeclareOutput(self, "neurons", neurons, lambda s, c: s._neurons(c)[:, u].clip(0.0), sources)
+        DeclareOutput(self, "neurons", neurons, outputs, sources)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Writes the rates of u and v (thesis Eq. 7) to `derivatives`."""
-        neurons = self._neurons(context)
-        tonic, feedback = self._default_tonic, 0.0
+        inputs, state = self._default_tonic, context.get_continuous_state_vector().value()
         if self._tonic.HasValue(context):
-            tonic = self._tonic.Eval(context)
+            inputs = self._tonic.Eval(context)
         if self._feedback.HasValue(context):
-            feedback = self._feedback.Eval(context)
-        oscillator.neuron_rates(self._network, tonic + feedback, neurons)
-        derivatives.SetFromVector(neurons[:, oscillator.U_RATE : oscillator.V_RATE + 1].T.ravel())
+            inputs = inputs + self._feedback.Eval(context)
+        self._compute_rates(self._parts, state, inputs, self._rates)
+        derivatives.SetFromVector(self._rates)
 
-    def _neurons(self, context: Context) -> np.ndarray:
-        """Table `neurons` of laws.oscillator, a row per neuron (2n rows), made from the continuous
-        state in `context`. It is a copy."""
-        return oscillator.make_neurons(context.get_continuous_state_vector().value())
+    def _outputs(self, context: Context) -> np.ndarray:
+        """Outputs y of the neurons (2n,)."""
+        return context.get_continuous_state_vector().value()[: self._default_tonic.size].clip(0.0)
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
-        signals = output.get_mutable_value()
-        oscillator.oscillator_output(self._neurons(context), signals)
-        signals *= self._gain
+        state = context.get_continuous_state_vector().value()
+        self._compute_signals(state, self._gain, output.get_mutable_value())
