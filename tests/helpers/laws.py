@@ -8,12 +8,13 @@ from tetra_drake.laws.terrain import Flat, Incline, Nothing, Obstacles, Relief, 
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.settings.units import INCH
 
+_READINGS = {"reset": {"reset": "reversal"}, "range": {"reset": "range"}}
 _KEPT = {"reset": "never", "breaks_free": "both", "stiffness": "0.3 lbf/in", "load": "0.1 lbf"}
 _THESIS = load_scenario("thesis")
 
 RESET: dict[str, FrictionKind] = {
     name: _THESIS.with_changes({"friction": changes}).friction
-    for name, changes in {"reset": {}, "kept": _KEPT, "range": {"reset": "range"}}.items()
+    for name, changes in {**_READINGS, "kept": _KEPT}.items()
 }
 COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
 FRICTIONS = RESET | {"coulomb": COULOMB, "firm": FIRM}

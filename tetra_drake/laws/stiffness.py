@@ -55,7 +55,9 @@ def stiffness_matrix(robot: Model, forces: Forces) -> bsr_array:
     for kind in kinds:
         springs = kind(robot, forces, carriers)
         motion = np.concatenate([springs.motion_a, springs.motion_b], axis=2)
-        added = motion.transpose(0, 2, 1) @ springs.stiffness @ motion
+        # Not by BLAS, whose last digits depend on the processor.
+        pulled = np.einsum("kni,knm->kim", motion, springs.stiffness)
+        added = np.einsum("kim,kmj->kij", pulled, motion)
         ends = np.stack([springs.body_a, springs.body_b], axis=1)
         for i, j in np.ndindex(2, 2):
             rows.append(ends[:, i])

@@ -270,7 +270,7 @@ def poses_of(structure: Structure, nodes: np.ndarray, since_steady_from: float) 
     return Poses(
         markers=followed_nodes(nodes, structure),
         tip=nodes[:, structure.p_WN[:, 0].argmax()],
-        centre=structure.node_shares @ nodes,
+        centre=np.einsum("n,tna->ta", structure.node_shares, nodes),
         since_steady_from=since_steady_from,
         length=structure.length,
     )

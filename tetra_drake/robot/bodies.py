@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TypeAlias
 
 import numpy as np
@@ -90,7 +91,7 @@ def _body_inertia(
     total, along = SpatialInertia.Zero(), [0.0, 0.0, 1.0]
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
         if density > 0.0:
-            X_FS, length = strut_pose(p_FN[a], p_FN[b]), float(np.linalg.norm(p_FN[b] - p_FN[a]))
+            X_FS, length = strut_pose(p_FN[a], p_FN[b]), math.dist(p_FN[a], p_FN[b])
             M_SSo_S = SpatialInertia.SolidCylinderWithDensity(density, radius, length, along)
             total += M_SSo_S.ReExpress(X_FS.rotation()).Shift(-X_FS.translation())
     for p, radius, density, mass in zip(p_FN, node_radius, node_density, node_mass, strict=True):

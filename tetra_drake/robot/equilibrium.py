@@ -24,7 +24,6 @@ from tetra_drake.laws.forces import Forces, Parts, compute_forces, move_robot
 from tetra_drake.laws.kinematics import FORCE, P_WN, move_bodies, rigid_motions
 from tetra_drake.laws.model import Model
 from tetra_drake.laws.stiffness import stiffness_matrix
-from tetra_drake.robot.statics import null_space
 
 ROUNDING = 64 * np.finfo(float).eps
 """Tolerance for the force left in equilibrium, as a share of the robot's greatest stiffness times
@@ -232,7 +231,7 @@ class _Descent:
             for _ in range(POWER_STEPS):
                 step = self._solved(factor, step)
                 step *= self._reach / np.abs(step).max()
-            return step, float(-step @ self._stiffness @ step)
+            return step, -product(step, self._stiffness @ step)
 
         self._shift = max(self._shift, self._least)
         while True:
@@ -243,7 +242,7 @@ class _Descent:
             step = self._solved(factor, self.force)
             excess = np.abs(step).max() / self._reach
             if excess <= 1.0:
-                return step, float(self.force @ step + self._shift * step @ step)
+                return step, product(self.force + self._shift * step, step)
             self._shift *= min(max(2.0, 0.7 * excess), 100.0)
 
     def _corrected(
@@ -260,7 +259,7 @@ class _Descent:
         moved = displaced(self._robot, self.state, step)
         for count in range(CORRECTIONS + 1):
             force = force_at_rest(self._robot, moved)
-            gain = (self.force + force) @ step / expected
+            gain = product(self.force + force, step) / expected
             if gain > GOOD_GAIN or count == CORRECTIONS or not np.isfinite(force).all():
                 break
             stiffness = stiffness_at_rest(self._robot)
@@ -282,7 +281,9 @@ class _Descent:
         """Displacements (6*n,) in m under a force (6*n,) in N, for the stiffness whose `factor` is
         from _factor(). Motions of the whole robot that nothing resists are projected out."""
         step = factor.solved(force)
-        return step - self._held @ (self._held.T @ step)
+        for motion in self._held:
+            step = step - product(motion, step) * motion
+        return step
 
 
 class Envelope(NamedTuple):
@@ -353,7 +354,7 @@ class Factor(NamedTuple):
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
-    """Orthonormal basis (6*n, motions) of rigid displacements of the whole robot that change no
+    """Orthonormal basis (motions, 6*n) of rigid displacements of the whole robot that change no
     energy: along x, along y and about z; for a robot without weight and contacts all six. Motions
     that anchors, cables from fixed nodes, or loads resist are left out. For the components see
     displaced(). force_at_rest() must have been called for this state before."""
@@ -374,9 +375,36 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
             turned.reshape(-1, 6) / np.abs(model.loads.forces).max(initial=np.finfo(float).tiny),
         ]
     )[:, kept]
-    free = null_space(resisted, RESISTED)
-    orthonormal, _ = np.linalg.qr((motions @ free).reshape(6 * len(p_WB), free.shape[1]))
-    return orthonormal
+    greatest = np.abs(resisted).max(initial=0.0)
+    basis = orthonormal(resisted, RESISTED * greatest)
+    free = np.eye(len(kept)) - np.einsum("ri,rj->ij", basis, basis)
+    free = orthonormal(free, RESISTED)[: len(kept) - len(basis)]
+    return orthonormal(np.einsum("bik,fk->fbi", motions, free).reshape(len(free), -1), 0.0)
+
+
+def product(a: np.ndarray, b: np.ndarray) -> float:
+    """Scalar product of two vectors. Unlike NumPy's, which calls BLAS, it has the same digits on
+    all processors."""
+    return float((a * b).sum())
+
+
+def orthonormal(vectors: np.ndarray, least: float) -> np.ndarray:
+    """Orthonormal basis (dimensions, n) of the space of some vectors (k, n), with the same digits
+    on all processors; by the method of Gram and Schmidt, the longest first. Vectors of which no
+    more than the length `least` is left count as 0."""
+    left, basis = np.array(vectors), np.zeros((0, vectors.shape[1]))
+    for _ in range(min(vectors.shape)):
+        lengths = np.sqrt((left * left).sum(axis=1))
+        longest = int(lengths.argmax())
+        if lengths[longest] <= least:
+            break
+        unit = left[longest] / lengths[longest]
+        for other in basis:  # what rounding has left of them
+            unit = unit - product(unit, other) * other
+        unit /= math.sqrt(product(unit, unit))
+        basis = np.vstack([basis, unit])
+        left -= (left * unit).sum(axis=1)[:, np.newaxis] * unit
+    return basis
 
 
 @compiled

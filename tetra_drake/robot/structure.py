@@ -187,7 +187,8 @@ class Structure(Blueprint):
             # The weighted sum of the nodes of a body is its origin, the centre of mass.
             conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max() or 1.0)])
             origin = [0.0, 0.0, 0.0, conditions[3, 0]]
-            shares.append(mass * np.linalg.lstsq(conditions, origin)[0])
+            # Rounded, because LAPACK's last digits depend on the processor.
+            shares.append(mass * np.linalg.lstsq(conditions, origin)[0].round(12))
         return np.concatenate([*shares, np.zeros(len(fixed))]) / self.mass.sum()
 
     @property
@@ -216,7 +217,7 @@ def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
     (..., 1, 3)."""
     if structure.markers.size:
         return p_WN[..., structure.markers, :]
-    return (structure.node_shares @ p_WN)[..., np.newaxis, :]
+    return np.einsum("n,...na->...a", structure.node_shares, p_WN)[..., np.newaxis, :]
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:

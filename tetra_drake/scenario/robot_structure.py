@@ -358,10 +358,10 @@ class StructureFile(RobotSettings):
         for cable in cables:
             is_backward = body_of[cable.nodes[0]] > body_of[cable.nodes[-1]]
             path = cable.nodes[::-1] if is_backward else cable.nodes
-            places = [np.array(self.nodes[node]) for node in path]
-            pieces = [np.linalg.norm(end - start) for start, end in itertools.pairwise(places)]
+            places = [self.nodes[node] for node in path]
+            length = sum(itertools.starmap(math.dist, itertools.pairwise(places)))
             place_in_group = parts_of(cable.key)[-1]
-            laws.append(self.cables[cable.group].law(float(sum(pieces)), int(place_in_group)))
+            laws.append(self.cables[cable.group].law(length, int(place_in_group)))
             paths.append([number[node] for node in path])
         ends = [[path[0], path[-1]] for path in paths]
         return {
