@@ -379,7 +379,7 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     basis = orthonormal(resisted, RESISTED * greatest)
     free = np.eye(len(kept)) - np.einsum("ri,rj->ij", basis, basis)
     free = orthonormal(free, RESISTED)[: len(kept) - len(basis)]
-    return orthonormal(np.einsum("bik,fk->fbi", motions, free).reshape(len(free), -1), 0.0)
+    return orthonormal(np.einsum("bik,fk->fbi", motions, free).reshape(-1, 6 * len(p_WB)), 0.0)
 
 
 def product(a: np.ndarray, b: np.ndarray) -> float:
