@@ -11,7 +11,7 @@ NUMBERS = {
     r"(?<=whole_cables)$": "[:3]",
     r"(?<=samples=)64": "8",
     r"(?<=DEPTH, PERIOD = )6": "3",
-    r"(?<=\(0\.0, )4\.0": "0.5",
+    r"(?<=\(0\.0, )4\.0": "0.2",
     r"(?<=True, )200_000": "5_000",
 }
 """Numbers of gaits, robots and samples and durations (s) of tutorials, and what stands in their
