@@ -1,9 +1,11 @@
 """Predictions for measured robots: the page's claims."""
 
+import functools
 import hashlib
 
 import measured
 import measured_intervals
+import measured_robots
 import numpy as np
 import pandas
 import pytest
@@ -11,6 +13,14 @@ import pytest
 LOADS = ("0.60", "2.08")
 MODE = {"S1": 1.0, "S2": 1.0, "S3": 1.0, "CB1": 0.393, "CT2": 0.393, "CV3": 0.681}
 """Forces of members of the simplex by the compression of its tubes, as published."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def simplex_once():
+    """Each simplex with a self-stress is looked for once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured_robots, "simplex", functools.cache(measured_robots.simplex))
+        yield
 
 
 def read_only(monkeypatch, file: str, rows) -> None:

@@ -54,7 +54,7 @@ def damage(tree: Any, draw: random.Random) -> None:
         place["spare"] = place[key]
 
 
-@pytest.mark.parametrize("draws", [70, pytest.param(250, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("draws", [50, pytest.param(250, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("structure", [True, False])
 def test_what_a_schema_refuses_does_not_load_and_most_of_the_rest_loads(
     structure: bool, draws: int, tmp_path: Path

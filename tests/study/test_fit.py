@@ -206,12 +206,12 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch, by_formu
     swapped.write_bytes(changed.read_bytes())
     torn.write_bytes(torn.read_bytes()[:-8])
     changed.write_bytes(bytes(32) + changed.read_bytes()[32:])
-    again = fit(hung(), cases, BOUNDS, search=True, out=tmp_path)
+    again = fit_values(hung(), cases, BOUNDS, search=True, folder=tmp_path)
     assert again.parameters.equals(whole.parameters)
     assert sum(predicted[needed:]) == 3 * len(cases)
     needed = len(predicted)
     # Other values are other evaluations.
-    fit(hung().with_changes({DAMPING: "1 N*s/m"}), cases, BOUNDS, out=tmp_path)
+    fit_values(hung().with_changes({DAMPING: "1 N*s/m"}), cases, BOUNDS, folder=tmp_path)
     assert len(predicted) > needed
 
 
