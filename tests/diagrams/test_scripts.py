@@ -31,7 +31,7 @@ def slide_briefly(scenario, *, duration, speed=0.0, of=tetrahedron_on_incline.si
 @pytest.mark.parametrize(
     ("script", "options", "files"),
     [
-        (single_oscillator, {}, 3),
+        (single_oscillator, {"weights": [1.0, 2.0], "ratios": [3.0]}, 3),
         pytest.param(entrainment, {}, 2, marks=pytest.mark.slow),
         (settling_node, {}, 2),
         (sliding_tetrahedron, {"speed": 0.5, "slope": 0.05, "law": "!Coulomb"}, 1),
@@ -79,7 +79,7 @@ def test_what_a_tutorial_imports_is_there_and_so_is_its_picture(name):
             assert hasattr(tetra_drake, node.attr), node.attr
 
 
-SLOW = ("05", "06", "07", "09", "10", "15", "16", "17", "22", "23")
+SLOW = ("05", "06", "07", "09", "10", "11", "15", "16", "17", "22", "23")
 
 
 @pytest.mark.parametrize(

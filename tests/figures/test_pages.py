@@ -156,6 +156,6 @@ def test_two_figures_are_side_by_side(drawn_texts):
     gait_diagram(gait_of("five"), figure=left)
     middle = figure.bbox.width / 2.0
     assert (drawn_texts(figure)[:, 2] <= middle).all()
-    one_step(gait_of("five"), figure=right)
+    relative_distances(gait_of("five"), figure=right)
     texts = drawn_texts(figure)
     assert not ((texts[:, 0] < middle) & (texts[:, 2] > middle)).any()

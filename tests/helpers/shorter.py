@@ -6,7 +6,7 @@ NUMBERS = {
     r'(?<="evolution.trials": )4': "2",
     r'(?<="evolution.evaluations": )\d+': "26",
     r'(?<="popsize": )16': "8",
-    r'(?<="simulation.duration": ")[58](?= s")': "2",
+    r'(?<="simulation.duration": ")[58](?= s")': "2.5",
     r"(?<=AdvanceTo\()[\d.]+(?=\))": "1.0",
     r"(?<=whole_cables)$": "[:3]",
     r"(?<=samples=)64": "8",

@@ -96,7 +96,7 @@ def test_frames_are_evenly_spread_over_the_samples():
 
 
 def test_in_a_browser_bodies_are_where_they_were_and_cables_between_them(browser, file, frames):
-    with opened(browser, file.as_uri(), draws=False) as page:
+    with opened(browser, file.as_uri(), size=(150, 100), draws=False) as page:
         wait_until_loaded(page)
         for frame in (4, -1):
             do(page, "show", float(frames["time"].values[frame]))
