@@ -7,6 +7,7 @@ import functools
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -24,10 +25,19 @@ ORDER = [name for row in ROWS for name in row]
 """A folder, or a module beside the folders, imports only those before it."""
 
 
+def statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """All statements of a module, inner ones, too."""
+    pending: list[ast.AST] = [tree]
+    for node in pending:
+        for field in ("body", "orelse", "handlers", "finalbody", "cases"):
+            pending += getattr(node, field, [])
+        yield node
+
+
 def imports(file: Path) -> set[str]:
     """The modules that a file imports anywhere, as dotted names."""
     modules = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in statements(trees()[file]):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -36,10 +46,16 @@ def imports(file: Path) -> set[str]:
 
 
 @functools.cache
+def trees() -> dict[Path, ast.Module]:
+    """The package's modules, parsed."""
+    return {file: ast.parse(file.read_text(encoding="utf-8")) for file in PACKAGE.rglob("*.py")}
+
+
+@functools.cache
 def modules() -> dict[str, set[str]]:
     """The modules of the package with what they import of it, names below "tetra_drake."."""
     names = {}
-    for file in PACKAGE.rglob("*.py"):
+    for file in trees():
         parts = file.relative_to(PACKAGE).with_suffix("").parts
         if parts[0] not in ("__init__", "__main__"):
             name = ".".join(part for part in parts if part != "__init__")
@@ -66,8 +82,8 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 def test_each_class_and_each_alias_of_a_type_has_a_name_of_its_own() -> None:
     names: Counter[str] = Counter()
-    for file in PACKAGE.rglob("*.py"):
-        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+    for tree in trees().values():
+        for node in tree.body:
             if isinstance(node, ast.ClassDef):
                 names[node.name] += 1
             elif isinstance(node, ast.Assign | ast.AnnAssign):
@@ -85,20 +101,25 @@ def test_neither_the_laws_nor_the_compiled_engine_use_drake(folder: str) -> None
 
 
 HEAVY = {"pydrake", "numba", "scipy", "cma", "ribs", "pandas", "xarray", "matplotlib"}
+IMPORTS = {
+    "tetra_drake": HEAVY | {"numpy"},
+    "tetra_drake.cli": HEAVY | {"numpy", "pydantic"},
+    # And so evaluators, which every worker imports.
+    "tetra_drake.evolution.trials": HEAVY - {"numba", "scipy"},
+    "tetra_drake.experiment": HEAVY - {"pydrake", "numba", "scipy"},
+}
+"""What each module must not import, from the lightest module to the heaviest."""
 
 
-@pytest.mark.parametrize(
-    ("module", "absent"),
-    [
-        ("tetra_drake", HEAVY | {"numpy"}),
-        ("tetra_drake.cli", HEAVY | {"numpy", "pydantic"}),
-        ("tetra_drake.experiment", HEAVY - {"pydrake", "numba", "scipy"}),
-        # And so evaluators, which every worker imports.
-        ("tetra_drake.evolution.trials", HEAVY - {"numba", "scipy"}),
-    ],
-)
-def test_an_import_is_light(module: str, absent: set[str]) -> None:
-    program = f"import sys, {module}; print(*sorted(sys.modules))"
-    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert module in loaded.stdout.split()
-    assert not absent & set(loaded.stdout.split())
+@pytest.fixture(scope="module")
+def loaded() -> dict[str, set[str]]:
+    """What is loaded after each import, in a process that imports one module after the other."""
+    lines = [f"import sys, {name}; print(*sys.modules)" for name in IMPORTS]
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
+    return dict(zip(IMPORTS, map(set, map(str.split, done.stdout.splitlines())), strict=True))
+
+
+@pytest.mark.parametrize("module", IMPORTS)
+def test_an_import_is_light(module: str, loaded: dict[str, set[str]]) -> None:
+    assert module in loaded[module]
+    assert not IMPORTS[module] & loaded[module]

@@ -7,6 +7,7 @@ without gravity. A passive cable and a driven one of equal laws hold it, l1 = L 
 """
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -130,7 +131,10 @@ def test_a_bar_on_an_actuator_is_a_linear_system(one, engine):
     passive = np.array([STIFFNESS, one.damping, 0.0, STIFFNESS * (LENGTH - FREE_LENGTH)])
     rates = np.array([[0, 1, 0, 0], (one.tension - passive) / mu, one.rate, [0, 0, 0, 0]])
     start = [0.0, 0.0, one.start, 1.0]
-    motion = np.array([expm(rates * time) @ start for time in trajectory.time.values])
+    times = trajectory.time.values
+    np.testing.assert_allclose(times, times[1] * np.arange(len(times)), atol=1e-12)
+    step = expm(rates * times[1])
+    motion = np.array([*itertools.accumulate(times[1:], lambda at, _: step @ at, initial=start)])
     assert (np.abs(motion[:, 2] - FREE_LENGTH) >= one.away).all(), "it does not arrive"
     assert np.ptp(motion[:, 0]) > 0.005
     np.testing.assert_allclose(sway_of(trajectory), motion[:, 0], atol=2e-6)
@@ -140,8 +144,8 @@ def test_a_bar_on_an_actuator_is_a_linear_system(one, engine):
 def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
     # Without damping: kinetic and elastic energy, k (l - x)² / 2 of a taut cable, grow by the
     # integral of T (-x').
-    places = np.random.default_rng(0).normal([0, 0, 1], 0.005, (3, 3))
-    floating = {"robot.tetrahedra": 3, "robot.gravity": 0.0, "robot.cables.damping": 0.0}
+    places = np.random.default_rng(0).normal([0, 0, 1], 0.005, (2, 3))
+    floating = {"robot.tetrahedra": 2, "robot.gravity": 0.0, "robot.cables.damping": 0.0}
     floating |= {"robot.offsets": with_unit(places, "m"), "actuation": LIMITED["winch"]}
     floating["simulation.sample_period"] = "0.1 ms"
     robot = Robot.of(shortly(scenario, 0.1, engine=engine, **floating))
@@ -155,5 +159,5 @@ def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
     tension, x = motion.tension.values[:, driven], motion.free_length.values[:, driven]
     works = -0.5 * (tension[1:] + tension[:-1]) * np.diff(x, axis=0)
     work = np.append(0.0, works.sum(axis=1).cumsum())
-    assert np.ptp(work) > 0.01, "J"
+    assert np.ptp(work) > 0.005, "J"
     np.testing.assert_allclose(energy - energy[0], work, atol=1e-4 * np.ptp(work))

@@ -16,6 +16,7 @@ from tetra_drake.scenario.scenario import Scenario
 def short(engine: str, scenario: Scenario) -> Scenario:
     """A fifth of a second on an engine."""
     changes = {"engine": engine, "cpg.start_up": "0.02 s", "friction.stiffness": "0 N/m"}
+    changes["robot.tetrahedra"] = 2
     return shortly(scenario, 0.2, **changes)
 
 

@@ -72,7 +72,7 @@ def test_a_cut_takes_the_energy_of_its_spring_and_a_loss_the_momentum_of_its_mas
 def walk(engine: str) -> Scenario:
     """A walk of two tetrahedra on an engine."""
     changes = {"engine": engine, "robot.tetrahedra": 2, "friction.stiffness": "0 N/m"}
-    return shortly(load_scenario("coulomb"), 0.4, **{"cpg.gain": "4 lbf"}).with_changes(changes)
+    return shortly(load_scenario("coulomb"), 0.3, **{"cpg.gain": "4 lbf"}).with_changes(changes)
 
 
 def test_events_at_the_start_give_the_changed_scenario(walk):
@@ -91,7 +91,7 @@ def test_events_at_the_start_give_the_changed_scenario(walk):
 def test_a_cut_cable_has_no_tension_in_steps_of_a_program_and_in_a_command(walk):
     events = [{"at": "0.1303 s", "cut": ["T1-T2 outer bottom_left"]}]
     scenario = walk.with_changes({"events": events})
-    actions = 2.0 + np.sin(np.arange(20))[:, np.newaxis] * [1.0, -1.0]
+    actions = 2.0 + np.sin(np.arange(15))[:, np.newaxis] * [1.0, -1.0]
     simulation = Simulation(scenario, record=True)
     for each in actions:
         readings = simulation.step(each)

@@ -24,7 +24,7 @@ INCH = 0.0254
 @pytest.mark.parametrize("friction", [RESET["reset"], FIRM])
 def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction):
     slope, gait = np.radians(8.0), seeded_gait(scenario, 2)
-    short = shortly(scenario, 0.3, friction=friction, engine=CONVERGED["drake"])
+    short = shortly(scenario, 0.15, friction=friction, engine=CONVERGED["drake"])
     incline = {"terrain": Incline(slope=slope), "engine": CONVERGED["compiled"]}
     inclined = short.with_changes(incline)
     up_the_slope = simulate(inclined, gait, record=True).trajectory.p_WN.values[-1]
@@ -35,7 +35,7 @@ def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction):
     gravity = diagram.GetSubsystemByName("plant").mutable_gravity_field()
     gravity.set_gravity_vector([-g * s, 0.0, -g * c])
     simulator: Simulator = MakeSimulator(diagram, robot, CONVERGED["drake"])
-    simulator.AdvanceTo(0.3)
+    simulator.AdvanceTo(0.15)
     state = diagram.GetOutputPort("state").Eval(simulator.get_context())
     level = node_positions(Robot.of(short).structure, state)
     turned = level @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])

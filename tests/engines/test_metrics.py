@@ -13,9 +13,9 @@ from tetra_drake.scenario.load import load_scenario
 
 
 def test_tallied_metrics_are_those_of_the_trajectory():
-    # Three tetrahedra on Coulomb friction for 2 s.
+    # Three tetrahedra on Coulomb friction for 1.2 s.
     changes = {"robot.tetrahedra": 3, "cpg.start_up": "0.2 s", "cpg.gain": "3 lbf"}
-    changes |= {"simulation.duration": "2.0 s", "simulation.steady_from": "0.5 s"}
+    changes |= {"simulation.duration": "1.2 s", "simulation.steady_from": "0.5 s"}
     changes |= {"simulation.sample_period": "1e-3 s", "friction.stiffness": "0 N/m"}
     changes["engine"] = "!Compiled"
     robot = Robot.of(load_scenario("coulomb").with_changes(changes))

@@ -28,8 +28,8 @@ pytestmark = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
 
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
-    """0.4 s on the engine `mujoco`, driven from between the samples at 0.10 and 0.11 s on."""
-    times = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.2 s"}
+    """0.3 s on the engine `mujoco`, driven from between the samples at 0.10 and 0.11 s on."""
+    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.2 s"}
     return scenario.with_changes({"engine": "!Mujoco", "cpg.start_up": "0.105 s", **times})
 
 
@@ -59,8 +59,8 @@ def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, struc
 @pytest.mark.parametrize("name", ["thesis", "mast"])  # with weak and strong dampers
 def test_dampers_between_bodies_do_not_slow_the_fall_of_a_robot(name):
     scenario = load_scenario(name)
-    high = {"robot.offsets": [[0.0, 0.0, "8 m"]] * scenario.robot.body_count}
-    falling = shortly(scenario, 1.2, engine="!Mujoco", **NO_BRISTLES | high)  # to 11.8 m/s
+    high = {"robot.offsets": [[0.0, 0.0, "2 m"]] * scenario.robot.body_count}
+    falling = shortly(scenario, 0.6, engine="!Mujoco", **NO_BRISTLES | high)  # to 5.9 m/s
     trajectory = trajectory_of(falling)
     v_WN = trajectory["v_WN"].values
     velocity = Robot.of(falling).structure.node_shares @ v_WN
@@ -70,10 +70,10 @@ def test_dampers_between_bodies_do_not_slow_the_fall_of_a_robot(name):
 
 
 def test_steps_count_against_the_budget_of_evaluations(short):
-    gait, steps = seeded_gait(short), 6400
+    gait, steps = seeded_gait(short), 4800
     short = short.with_changes({"simulation.max_evaluations": steps})
     work = simulate(scenario=short, gait=gait).integrator
-    assert (work.scheme, work.accuracy) == ("Euler", 0.4 / steps)
+    assert (work.scheme, work.accuracy) == ("Euler", 0.3 / steps)
     assert work.steps == work.derivative_evaluations == steps
     short = short.with_changes({"simulation.max_evaluations": steps - 1})
     with pytest.raises(StepBudgetExceeded):

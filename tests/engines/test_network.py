@@ -44,7 +44,7 @@ def image(gait: Gait, scenario: Scenario) -> Gait:
 def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, engine):
     # Each of the pair is inhibited by both of another junction, so each by half of the weight,
     # and not by the other of its own: then both sum to what the thesis's oscillator gets.
-    thesis = shortly(scenario, 1.0, cpg__signals="listing")
+    thesis = shortly(scenario, 0.5, robot__tetrahedra=2, cpg__signals="listing")
     pairs = thesis.with_changes(SIDES)
     gait, sides = seeded_gait(thesis), Weights.of(pairs)
     weight = dict(zip(map(tuple, Weights.of(thesis).couplings), gait.weights, strict=True))
@@ -63,8 +63,8 @@ def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
     every = list(PATHWAYS) if signals == "live" else []
     changes = {"cpg__signals": signals, "cpg__feedback": every}
     # A bristle's reset falls into one step or the next by rounding.
-    changes["friction__stiffness"] = "0 N/m"
-    scenario = shortly(load_scenario("undulation"), 0.6, **changes)
+    changes |= {"friction__stiffness": "0 N/m", "robot__tetrahedra": 3}
+    scenario = shortly(load_scenario("undulation"), 0.4, **changes)
     gait = dataclasses.replace(seeded_gait(scenario, 3), turn=0.4)
     # By default the compiled engine's two walks soon step differently, by rounding.
     engine = CONVERGED["compiled"] if engine == "!Compiled" else engine
@@ -75,7 +75,7 @@ def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
 
 @BOTH
 def test_zero_gains_give_the_walk_without_feedback(scenario, engine):
-    blind = shortly(scenario, 0.5, cpg__signals="live")
+    blind = shortly(scenario, 0.3, robot__tetrahedra=2, cpg__signals="live")
     senses = blind.with_changes({"cpg.feedback": list(PATHWAYS)})
     gait = seeded_gait(blind)
     one, other = walk(blind, gait, engine), walk(senses, gait, engine)

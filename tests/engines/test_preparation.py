@@ -33,7 +33,7 @@ def compiled(prepared: None) -> Iterator[list[str]]:
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_no_shipped_scenario_compiles_anything(name):
     for engine in ("!Compiled", "!Drake"):
-        scenario = shortly(load_scenario(name), 0.05, engine=engine)
+        scenario = shortly(load_scenario(name), 0.01, engine=engine)
         result = simulate(scenario, seeded_gait(scenario), record=True)
         assert result.trajectory.tension.size > 0
     if name in shipped_structures():

@@ -60,12 +60,12 @@ def go(simulation: Simulation, actions: np.ndarray) -> list:
 def test_steps_with_the_samples_of_a_command_give_its_motion(
     short, actuation, steps, engine, count
 ):
-    period = steps * short.cpg.listing_step
-    shares = {"duration": PERIODS, "steady_from": 5.625, "sample_period": 0.5}
+    period, periods = steps * short.cpg.listing_step, 6
+    shares = {"duration": periods, "steady_from": 2.625, "sample_period": 0.5}
     times = {f"simulation.{key}": share * period for key, share in shares.items()}
     scenario = short.with_changes(actuation | {"engine": engine}).with_numbers(times)
     simulation = Simulation(scenario, count=count, control_period=period, record=True, workers=1)
-    actions = drawn_actions(simulation)
+    actions = drawn_actions(simulation)[:periods]
     found = go(simulation, actions)
     for robot in (0, count - 1):
         command = Command("drawn", period, actions[:, robot])
@@ -83,7 +83,7 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(
             held = trajectory.signal[1::2]
             np.testing.assert_allclose(held, actions[:, robot], atol=1e-9)
             assert np.array_equal(trajectory.signal[0], actions[0, robot])
-    assert found[-1].time.tolist() == pytest.approx([PERIODS * period] * count)
+    assert found[-1].time.tolist() == pytest.approx([periods * period] * count)
 
 
 def test_a_robot_that_diverges_says_so_and_does_not_stop_the_others(short):
@@ -137,7 +137,8 @@ def test_the_digits_of_a_robot_depend_neither_on_others_nor_on_threads(short):
 def test_after_an_interrupt_a_reset_makes_the_robots_whole(
     short, engine, inner, monkeypatch, refused
 ):
-    two = Simulation(short.with_changes({"engine": engine}), count=2, workers=1)
+    small = short.with_changes({"engine": engine, "robot.tetrahedra": 2})
+    two = Simulation(small, count=2, workers=1)
     actions, call = drawn_actions(two)[:3], getattr(*inner)
     expected = go(two, actions)[-1]
     two.reset()

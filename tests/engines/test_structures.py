@@ -1,7 +1,8 @@
 """Structures: against an independent simulation, the row of tetrahedra, and what they sense.
 
-In tests/data/structures.json sines pull at the cables of structures at rest. After 5 s, starts
-1e-7 m apart end 3e-7 m apart there, and half the step makes a difference of 9e-8 m.
+In tests/data/structures.json sines pull at the cables of structures at rest, of which the first
+2.5 s are compared. After 5 s, starts 1e-7 m apart end 3e-7 m apart there, and half the step makes
+a difference of 9e-8 m.
 """
 
 import dataclasses
@@ -60,7 +61,7 @@ def test_driven_structures_move_as_the_independent_simulation(name, data):
 
     work.state[:] = structure.initial_state
     centres, every = [centre()], round(INTERVAL / h)
-    for i in range(10 * every):
+    for i in range(5 * every):
         modes_after_step(parts, work.state, modes)
         stepper.take(modes, signals(i * h), signals((i + 1) * h), h)
         if (i + 1) % every == 0:
@@ -68,7 +69,7 @@ def test_driven_structures_move_as_the_independent_simulation(name, data):
     p_WN = node_positions(structure, structure.initial_state)
     transform = onto_recorded(recorded, structure.node_names, p_WN)
     there = np.array(centres) @ transform[:, :3].T + transform[:, 3]
-    expected = np.array(recorded["drive"]["centre_of_bars"])
+    expected = np.array(recorded["drive"]["centre_of_bars"])[: len(centres)]
     assert np.ptp(expected, axis=0).max() > 3e-3, "it moves"
     np.testing.assert_allclose(there, expected, atol=1e-5)
 
@@ -245,11 +246,11 @@ def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):
     assert set(saved["path"]["heading_rad"]) == {None}
 
 
-def test_pictures_of_a_lifted_robot_leave_out_the_ground(tmp_path):
+def test_pictures_of_a_lifted_robot_leave_out_the_ground():
     scenario = floating_prism(duration=0.2)
     result = simulate(scenario, seeded_gait(scenario, 3), record=True)
     assert result.trajectory.sizes["contact"] == 0
     assert result.metrics.lifted == 1.0
-    run_page.draw_pictures(run_page.pictures_of_gait(result), tmp_path)
-    names = {picture.stem for picture in tmp_path.iterdir()}
-    assert "ground_forces" not in names and len(names) > 3
+    pictures = [draw for part in run_page.pictures_of_gait(result).values() for draw in part]
+    assert "ground_forces" not in {draw.func.__name__ for draw in pictures}
+    assert all(draw().axes for draw in pictures) and len(pictures) > 3

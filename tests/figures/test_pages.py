@@ -73,7 +73,7 @@ def drawn_texts(monkeypatch):
                 places[text] = text.get_window_extent(renderer).extents
 
         with common_style(), monkeypatch.context() as patch:
-            figure.draw_without_rendering()  # the layout settles in the second drawing, as if saved
+            figure.get_layout_engine().execute(figure)  # it settles in the second, as if saved
             patch.setattr(Text, "draw", record)
             figure.draw_without_rendering()
         return np.array(list(places.values()))
@@ -84,7 +84,13 @@ def drawn_texts(monkeypatch):
 SLOW = pytest.mark.slow
 
 
-@pytest.fixture(params=[7.0, 3.4, pytest.param((5.0, 8.0), marks=SLOW)], ids=repr)
+WIDE, NARROW, GIVEN = 7.0, 3.4, (5.0, 8.0)
+"""Widths of a page, and the size of a given figure (in)."""
+
+
+@pytest.fixture(
+    params=[NARROW, *(pytest.param(page, marks=SLOW) for page in (WIDE, GIVEN))], ids=repr
+)
 def check(drawn_texts, request):
     """check(draw, *data): checks a figure on a page of its own of some width, or on a given one."""
 
@@ -103,7 +109,15 @@ def check(drawn_texts, request):
     return check
 
 
-@pytest.mark.parametrize("robot", ["five", "long names", pytest.param("three", marks=SLOW)])
+QUICK = ("five", NARROW), ("long names", WIDE)
+ALL = itertools.product(("three", "five", "long names"), (WIDE, NARROW, GIVEN))
+
+
+@pytest.mark.parametrize(
+    ("robot", "check"),
+    [pytest.param(*each, marks=() if each in QUICK else SLOW, id=f"{each}") for each in ALL],
+    indirect=["check"],
+)
 @pytest.mark.parametrize("draw", OF_A_GAIT)
 def test_figures_of_a_gait(draw, robot, check):
     check(draw, gait_of(robot))
@@ -142,6 +156,6 @@ def test_two_figures_are_side_by_side(drawn_texts):
     gait_diagram(gait_of("five"), figure=left)
     middle = figure.bbox.width / 2.0
     assert (drawn_texts(figure)[:, 2] <= middle).all()
-    one_step(gait_of("five"), figure=right)
+    relative_distances(gait_of("five"), figure=right)
     texts = drawn_texts(figure)
     assert not ((texts[:, 0] < middle) & (texts[:, 2] > middle)).any()

@@ -16,8 +16,8 @@ def draw(value):
     return page
 
 
-def saved(folder, value=1.0):
-    save_figure(draw(value), folder, "line", kinds=["svg", "png", "pdf"])
+def saved(folder, *, value=1.0, kinds=("svg", "png", "pdf")):
+    save_figure(draw(value), folder, "line", kinds=kinds)
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
@@ -27,7 +27,7 @@ def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
     with matplotlib.rc_context(users):
         assert saved(tmp_path / "b") == files
         assert matplotlib.rcParams["lines.linewidth"] == 9.0
-    assert saved(tmp_path / "c", value=2.0)["line.svg"] != files["line.svg"]
+    assert saved(tmp_path / "c", value=2.0, kinds=["svg"])["line.svg"] != files["line.svg"]
     starts = {"line.svg": b"<?xml", "line.png": b"\x89PNG", "line.pdf": b"%PDF"}
     assert {name: files[name][: len(start)] for name, start in starts.items()} == starts
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 from helpers.converged import shortly
@@ -40,21 +41,25 @@ SUPPORTS = {"n0": "xyz", "n1": "yz", "n2": "z"}
 LOADS = {"n3": [0.0, 0.0, -0.4], "n4": [0.1, 0.0, -0.3]}
 
 
+load_once = functools.cache(load_scenario)
+read_once = functools.cache(read_structure)
+
+
 def scenario_of(tree: dict[str, Any], duration: float = 2.0, **changes: object) -> Scenario:
     """A structure without ground and contact of struts, its numbers in SI; `actuation="!Winch"`
     changes a section."""
     robot = StructureFile.model_validate(tree)
     parts = {"robot": robot, "terrain": Nothing(), "strut_contact": NoStrutContact()}
-    scenario = load_scenario("prism").with_sections(name="anchored", **parts)
+    scenario = load_once("prism").with_sections(name="anchored", **parts)
     return shortly(scenario, duration, **changes)
 
 
 def supported_prism(**changes: object) -> Scenario:
     """The shipped prism on supports, with loads."""
     parts = {"anchors": SUPPORTS, "loads": LOADS, "actuated": SIDES_ALONE}
-    return scenario_of(read_structure("prism").model_dump() | parts, **changes)
+    return scenario_of(read_once("prism").model_dump() | parts, **changes)
 
 
 def floating_prism(**changes: object) -> Scenario:
     """The shipped prism without weight."""
-    return scenario_of(read_structure("prism").model_dump() | {"gravity": 0.0}, **changes)
+    return scenario_of(read_once("prism").model_dump() | {"gravity": 0.0}, **changes)

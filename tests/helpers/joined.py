@@ -130,7 +130,7 @@ def as_atwood(robot: Robot, times: np.ndarray) -> np.ndarray:
 
 
 def plucked() -> Robot:
-    return Robot.of(scenario_of(STRING | {"offsets": [[0.0, 0.0, 0.06]]}, duration=1.0))
+    return Robot.of(scenario_of(STRING | {"offsets": [[0.0, 0.0, 0.06]]}, duration=0.4))
 
 
 def as_a_string(robot: Robot, times: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ LEANS = 0.5, 1.0
 
 def folded() -> Robot:
     """The double pendulum with both bars aslant."""
-    robot = Robot.of(scenario_of(DOUBLE, duration=3.0))
+    robot = Robot.of(scenario_of(DOUBLE, duration=0.6))
     knee = np.array([0.0, 0.0, -UPPER]), UPPER * along(np.array(LEANS[0]))
     pivots = {0: np.zeros((2, 3)), 1: np.array(knee)}
     return turned(robot, dict(enumerate(LEANS)), pivots)
@@ -203,7 +203,7 @@ def as_a_double_pendulum(robot: Robot, times: np.ndarray) -> np.ndarray:
 
 def ajar() -> Robot:
     """The triangle on its hinge, turned by 0.5 rad."""
-    robot = Robot.of(scenario_of(HINGED, duration=1.0))
+    robot = Robot.of(scenario_of(HINGED, duration=0.5))
     return turned(robot, {1: LEANS[0]}, {1: np.tile([0.0, 0.0, 1.0], (2, 1))})
 
 

@@ -21,6 +21,7 @@ from tetra_drake.scenario.load import SCENARIO, load_scenario
 RECORDED = Path(__file__).parents[2] / "runs/coulomb/trial_08/best_gait.json"
 
 SHORT = {"simulation.duration": "3 s", "simulation.steady_from": "1 s", "cpg.start_up": "0.2 s"}
+BRIEF = {"simulation.duration": "0.6 s", "simulation.steady_from": "0.3 s"}
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,8 @@ def test_a_command_is_played_on_the_scenario_beside_it(short, tmp_path, monkeypa
         return load_scenario(tmp_path / out / SCENARIO)
 
     monkeypatch.chdir(tmp_path)
-    export(short, seeded_gait(short), rate=50.0, out="lab")
+    brief = short.with_changes(BRIEF)
+    export(brief, seeded_gait(brief), rate=50.0, out="lab")
     beside = load_scenario("lab/scenario.yaml")
     assert played("beside") == beside
     assert capsys.readouterr().err == ""

@@ -1,5 +1,6 @@
 """What analyse.py simulates of a run's best gaits."""
 
+import functools
 import json
 from concurrent.futures import ThreadPoolExecutor
 
@@ -25,7 +26,9 @@ def folder(tmp_path_factory):
     metrics = {5.0: METRICS, 3.0: METRICS}
     path = tmp_path_factory.mktemp("runs") / "thesis"
     run = write_run(path, TRIALS, scenario=scenario, metrics=metrics)
-    analyse.analyse(run, workers=1, executor=ThreadPoolExecutor)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(analyse, "robustness", functools.partial(analyse.robustness, draws=8))
+        analyse.analyse(run, workers=1, executor=ThreadPoolExecutor)
     return run
 
 

@@ -40,7 +40,7 @@ def test_cost_is_measured_by_size(scenario, monkeypatch, capsys):
 
 
 def test_all_schemes_of_drake_are_measured(scenario, monkeypatch, capsys):
-    monkeypatch.setattr(benchmark, "MOMENT", 0.03)
+    monkeypatch.setattr(benchmark, "MOMENT", 0.01)
     benchmark.main(["schemes"], scenario)
     rows = [
         line.strip("| ").split("|") for line in capsys.readouterr().out.splitlines()[2:] if line
@@ -62,7 +62,7 @@ def test_a_scheme_that_fails_says_why(scenario):
 
 
 def test_parameters_are_faster_than_a_diagram_for_each_robot(scenario, monkeypatch, capsys):
-    monkeypatch.setattr(benchmark, "CANDIDATES", 10)
+    monkeypatch.setattr(benchmark, "CANDIDATES", 4)
     benchmark.main(["candidates"], scenario)
     lines = [line for line in capsys.readouterr().out.splitlines()[2:] if line]
     own, shared = (float(line.split("|")[2]) for line in lines)

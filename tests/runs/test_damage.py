@@ -1,5 +1,7 @@
 """Trial and error after damage: its choices on a made-up map, its records, and its page."""
 
+import functools
+
 import damage
 import numpy as np
 import pytest
@@ -7,9 +9,17 @@ import pytest
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import load_run
 
+load_once = functools.cache(load_run)
+
+
+@pytest.fixture(autouse=True)
+def read_once(monkeypatch):
+    """The walker's run is read once."""
+    monkeypatch.setattr(damage, "load_run", load_once)
+
 
 def test_a_gait_for_each_motor_is_the_recorded_one():
-    run = load_run(damage.WALKER)
+    run = load_once(damage.WALKER)
     same = simulate(damage.scenario(), damage.steered(run.best_gait(), 0.0))
     recorded = simulate(run.scenario, run.best_gait()).metrics.steady_distance
     assert same.metrics.steady_distance == pytest.approx(recorded, abs=1e-4)
@@ -26,7 +36,7 @@ def test_trials_turn_to_the_side_of_the_map_that_still_walks_and_end():
 
 
 def test_a_strong_trial_pulls_harder_in_the_same_rhythm_without_the_cable():
-    gait = damage.steered(load_run(damage.WALKER).best_gait(), 0.0)
+    gait = damage.steered(load_once(damage.WALKER).best_gait(), 0.0)
     weak, strong = (damage.Trial(gait, each) for each in (1.0, 1.5))
     cable = "T1-T2 outer top"
     robots = [trial.on(damage.scenario(), cable) for trial in (weak, strong)]

@@ -1,8 +1,11 @@
 """Predictions for measured robots: the page's claims."""
 
+import functools
 import hashlib
 
 import measured
+import measured_intervals
+import measured_robots
 import numpy as np
 import pandas
 import pytest
@@ -12,10 +15,24 @@ MODE = {"S1": 1.0, "S2": 1.0, "S3": 1.0, "CB1": 0.393, "CT2": 0.393, "CV3": 0.68
 """Forces of members of the simplex by the compression of its tubes, as published."""
 
 
-def test_the_simplex_is_as_high_as_measured_up_to_a_load_of_1_kn():
-    under_load = measured.simplex_under_load()
-    moderate = under_load[under_load["load"] < 1.01]
-    assert len(moderate) > 8
+@pytest.fixture(autouse=True, scope="module")
+def simplex_once():
+    """Each simplex with a self-stress is looked for once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured_robots, "simplex", functools.cache(measured_robots.simplex))
+        yield
+
+
+def read_only(monkeypatch, file: str, rows) -> None:
+    """Leaves only some rows of a file of measurements: an index, or a function of the table."""
+    table = pandas.read_csv(measured.HERE / file)
+    monkeypatch.setattr(pandas, "read_csv", lambda _: table[rows].copy())
+
+
+def test_the_simplex_is_as_high_as_measured_up_to_a_load_of_1_kn(monkeypatch):
+    read_only(monkeypatch, "simplex_loading.csv", lambda table: table["x"] < 1.01)
+    moderate = measured.simplex_under_load()
+    assert len(moderate) > 8 and moderate["load"].max() > 0.9
     np.testing.assert_allclose(moderate["H"], moderate["H measured"], atol=1.0)  # mm
     for kind in ("CB", "CT", "CV"):
         np.testing.assert_allclose(moderate[kind], moderate[f"{kind} measured"], rtol=0.05)
@@ -39,8 +56,11 @@ def test_the_simplex_vibrates_faster_with_more_self_stress():
     assert slow == pytest.approx(2.28, abs=0.02) and fast == pytest.approx(2.72, abs=0.02)
 
 
-def test_the_spine_rests_where_the_authors_statics_wants_it():
+@pytest.mark.parametrize("every", [8, pytest.param(1, marks=pytest.mark.slow)])
+def test_the_spine_rests_where_the_authors_statics_wants_it(every, monkeypatch):
+    read_only(monkeypatch, "spine_poses.csv", slice(None, None, every))
     poses = measured.spine_poses()
+    assert len(poses) > 350 / every
     for axis in ("x_m", "y_m"):
         np.testing.assert_allclose(poses[f"predicted_{axis}"], poses[f"wanted_{axis}"], atol=5e-5)
     angles = np.degrees(poses["predicted_rad"] - poses["wanted_rad"])
@@ -61,7 +81,8 @@ def test_the_hash_of_the_blind_predictions_is_on_the_page():
 
 
 def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
-    case = measured.cases()["simplex_loads"]
+    loads = [float(load) for load in LOADS]
+    case = measured_intervals.simplex_loads_case(1.5, loads, is_known=True)
     middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
     straight, bowed = case.predict(
         [(case.scenario(), middle | {"bow of the tubes": bow}) for bow in (0.0, 3e-3)]
@@ -71,7 +92,7 @@ def test_bowed_tubes_lower_the_simplex_under_a_high_load_only():
 
 
 def test_a_longer_tube_stresses_all_members_of_the_simplex_by_the_published_mode():
-    case = measured.cases()["blind_simplex_tightened"]
+    case = measured_intervals.simplex_tightened_case((2.0, 8.0))
     middle = {name: unknown.middle for name, unknown in case.unknowns.items()}
     (force,) = case.predict([(case.scenario(), middle)])
     added = {member: force[f"{member} at +8 mm"] - force[f"{member} at +2 mm"] for member in MODE}

@@ -11,10 +11,10 @@ import pytest
 import record
 import tables
 from analyse import ROUNDINGS, load_analysis
+from helpers.recorded import recorded_run
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
-from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait import ParameterSpace, load_gait
@@ -26,11 +26,21 @@ from tetra_drake.study.elites import elites
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""
 
-QUICK = ("thesis", "map", "prism")
-SOME = [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in FOLDERS]
+
+def some(*quick: str) -> list[object]:
+    """All runs; they are slow tests but for these."""
+    marks = {name: [] if name in quick else [pytest.mark.slow] for name in FOLDERS}
+    return [pytest.param(name, marks=each) for name, each in marks.items()]
+
 
 if not FOLDERS:  # as in a source distribution
     pytest.skip("the recorded runs are not here", allow_module_level=True)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """All recorded runs by their names, as the pages need them."""
+    return tables.load_all()
 
 
 def files_in_git():
@@ -43,7 +53,7 @@ def test_every_experiment_is_recorded():
     assert folders <= set(FOLDERS) == set(record.EXPERIMENTS)
 
 
-@pytest.mark.parametrize("name", SOME)
+@pytest.mark.parametrize("name", some("thesis", "map", "prism"))
 def test_the_best_gaits_walk_as_recorded(name):
     """On the compiled engine, undisturbed, which is what analyse.py recorded, too."""
     folder = tables.HERE / name
@@ -58,9 +68,10 @@ def test_the_best_gaits_walk_as_recorded(name):
         assert walked == recorded, f"trial {trial}"
 
 
+@pytest.mark.slow
 def test_the_diagram_walks_as_recorded():
     """Ten starts that are displaced by 1 nm change this distance by at most 0.0022 in."""
-    run = load_run(tables.HERE / "thesis-drake")
+    run = recorded_run("thesis-drake")
     walked = simulate(scenario=run.scenario, gait=run.best_gait()).metrics.distance_in
     recorded = run.fittest()["distance"] / INCH
     assert walked == pytest.approx(recorded, rel=0, abs=ROUNDINGS * 0.0022)
@@ -73,9 +84,9 @@ def test_a_record_holds_every_value_of_its_scenario(name):
         assert dump_scenario(load_scenario(file)) == file.read_text(encoding="utf-8"), file
 
 
-@pytest.mark.parametrize("name", SOME)
+@pytest.mark.parametrize("name", some("motors-map", "prism"))
 def test_all_lines_of_a_run_are_its_own(name):
-    run = load_run(tables.HERE / name)
+    run = recorded_run(name)
     assert len(run.evaluations) and len(run.iterations)
     is_map = isinstance(run.scenario.optimizer, QualityDiversity)
     assert len(elites(run)) > 0 if is_map else elites(run).empty
@@ -94,16 +105,15 @@ def test_a_run_begins_as_its_scenario_and_seed_say(name):
     assert np.array_equal(asked, recorded)
 
 
-def test_the_pages_show_the_recorded_runs():
-    runs = tables.load_all()
+def test_the_pages_show_the_recorded_runs(runs):
     assert set(runs) == set(FOLDERS)
     for page in tables.pages(runs):
         assert tables.made_again(page, runs) == page.read_text(encoding="utf-8"), page
 
 
-def test_the_gallery_is_current_and_opens_every_replay_in_its_folder():
+def test_the_gallery_is_current_and_opens_every_replay_in_its_folder(runs):
     text = (tables.HERE / tables.GALLERY).read_text(encoding="utf-8")
-    assert tables.gallery_page(tables.load_all()) == text
+    assert tables.gallery_page(runs) == text
     links = re.findall(r'(?:href|src)="([^":]+)"', text)
     figures = {f"measured/{name}.svg" for name in tables.MEASURED}
     assert {f"{name}/{REPLAY}" for name in FOLDERS} | figures <= set(links)

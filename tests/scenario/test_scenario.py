@@ -115,14 +115,14 @@ def test_a_written_scenario_loads_back_to_every_bit_without_its_base(tmp_path, n
     odd["ground.damping"] = 1e-5 / 3  # written with an exponent
     other = shipped.with_numbers(odd).with_sections(name="a: 'name' that needs # quoting")
     for scenario in (shipped, other):
-        for text in (dump_scenario(scenario), scenario.to_yaml()):
+        for text in {dump_scenario(scenario), scenario.to_yaml()}:  # which may be one text
             assert load_scenario(write(tmp_path, text)) == scenario
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_a_duration_is_shortened_by_one_key(name):
     shipped = load_scenario(name)
-    for duration in (0.5, 1.0, 2.0, 15.0):
+    for duration in (0.5, 2.0, 15.0):
         changed = shipped.with_changes({"simulation.duration": f"{duration} s"})
         assert changed.simulation.settling_time == min(3.0, duration / 4.0)
         is_idle = duration <= changed.cpg.start_up and changed.policy is None

@@ -54,8 +54,11 @@ def damage(tree: Any, draw: random.Random) -> None:
         place["spare"] = place[key]
 
 
+@pytest.mark.parametrize("draws", [50, pytest.param(250, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("structure", [True, False])
-def test_what_a_schema_refuses_does_not_load_and_most_of_the_rest_loads(structure, tmp_path: Path):
+def test_what_a_schema_refuses_does_not_load_and_most_of_the_rest_loads(
+    structure: bool, draws: int, tmp_path: Path
+) -> None:
     kind, texts, load = "scenario", SCENARIO_TEXTS, load_scenario
     if structure:
         kind, texts, load = "structure", STRUCTURE_TEXTS, read_structure
@@ -68,7 +71,7 @@ def test_what_a_schema_refuses_does_not_load_and_most_of_the_rest_loads(structur
         assert [*check.iter_errors(without_tags(tree))] == []
 
     draw, refused, seen = random.Random(1), 0, 0
-    for count in range(250):
+    for count in range(draws):
         tree = copy.deepcopy(trees[count % len(trees)])
         damage(tree, draw)
         is_seen = not check.is_valid(without_tags(tree))
@@ -79,5 +82,5 @@ def test_what_a_schema_refuses_does_not_load_and_most_of_the_rest_loads(structur
             refused, seen = refused + 1, seen + is_seen
         else:
             assert not is_seen, tree
-    assert refused > 100
+    assert refused > 0.4 * draws
     assert seen >= 0.6 * refused

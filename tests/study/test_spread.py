@@ -19,7 +19,7 @@ from tetra_drake.study.spread import record_spread
 
 
 def test_a_spread_repeats_and_holds_the_unmoved_start_and_grows_with_chaos(scenario):
-    short = scenario.with_changes({"engine": "!Compiled", "simulation.duration": "6 s"})
+    short = scenario.with_changes({"engine": "!Compiled", "simulation.duration": "4 s"})
     gait = td.seeded_gait(short, 80)
     ranges = td.spread(short, gait)
     assert ranges == td.spread(short, gait, workers=1) != td.spread(short, gait, seed=1)

@@ -70,7 +70,7 @@ def rates_and_gradient(diagram: System, numbers: np.ndarray) -> tuple[np.ndarray
 
 def test_cables_have_the_derivatives_of_drakes_linear_spring_dampers():
     ours, drakes = (acrobot(each).ToAutoDiffXd() for each in (with_cables, with_springs))
-    for numbers in np.random.default_rng(1).uniform(-2.0, 2.0, (1000, 5)):
+    for numbers in np.random.default_rng(1).uniform(-2.0, 2.0, (100, 5)):
         rates, gradient = rates_and_gradient(ours, numbers)
         expected = rates_and_gradient(drakes, numbers)
         np.testing.assert_allclose(rates, expected[0], rtol=1e-9, atol=1e-9)
@@ -121,7 +121,7 @@ def test_the_rates_of_oscillators_have_the_derivatives_of_their_law():
     network = Network.of(weights, tau_a=0.3, tau_b=0.6, self_inhibition_weight=1.1)
     cpg = MatsuokaCpg(network, tonic=0.5, initial_state=np.zeros(12)).ToAutoDiffXd()
     unit = np.eye(6)
-    for numbers in generator.uniform(-1.0, 1.0, (1000, 18)):  # u, v, tonic input
+    for numbers in generator.uniform(-1.0, 1.0, (100, 18)):  # u, v, tonic input
         _, gradient = rates_and_gradient(cpg, numbers)
         fires = np.diag(numbers[:6] > 0.0)
         expected = np.block(

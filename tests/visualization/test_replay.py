@@ -96,7 +96,7 @@ def test_frames_are_evenly_spread_over_the_samples():
 
 
 def test_in_a_browser_bodies_are_where_they_were_and_cables_between_them(browser, file, frames):
-    with opened(browser, file.as_uri()) as page:
+    with opened(browser, file.as_uri(), size=(150, 100), draws=False) as page:
         wait_until_loaded(page)
         for frame in (4, -1):
             do(page, "show", float(frames["time"].values[frame]))
@@ -234,7 +234,7 @@ def test_pages_share_one_version_of_a_viewer(scenario, trajectory, page, tmp_pat
 
 
 def test_a_page_without_ground_shows_anchors_and_no_floor(tmp_path):
-    hung = scenario_of(HUNG, duration=0.2)
+    hung = scenario_of(HUNG, duration=0.05)
     robot, frames = Robot.of(hung), recorded(hung)
     save_replay(tmp_path / "page.html", robot=robot, trajectory=frames, title="a robot: hangs")
     page = read_page(tmp_path / "page.html")
