@@ -55,7 +55,7 @@ def _aim_at_target() -> None:
     config: Any = numba.config
     config.CPU_NAME = code_target()
     if config.CPU_NAME in (*LEVELS, "generic") and config.CPU_FEATURES is None:
-        config.CPU_FEATURES = ""  # those of the level
+        config.CPU_FEATURES = ""  # only what the level has
 
 
 _aim_at_target()

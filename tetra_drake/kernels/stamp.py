@@ -10,6 +10,7 @@ from __future__ import annotations
 import dis
 import functools
 import hashlib
+import inspect
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +18,9 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
+
+_VARIADIC = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
+"""Flags of code that numba reads; a profiler changes others."""
 
 _LIBRARIES = {*sys.stdlib_module_names, "numpy", "numba", "llvmlite"}
 """Packages whose functions numba compiles by rules of its own."""
@@ -26,7 +30,7 @@ def stamp(*values: Any) -> str:
     """Digest (hexadecimal) of functions and constants, of all that the functions use, and of the
     package `kernels`, whose rules compile all kernels."""
     digest = hashlib.sha256(_rules().encode())
-    numbers: dict[Any, int] = {}  # of the functions, in the order in which they are met
+    numbers: dict[Any, int] = {}  # functions, in the order of discovery
     pending = [("", value) for value in values]
     for name, value in pending:
         text = _text(value)
@@ -73,7 +77,7 @@ def _bytecode(code: CodeType, *, docstring: str | None = None) -> str:
     """A code object as numba reads it: without positions in the file, and without its docstring."""
     constants = [_constant(one) for one in code.co_consts if docstring is None or one != docstring]
     names = code.co_names, code.co_varnames, code.co_cellvars, code.co_freevars
-    counts = code.co_argcount, code.co_kwonlyargcount, code.co_flags
+    counts = code.co_argcount, code.co_kwonlyargcount, code.co_flags & _VARIADIC
     return f"{code.co_code.hex()} {names} {counts} {constants}"
 
 

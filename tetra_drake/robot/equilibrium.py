@@ -390,8 +390,8 @@ def product(a: np.ndarray, b: np.ndarray) -> float:
 
 def orthonormal(vectors: np.ndarray, least: float) -> np.ndarray:
     """Orthonormal basis (dimensions, n) of the space of some vectors (k, n), with the same digits
-    on all processors; by the method of Gram and Schmidt, the longest first. Vectors of which no
-    more than the length `least` is left count as 0."""
+    on all processors; by the method of Gram and Schmidt, the longest first. Remainders
+    that are at most `least` long count as 0."""
     left, basis = np.array(vectors), np.zeros((0, vectors.shape[1]))
     for _ in range(min(vectors.shape)):
         lengths = np.sqrt((left * left).sum(axis=1))
