@@ -32,10 +32,10 @@ def short():
 @pytest.mark.skipif(not RECORDED.exists(), reason="the recorded runs are not here")
 @pytest.mark.parametrize("actuation", [FORCE, MOTOR])
 def test_a_robot_walks_by_the_file_as_far_as_by_the_gait(actuation, tmp_path):
-    scenario = load_scenario("coulomb").with_changes(actuation)
+    scenario = load_scenario("coulomb").with_changes(actuation | {"simulation.duration": "6 s"})
     verdict = export(scenario, load_gait(RECORDED, scenario), rate=100.0, out=tmp_path / "lab")
     played, own = map(float, re.findall(r"goes (\S+) in", verdict))
-    assert own > 30.0
+    assert own > 10.0
     assert played == pytest.approx(own, rel=0.02)
 
 

@@ -1,5 +1,6 @@
 """Scenario files: the thesis's numbers, files based on files, dumping, and bad files."""
 
+import functools
 import itertools
 from operator import attrgetter
 from pathlib import Path
@@ -91,6 +92,7 @@ def test_bad_changes_are_refused(scenario, refused, changes, key, found):
         scenario.with_changes(changes)
 
 
+load_once = functools.cache(load_scenario)
 RUNS = Path(__file__).parents[2] / "runs"
 
 
@@ -110,7 +112,7 @@ def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
 
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_a_written_scenario_loads_back_to_every_bit_without_its_base(tmp_path, name):
-    shipped = load_scenario(name)
+    shipped = load_once(name)
     odd = {key: 0.99973 * number for key, number in shipped.numbers().items()}
     odd["ground.damping"] = 1e-5 / 3  # written with an exponent
     other = shipped.with_numbers(odd).with_sections(name="a: 'name' that needs # quoting")
@@ -121,7 +123,7 @@ def test_a_written_scenario_loads_back_to_every_bit_without_its_base(tmp_path, n
 
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_a_duration_is_shortened_by_one_key(name):
-    shipped = load_scenario(name)
+    shipped = load_once(name)
     for duration in (0.5, 2.0, 15.0):
         changed = shipped.with_changes({"simulation.duration": f"{duration} s"})
         assert changed.simulation.settling_time == min(3.0, duration / 4.0)

@@ -1,6 +1,7 @@
 """Small motions about rest against analysis, statics and the engines; LQR."""
 
 import dataclasses
+import functools
 import json
 import math
 import re
@@ -49,6 +50,7 @@ MAST = {
 """A mast on a ball joint, with a mass on its top and four soft guys: a push topples it."""
 
 
+@functools.cache
 def undamped() -> Linearization:
     """The prism without weight, damping and actuators."""
     groups = "bottom", "top", "side"
@@ -305,6 +307,13 @@ def test_the_page_shows_one_mode_with_damping(tmp_path):
 
 
 PRISM, NO_GROUND = "prism", {"terrain": "!Nothing {}"}
+
+
+@functools.cache
+def prism() -> Linearization:
+    return linearize(PRISM)
+
+
 BAD = [
     (lambda: linearize(PRISM, np.zeros(12)), "state"),
     (lambda: linearize(PRISM, np.full(39, math.nan)), "state"),
@@ -317,15 +326,15 @@ BAD = [
     (lambda: linearize(PRISM, outputs=[5]), "outputs"),
     (lambda: linearize("incline"), "robot"),
     (lambda: linearize(load_scenario(PRISM).with_changes(NO_GROUND)), "robot"),  # it falls
-    (lambda: linearize(PRISM).lqr(np.eye(3), np.eye(6)), "state_cost"),
-    (lambda: linearize(PRISM).lqr(np.eye(36), np.eye(5)), "input_cost"),
-    (lambda: linearize(PRISM).lqr(-np.eye(36), np.eye(6)), "state_cost"),
-    (lambda: linearize(PRISM).lqr(np.tri(36), np.eye(6)), "state_cost"),
-    (lambda: linearize(PRISM).lqr(np.eye(36), np.zeros((6, 6))), ""),
+    (lambda: prism().lqr(np.eye(3), np.eye(6)), "state_cost"),
+    (lambda: prism().lqr(np.eye(36), np.eye(5)), "input_cost"),
+    (lambda: prism().lqr(-np.eye(36), np.eye(6)), "state_cost"),
+    (lambda: prism().lqr(np.tri(36), np.eye(6)), "state_cost"),
+    (lambda: prism().lqr(np.eye(36), np.zeros((6, 6))), ""),
     (lambda: undamped().lqr(np.eye(36), np.zeros((0, 0))), "robot.actuated"),
-    (lambda: linearize(PRISM).lqr(np.eye(36), np.full((6, 6), math.nan)), "input_cost"),
-    (lambda: linearize(PRISM).controller(np.zeros((5, 36))), "gain"),
-    (lambda: linearize(PRISM).controller(np.full((6, 36), math.nan)), "gain"),
+    (lambda: prism().lqr(np.eye(36), np.full((6, 6), math.nan)), "input_cost"),
+    (lambda: prism().controller(np.zeros((5, 36))), "gain"),
+    (lambda: prism().controller(np.full((6, 36), math.nan)), "gain"),
     (lambda: linearize("winch").controller(np.zeros((8, 68))), "actuation"),
 ]
 

@@ -100,11 +100,11 @@ def test_draws_without_result_are_counted_and_the_same_seed_gives_the_same(tmp_p
     scenario = load_scenario("prism").with_changes(
         {"robot.tolerances": {"cables.side.stiffness": "90 %"}}
     )
-    first, again = (predict(scenario, ["n3 z"], draws=6, seed=1) for _ in range(2))
+    first, again = (predict(scenario, ["n3 z"], draws=4, seed=2) for _ in range(2))
     pandas.testing.assert_frame_equal(first.draws, again.draws)
     failed = int((first.draws["failure"] != "").sum())
-    assert 0 < failed < 6 and first.quantities["draws"].to_list() == [6 - failed]
-    assert any(note.startswith(f"{failed} of 6 draws have no result") for note in first.notes)
+    assert 0 < failed < 4 and first.quantities["draws"].to_list() == [4 - failed]
+    assert any(note.startswith(f"{failed} of 4 draws have no result") for note in first.notes)
     file = tmp_path / "my.yaml"
     file.write_text("base: prism\ntolerances: {robot.cables.side.stiffness: 2 %}\n")
     assert main(["predict", str(file), "--draws", "5", "--out", str(tmp_path / "out")]) == 0
@@ -116,7 +116,7 @@ def test_draws_without_result_are_counted_and_the_same_seed_gives_the_same(tmp_p
 
 
 def test_draws_are_simulated_with_a_gait():
-    changes = {"tolerances": {"ground.stiffness": "20 %"}, "simulation.duration": "2 s"}
+    changes = {"tolerances": {"ground.stiffness": "20 %"}, "simulation.duration": "1 s"}
     scenario = load_scenario("prism").with_changes(changes)
     measures = {"way": "distance", "own": lambda result: result.metrics.distance}
     draws = predict(scenario, measures, gait=td.seeded_gait(scenario, 1), draws=8).draws
