@@ -341,8 +341,8 @@ def test_the_diagram_hardly_damps_what_has_no_dampers():
     simulator, start = MakeSimulator(diagram, robot, Drake()), robot.structure.initial_state
     context = simulator.get_mutable_context()
     context.SetContinuousState(start)
-    simulator.AdvanceTo(0.4)
+    simulator.AdvanceTo(0.2)
     end, still = diagram.GetOutputPort("state").Eval(context), start.copy()
     still[7 * len(robot.structure.bodies) :] = 0.0
     energy, kept, least = (energy_and_momenta(robot, state)[0] for state in (start, end, still))
-    assert kept == pytest.approx(energy, abs=1e-3 * (energy - least))
+    assert kept == pytest.approx(energy, abs=2e-4 * (energy - least))
