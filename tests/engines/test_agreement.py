@@ -181,6 +181,7 @@ def rows() -> Iterable[Any]:
         changes, engines = begin | NO_BRISTLES, (FINE[0], Limit(2e-4))
         name, within, slow = f"{scenario}, MuJoCo", {"distance_in": 2e-3}, scenario == "six_bar"
         yield row(name, scenario, duration, changes, engines, within, gait(seed), 0.05, slow=slow)
+    begin = {"cpg.start_up": "0.25 s", "simulation.steady_from": "0.6 s"}
     for kind in LIMITED:
         actuation = LIMITED[kind].model_copy(update={"max_force": 12.0})
         changes = begin | NO_BRISTLES | {"actuation": actuation}
