@@ -18,7 +18,7 @@ from tetra_drake.scenario.load import load_scenario
 SHORT = """\
 base: thesis
 name: short
-simulation: {duration: 0.3 s, steady_from: 0.1 s, sample_period: 70 ms}
+simulation: {duration: 0.1 s, steady_from: 0.03 s, sample_period: 70 ms}
 """
 """The sample period does not divide the duration."""
 

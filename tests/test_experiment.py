@@ -66,7 +66,7 @@ QUICK = {"reevaluate": False, "report": False}
 
 def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports, monkeypatch):
     progress = MagicMock(spec=Progress)
-    run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
+    run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=1, progress=progress)
     assert run.manifest.seed == 3
     assert run.evaluations["engine"].tolist() == ["compiled"] * 8
     assert run.reevaluations["engine"].tolist() == ["drake"] * 5

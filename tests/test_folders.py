@@ -48,7 +48,8 @@ READERS = {
 @pytest.fixture(scope="module", autouse=True)
 def quick_drawing():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tetra_drake.report.run_page.save_figure", quick_figures.save_figure)
+        patch.setattr("tetra_drake.report.run_page.draw_pictures", quick_figures.draw_pictures)
+        patch.setattr("tetra_drake.figures.style.save_figure", quick_figures.save_blank)
         yield
 
 

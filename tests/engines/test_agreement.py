@@ -122,17 +122,17 @@ def rows() -> Iterable[Any]:
         changes = {"robot.tetrahedra": 3, "robot.contacts": "all", "terrain": UNEVEN[terrain]}
         changes["friction"] = FRICTIONS[law]
         within = {"p_WN": 1e-5 if law in RESET else 1e-6}  # some forty mode changes
-        cells = "thesis", 0.1, changes, CONVERGE, within, gait(2), 5e-4
+        cells = "thesis", 0.04, changes, CONVERGE, within, gait(2), 5e-4
         yield row(f"{terrain}, {law}", *cells)
     # The reset integrator's modes change 1e5 times while a robot with feedback lands.
     changes = {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS), "friction": COULOMB}
     drive = gait(gains=Gains(**dict.fromkeys(PATHWAYS, 1.0)))
     within = {"p_WN": 1e-6, "signal": 2e-5}
-    yield row("feedback", "thesis", 0.15, changes, CONVERGE, within, drive)
+    yield row("feedback", "thesis", 0.1, changes, CONVERGE, within, drive)
     for signals in ("listing", "live"):
         changes = {"cpg.signals": signals, "cpg.listing_step": "1e-4 s", "gait_bounds.turn": 0.0}
         name = f"steering, {signals}"
-        yield row(name, "turning", 0.2, changes, CONVERGE, {"signal": 2e-4}, steered)
+        yield row(name, "turning", 0.15, changes, CONVERGE, {"signal": 2e-4}, steered)
 
     begin = {"cpg.start_up": "0.25 s", "simulation.steady_from": "1 s"}
     within = {"distance_in": 1e-4}  # seen: 1e-5
@@ -147,7 +147,7 @@ def rows() -> Iterable[Any]:
     begin = {"cpg.start_up": "0.1 s", "simulation.steady_from": "0.2 s"}
     yield row("prism", "prism", 0.6, begin, EXPLICIT, {"distance_in": 1e-4}, gait(8), 0.05)
     round_feet = begin | {"robot.struts.bar.contact_radius": "8 mm", "robot.masses": {"n4": "50 g"}}
-    yield row("payload", "prism", 0.5, round_feet, EXPLICIT, {"p_WN": 1e-5}, gait(3), 5e-3)
+    yield row("payload", "prism", 0.3, round_feet, EXPLICIT, {"p_WN": 1e-5}, gait(3), 5e-3)
     # Structures on supports, with loads, and floating.
     bounces = scenario_of(HUNG | {"offsets": [[0.01, 0.0, -0.01]]})
     for name, scenario, engines, apart in (
@@ -160,11 +160,11 @@ def rows() -> Iterable[Any]:
         ("joint and ring", with_arm(), CONVERGE, 1e-6),
         ("joint and ring", with_arm(), (CONVERGE[0], Mujoco()), 1e-4),
     ):
-        yield row(name, scenario, 0.3, NO_BRISTLES, engines, {"p_WN": apart}, gait(3), 1e-3)
+        yield row(name, scenario, 0.15, NO_BRISTLES, engines, {"p_WN": apart}, gait(3), 1e-3)
     for scenario, force in (("motors", 0.04), ("winch", 0.5)):
-        changes = {"cpg.start_up": "0.25 s", "simulation.steady_from": "1 s"}
-        within = {"distance_in": 0.05, "peak_actuator_force": force, "actuator_limited": 0.01}
-        yield row(scenario, scenario, 2.0, changes, DEFAULT, within, gait(3))
+        changes = {"cpg.start_up": "0.25 s", "simulation.steady_from": "0.6 s"}
+        within = {"distance_in": 5e-3, "peak_actuator_force": force, "actuator_limited": 0.01}
+        yield row(scenario, scenario, 1.2, changes, DEFAULT, within, gait(3), 0.05)
 
     begin = {"simulation.steady_from": "0.2 s"}
     commands = {"force": ({}, waves(0.0, 1.5))}
@@ -181,6 +181,7 @@ def rows() -> Iterable[Any]:
         changes, engines = begin | NO_BRISTLES, (FINE[0], Limit(2e-4))
         name, within, slow = f"{scenario}, MuJoCo", {"distance_in": 2e-3}, scenario == "six_bar"
         yield row(name, scenario, duration, changes, engines, within, gait(seed), 0.05, slow=slow)
+    begin = {"cpg.start_up": "0.25 s", "simulation.steady_from": "0.6 s"}
     for kind in LIMITED:
         actuation = LIMITED[kind].model_copy(update={"max_force": 12.0})
         changes = begin | NO_BRISTLES | {"actuation": actuation}
@@ -211,7 +212,7 @@ def rows() -> Iterable[Any]:
     # feet chatter: they leave the ground for a step every few.
     chatters = ("metrics.lifted", "metrics.path_curvature")
     within = {name: 50.0 * value for name, value in within.items() if name not in chatters}
-    engines = Compiled(), Mujoco()
+    cells, engines = ("coulomb", 1.2, changes), (Compiled(), Mujoco())
     yield row("all metrics, MuJoCo", *cells, engines, within, gait(3), relative=0.03)
     # Bodies, cables and motors are the same; only the ground differs.
     within = {"p_WN": 2e-5, "v_WN": 2e-4, "p_WB": 2e-5, "q_WB": 1e-4}

@@ -19,6 +19,8 @@ from tetra_drake.settings.units import INCH
 from tetra_drake.systems import SampledController
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
+EXPLICIT = Drake(scheme="runge_kutta3", accuracy=1e-6)
+
 
 @pytest.fixture
 def walking() -> Scenario:
@@ -138,13 +140,13 @@ def test_free_input_ports_of_a_controller_are_ports_of_the_diagram(walking):
 def test_signals_from_outside_drive_as_those_of_a_controller(walking):
     robot, held = controlled_robot(walking), np.linspace(0.5, 4.0, 4)
     diagram = MakeTensegrityDiagram(robot)
-    simulator = MakeSimulator(diagram, robot, Drake(accuracy=1e-6))
+    simulator = MakeSimulator(diagram, robot, EXPLICIT)
     diagram.GetInputPort("signals").FixValue(simulator.get_mutable_context(), held)
     simulator.AdvanceTo(0.08)
     context = simulator.get_context()
     np.testing.assert_array_equal(diagram.GetOutputPort("signals").Eval(context), held)
     result = simulate(
-        shortly(walking, 0.08, engine=Drake(accuracy=1e-6)),
+        shortly(walking, 0.08, engine=EXPLICIT),
         controller=lambda time, readings: held,
         record=True,
     )

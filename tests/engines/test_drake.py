@@ -43,7 +43,7 @@ def test_a_live_network_walks_as_the_listing_with_short_steps_does(scenario, gai
 
 def test_the_work_counts_all_steps_from_the_start(scenario, gait):
     # New Jacobians after mode changes clear the integrator's own counts.
-    times = {"simulation.duration": "2.0 s", "simulation.steady_from": "1.0 s"}
+    times = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.5 s"}
     viewer = Mock(wants=Mock(return_value=False))
     work = simulate(scenario=scenario.with_changes(times), gait=gait, viewer=viewer).integrator
     ends = {call.args for call in viewer.wants.call_args_list}

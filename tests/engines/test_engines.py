@@ -80,8 +80,9 @@ def test_a_robot_follows_a_gait_or_a_command(scenario, what, key, refused):
 
 
 def test_the_path_is_that_of_the_trajectory(scenario, engine):
-    beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3, 1, 6)]
-    short = shortly(scenario, 0.5, **{"robot.offsets": beside, "engine": engine})
+    beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3)]
+    changes = {"robot.tetrahedra": 3, "robot.offsets": beside, "engine": engine}
+    short = shortly(scenario, 0.5, **changes)
     result = simulate(scenario=short, gait=seeded_gait(short), record=True)
     path, whole = result.path, path_of_centre(result.trajectory, Robot.of(short).structure)
     assert path.times.tolist() == [0.0, 0.25, 0.5]

@@ -47,9 +47,9 @@ def test_contact_never_gives_energy(scenario, friction):
     # Kinetic energy, weight, cables and the springs of contacts (k d^2 / 2); a bristle's spring
     # can only hold what it has taken.
     fall = {"robot__offsets": [[0.0, 0.0, "5 mm"]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
-    fall["simulation__sample_period"] = "2 ms"
+    fall["simulation__sample_period"] = "4 ms"
     rough = Rough(amplitude=0.25 * INCH, wavelength=4.0 * INCH, seed=5)
-    falling = shortly(scenario, 0.6, terrain=rough, friction=friction, **fall)
+    falling = shortly(scenario, 0.4, terrain=rough, friction=friction, **fall)
     robot = Robot.of(falling.with_sections(engine=CONVERGED["compiled"]))
     states = simulated(robot, seed=2)[1].states
     energy = np.array([energy_and_momenta(robot, state)[0] for state in states])

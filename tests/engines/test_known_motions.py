@@ -108,10 +108,10 @@ def lowered(tree: dict, duration: float, low: float = -0.01) -> Robot:
 
 
 KNOWN = {
-    "a bar on a cable": (lambda: lowered(HUNG, 2.0), on_a_spring, 1e-6),
+    "a bar on a cable": (lambda: lowered(HUNG, 0.6), on_a_spring, 1e-6),
     # 12 g at 100 N are as fast as 64 m/s.
     "a light bar": (lambda: lowered(HUNG | {"masses": {}}, 0.012, -0.5), on_a_spring, 3e-3),
-    "a point mass": (lambda: lowered(HANGING, 0.6), between_two_cables, 1e-6),
+    "a point mass": (lambda: lowered(HANGING, 0.3), between_two_cables, 1e-6),
     # The anchor gives way by m g / k, 0.7 um, and by some more as the bar speeds up.
     "a pendulum": (leaning, as_a_pendulum, 1e-5),
     "Atwood's machine": (joined.released, joined.as_atwood, 1e-6),
@@ -341,8 +341,8 @@ def test_the_diagram_hardly_damps_what_has_no_dampers():
     simulator, start = MakeSimulator(diagram, robot, Drake()), robot.structure.initial_state
     context = simulator.get_mutable_context()
     context.SetContinuousState(start)
-    simulator.AdvanceTo(0.4)
+    simulator.AdvanceTo(0.2)
     end, still = diagram.GetOutputPort("state").Eval(context), start.copy()
     still[7 * len(robot.structure.bodies) :] = 0.0
     energy, kept, least = (energy_and_momenta(robot, state)[0] for state in (start, end, still))
-    assert kept == pytest.approx(energy, abs=1e-3 * (energy - least))
+    assert kept == pytest.approx(energy, abs=2e-4 * (energy - least))

@@ -64,7 +64,7 @@ def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
     changes = {"cpg__signals": signals, "cpg__feedback": every}
     # A bristle's reset falls into one step or the next by rounding.
     changes |= {"friction__stiffness": "0 N/m", "robot__tetrahedra": 3}
-    scenario = shortly(load_scenario("undulation"), 0.4, **changes)
+    scenario = shortly(load_scenario("undulation"), 0.3, **changes)
     gait = dataclasses.replace(seeded_gait(scenario, 3), turn=0.4)
     # By default the compiled engine's two walks soon step differently, by rounding.
     engine = CONVERGED["compiled"] if engine == "!Compiled" else engine

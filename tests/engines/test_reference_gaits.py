@@ -15,16 +15,13 @@ WELL_CONDITIONED = [f"gait_{letter}" for letter in "bcdefgh"]
 GAITS = ["gait_a", *WELL_CONDITIONED]
 
 
-ALL_ON_DRAKE = pytest.param(("drake", GAITS), marks=pytest.mark.slow)
-
-
-@pytest.fixture(scope="module", params=[("drake", ["gait_b"]), ALL_ON_DRAKE, ("compiled", GAITS)])
+@pytest.fixture(scope="module", params=["compiled", pytest.param("drake", marks=pytest.mark.slow)])
 def results(request, data: Path) -> dict[str, SimulationResult]:
-    engine, names = request.param
+    engine = request.param
     scenario = load_scenario("thesis").with_changes({"engine": f"!{engine.capitalize()}"})
     return {
         name: simulate(scenario=scenario, gait=load_gait(data / f"{name}.json", scenario))
-        for name in names
+        for name in GAITS
     }
 
 

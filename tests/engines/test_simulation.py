@@ -63,7 +63,8 @@ def test_steps_with_the_samples_of_a_command_give_its_motion(
     period, periods = steps * short.cpg.listing_step, 6
     shares = {"duration": periods, "steady_from": 2.625, "sample_period": 0.5}
     times = {f"simulation.{key}": share * period for key, share in shares.items()}
-    scenario = short.with_changes(actuation | {"engine": engine}).with_numbers(times)
+    small = {"engine": engine, "robot.tetrahedra": 2}
+    scenario = short.with_changes(actuation | small).with_numbers(times)
     simulation = Simulation(scenario, count=count, control_period=period, record=True, workers=1)
     actions = drawn_actions(simulation)[:periods]
     found = go(simulation, actions)

@@ -33,7 +33,7 @@ def similar(scenario: Scenario, length: float) -> Scenario:
 
 def test_a_robot_of_another_size_moves_as_its_model(engine):
     changes = {"friction.stiffness": "0 N/m", "simulation.sample_period": "0.02 s"}
-    prism = shortly(load_scenario("prism"), 0.5, engine=engine, **changes)
+    prism = shortly(load_scenario("prism"), 0.4, engine=engine, **changes)
     robots = {length: similar(prism, length) for length in (1.0, 0.01, 10.0)}
     model, *others = (
         simulate(robot, seeded_gait(robot, 8), record=True).trajectory.p_WB.values / length

@@ -179,9 +179,10 @@ LIFTED_BAR = LYING_BAR | {"offsets": [[0.0, 0.0, 0.02]]}
 @pytest.fixture(params=["pair", "body"])
 def undriven(request) -> Scenario:
     """A pair whose cables nothing drives, or a body without cables, 2 cm above the ground."""
+    brief = BRIEF | {"simulation.duration": "0.7 s"}
     if request.param == "pair":
-        return load_scenario("pair").with_changes(BRIEF | {"robot.actuated": {}})
-    prism = load_scenario("prism").with_changes(BRIEF)
+        return load_scenario("pair").with_changes(brief | {"robot.actuated": {}})
+    prism = load_scenario("prism").with_changes(brief)
     return prism.with_sections(name="body", robot=StructureFile.model_validate(LIFTED_BAR))
 
 

@@ -11,15 +11,15 @@ from helpers.converged import shortly
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.evaluators import WorkerProcesses, in_lanes, on_executor
+from tetra_drake.evolution.evaluators import in_lanes, on_executor
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
 
 
 @pytest.fixture
 def tiny():
-    """0.3 s from a standing start, actuated at once so that gaits differ."""
-    return shortly(small_scenario(), 0.3)
+    """0.1 s from a standing start, actuated at once so that gaits differ."""
+    return shortly(small_scenario(), 0.1)
 
 
 @pytest.fixture
@@ -28,11 +28,11 @@ def vectors(tiny):
     return [ParameterSpace.of(tiny).random(generator) for _ in range(2)]
 
 
-def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vectors):
+def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vectors, one_process):
     tasks = tasks_of(vectors)
     here = [GaitEvaluation(tiny)(task) for task in tasks]
-    with on_executor(GaitEvaluation(tiny), WorkerProcesses, 1) as processes:
-        there = evaluated(processes, tasks)
+    with on_executor(GaitEvaluation(tiny), one_process, 1) as process:
+        there = evaluated(process, tasks)
     for index, vector in enumerate(vectors):
         result = simulate(tiny, ParameterSpace.of(tiny).gait(vector, name="any"), record=True)
         for found in (here[index], there[index]):

@@ -13,12 +13,13 @@ from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
 from tetra_drake.evolution.run import load_run
 
 
-@pytest.mark.parametrize("make", [WorkerProcesses, ProcessPoolExecutor])
-def test_a_run_whose_worker_dies_says_so_and_is_resumed(make, tmp_path, refused):
+@pytest.mark.parametrize(("make", "workers"), [(WorkerProcesses, 1), (ProcessPoolExecutor, 2)])
+def test_a_run_whose_worker_dies_says_so_and_is_resumed(make, workers, tmp_path, refused):
     run, scenario = tmp_path / "run", analytic.small_scenario(trials=1)
     analytic.record_run(tmp_path / "whole", scenario)
     with refused("worker processes", "", "died"):
-        analytic.record_run(run, scenario, evaluator=on_executor(analytic.Dying(17), make, 2))
+        evaluator = on_executor(analytic.Dying(17), make, workers)
+        analytic.record_run(run, scenario, evaluator=evaluator)
     assert load_run(run).evaluations["failure"].isin([None, "fell off the table"]).all()
     analytic.record_run(run)
     assert analytic.read_record(run) == analytic.read_record(tmp_path / "whole")
@@ -28,7 +29,7 @@ def test_a_function_that_workers_cannot_load_is_told(tasks, monkeypatch, capfd, 
     monkeypatch.delenv("TETRA_DRAKE_LOADED_IN", raising=False)
     evaluate = importlib.import_module("helpers.unloadable").evaluate
     with (
-        refused("worker processes", "", "do not start"),
+        refused("worker processes", "", "do not start", "__main__"),
         on_executor(evaluate, WorkerProcesses, 1) as processes,
     ):
         analytic.evaluated(processes, tasks)
@@ -43,9 +44,10 @@ from helpers.analytic import Bowl, evaluated, small_scenario, tasks_of
 def objective(result):
     return result.metrics.twist
 def evolve(**options):
-    times = {"simulation.duration": "0.1 s", "simulation.steady_from": "0.05 s"}
-    scenario = small_scenario(population=4, iterations=1, trials=1).with_changes(times)
-    run = tetra_drake.evolve(scenario, "run", workers=2, report=False, **options)
+    times = {"simulation.duration": "20 ms", "simulation.steady_from": "10 ms"}
+    small = small_scenario(oscillators=2, population=4, iterations=1, trials=1)
+    options |= {"workers": 2, "reevaluate": False, "report": False}
+    run = tetra_drake.evolve(small.with_changes(times), "run", **options)
     print(len(run.evaluations), run.statuses[0].failures)
 """
 EVALUATE = """
@@ -70,6 +72,7 @@ def run_program(folder, call, *, how):
     )
 
 
+@pytest.mark.slow
 def test_a_program_without_guard_is_told(tmp_path):
     ended = run_program(tmp_path, EVALUATE, how="file")
     assert ended.returncode == 1 and ended.stdout == ""

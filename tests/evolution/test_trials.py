@@ -3,19 +3,18 @@
 import pytest
 from helpers.analytic import Bowl, RandomSearch, read_record, record_run, small_scenario
 
-from tetra_drake.evolution import evaluators
+from tetra_drake.evolution.evaluators import on_executor
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Evaluation, Iteration
 
 
 def test_neither_workers_nor_executor_nor_timing_change_the_record(
-    run_small, tmp_path, monkeypatch
+    run_small, tmp_path, one_process
 ):
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
-    monkeypatch.setattr(evaluators, "TASKS_PER_WORKER", 20)
-    processes = evaluators.on_executor(Bowl(), evaluators.WorkerProcesses, 2)
-    record_run(tmp_path / "pool", small_scenario(), evaluator=processes)
+    process = on_executor(Bowl(), one_process, 1)  # it is replaced on the way
+    record_run(tmp_path / "pool", small_scenario(), evaluator=process)
     assert read_record(tmp_path / "pool") == reference
 
 

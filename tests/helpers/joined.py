@@ -130,7 +130,7 @@ def as_atwood(robot: Robot, times: np.ndarray) -> np.ndarray:
 
 
 def plucked() -> Robot:
-    return Robot.of(scenario_of(STRING | {"offsets": [[0.0, 0.0, 0.06]]}, duration=0.4))
+    return Robot.of(scenario_of(STRING | {"offsets": [[0.0, 0.0, 0.06]]}, duration=0.3))
 
 
 def as_a_string(robot: Robot, times: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ LEANS = 0.5, 1.0
 
 def folded() -> Robot:
     """The double pendulum with both bars aslant."""
-    robot = Robot.of(scenario_of(DOUBLE, duration=0.6))
+    robot = Robot.of(scenario_of(DOUBLE, duration=0.4))
     knee = np.array([0.0, 0.0, -UPPER]), UPPER * along(np.array(LEANS[0]))
     pivots = {0: np.zeros((2, 3)), 1: np.array(knee)}
     return turned(robot, dict(enumerate(LEANS)), pivots)

@@ -34,7 +34,7 @@ def compile_terminated(scenario):
 
 if __name__ == "__main__":
     from tetra_drake.cli import main
-    from tetra_drake.engines.drake import ENGINE
+    from tetra_drake.engines.lanes.batch import ENGINE
 
     ENGINE.prepare = compile_terminated
-    sys.exit(main(["simulate", "--out", sys.argv[1]]))
+    sys.exit(main(["simulate", "--engine", "compiled", "--out", sys.argv[1]]))

@@ -2,8 +2,6 @@
 
 import os
 
-from helpers.analytic import Bowl
-
 if os.environ.get("TETRA_DRAKE_LOADED_IN", str(os.getpid())) != str(os.getpid()):
     raise ImportError("only one process can load this")
 os.environ["TETRA_DRAKE_LOADED_IN"] = str(os.getpid())
@@ -11,4 +9,6 @@ os.environ["TETRA_DRAKE_LOADED_IN"] = str(os.getpid())
 
 def evaluate(task):
     """As Bowl."""
+    from helpers.analytic import Bowl
+
     return Bowl()(task)

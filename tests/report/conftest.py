@@ -22,9 +22,10 @@ COSTS = {4.0: 0.9, 3.0: 0.5, 2.5: 0.7, 2.0: 0.25, 1.5: 0.1}
 
 @pytest.fixture(scope="package", autouse=True)
 def quick_drawing():
-    """All but one of the figures are blank, as it takes seconds to write them."""
+    """All but one of the figures are written blank, and those of a gait are drawn once, as it takes
+    seconds."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tetra_drake.report.run_page.save_figure", quick_figures.save_figure)
+        patch.setattr("tetra_drake.report.run_page.draw_pictures", quick_figures.draw_pictures)
         yield
 
 

@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pytest
 from helpers.plugin import declare, install_example
@@ -35,7 +35,11 @@ evolution: {trials: 1, evaluations: 2}
 TAGS = ["Scaled", "Viscous", "Waves", "Servo", "Sine", "HillClimb"]
 
 USE = """\
-import json, sys
+import json, pickle, sys
+from concurrent.futures import ThreadPoolExecutor
+import tetra_drake.cli, tetra_drake.experiment
+from tetra_drake.settings.plugins import entries
+searches = entries.cache_info().misses
 import tetra_drake as td
 from tetra_drake.report.result_folder import save_result
 from tetra_drake.scenario.keys import keys_page, schema_text
@@ -44,13 +48,16 @@ from tetra_drake.scenario.structure_files import read_structure
 if __name__ == "__main__":
     scenario = td.load_scenario(sys.argv[1])
     save_result("result.json", td.simulate(scenario, td.seeded_gait(scenario)))
-    run = td.evolve(scenario, "run", report=False, reevaluate=False)
+    quick = {"report": False, "reevaluate": False}
+    run = td.evolve(scenario, "run", executor=ThreadPoolExecutor, workers=1, **quick)
     print(json.dumps({
+        "searches by imports": searches,
         "page": keys_page(),
         "schema": schema_text(),
         "bodies": read_structure("hanging_bar").blueprint().bodies,
         "read back": td.load_run("run").scenario == scenario,
         "evaluations": len(run.evaluations),
+        "pickled": pickle.loads(pickle.dumps(scenario)) == scenario,
     }))
 """
 
@@ -70,11 +77,17 @@ def run_with(site: Path, folder: Path, program: str, *, jit: bool = False) -> di
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_a_plugin_adds_one_of_each_and_records_name_it(tmp_path):
-    site = tmp_path / "site"
-    install_example(site)
-    found = run_with(site, tmp_path, USE)
-    assert found["read back"] and found["evaluations"] == 2
+@pytest.fixture(scope="module")
+def used(tmp_path_factory) -> tuple[Path, dict[str, Any]]:
+    """The folder in which USE has run, and what it printed."""
+    folder = tmp_path_factory.mktemp("used")
+    install_example(folder / "site")
+    return folder, run_with(folder / "site", folder, USE)
+
+
+def test_a_plugin_adds_one_of_each_and_records_name_it(used):
+    folder, found = used
+    assert found["read back"] and found["pickled"] and found["evaluations"] == 2
     assert found["bodies"] == ["bar"]
     titles = {
         part["title"]
@@ -85,13 +98,13 @@ def test_a_plugin_adds_one_of_each_and_records_name_it(tmp_path):
         assert f"!{tag}`" in found["page"] and f"!{tag}" in titles
     assert "Friction divided by velocity." in found["page"]
 
-    for file in (tmp_path / "result.json", tmp_path / "run/manifest.json"):
+    for file in (folder / "result.json", folder / "run/manifest.json"):
         assert json.loads(file.read_text())["versions"]["plug-in tetra-example"] == "0.1"
     with pytest.raises(InputError, match=r"plug-in tetra-example 0\.1, which is not") as refused:
-        read_manifest(tmp_path / "run")
+        read_manifest(folder / "run")
     assert refused.value.key == "versions"
     with pytest.raises(InputError, match="!Structure; a plug-in may be missing") as refused:
-        load_scenario(tmp_path / "scenario.yaml")
+        load_scenario(folder / "scenario.yaml")
     assert refused.value.key == "robot"
 
 
@@ -183,13 +196,8 @@ def test_a_structure_of_a_plugin_without_its_file_is_one_line(site):
         load_scenario("prism").with_file(tree, "mine")
 
 
-def test_plugins_are_not_searched_by_an_import():
-    program = "import tetra_drake.cli, tetra_drake.experiment\n"
-    program += (
-        "from tetra_drake.settings.plugins import entries; print(entries.cache_info().misses)"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.stdout.split() == ["0"]
+def test_plugins_are_not_searched_by_an_import(used):
+    assert used[1]["searches by imports"] == 0
 
 
 COMPARE = """\
@@ -200,13 +208,16 @@ if __name__ == "__main__":
     scenario = td.load_scenario(sys.argv[1]).with_changes({"simulation.duration": "0.5 s"})
     gait = td.seeded_gait(scenario)
     results = [td.simulate(scenario.on_engine(name), gait) for name in ("drake", "compiled")]
-    print(json.dumps([result.metrics.to_json() for result in results]))
+    run = td.evolve(td.load_scenario(sys.argv[1]), "run", workers=1, report=False)
+    metrics = [result.metrics.to_json() for result in results]
+    print(json.dumps([*metrics, len(run.evaluations)]))
 """
 
 
 @pytest.mark.slow
 def test_laws_of_a_plugin_are_compiled_for_every_engine(tmp_path):
     install_example(tmp_path / "site")
-    drake, lanes = run_with(tmp_path / "site", tmp_path, COMPARE, jit=True)
+    drake, lanes, evaluations = run_with(tmp_path / "site", tmp_path, COMPARE, jit=True)
+    assert evaluations == 2, "in a worker process"
     for name in ("distance", "tension", "peak_actuator_force"):
         assert lanes[name] == pytest.approx(drake[name], rel=0.02), name

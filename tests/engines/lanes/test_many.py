@@ -147,7 +147,7 @@ def scenarios_of_their_own(short: Scenario) -> list[Scenario]:
         senses | {"cpg.gain": "1 lbf"},
         {"robot.cables.slack": True, "cpg.listing_step": "0.1 ms"},
         {"robot.gravity": "1.6 m/s^2", "ground.stiffness": "20 lbf/in"},
-        {"engine": "!Drake"},
+        {"engine": "!Drake", "robot.tetrahedra": 2},
     ]
     scenarios = [short.with_changes(each) for each in changes]
     hung = scenario_of(HUNG | {"loads": {"b": [0.1, 0.0, 0.0]}}, duration=1.0)
@@ -155,7 +155,7 @@ def scenarios_of_their_own(short: Scenario) -> list[Scenario]:
         places = {"robot.loads.b[0]": f"{force} N", "robot.nodes.top[0]": f"{x} m"}
         scenarios += [hung.with_changes(places)]
     for name in ("mast", "pair"):
-        scenario = load_scenario(name).with_changes({"simulation.duration": "5 s"})
+        scenario = load_scenario(name).with_changes({"simulation.duration": "2 s"})
         spreads = {f"robot.cables.{group}.stiffness": 0.2 for group in scenario.robot.cables}
         settings = Disturbances(draws=1, start=0.05, spreads=spreads)
         scenario = scenario.with_sections(disturbances=settings)
