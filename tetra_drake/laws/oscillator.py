@@ -118,7 +118,7 @@ class Network(NamedTuple):
         )
 
 
-Parts: TypeAlias = Packed[tuple[Network, Table]]
+NetworkParts: TypeAlias = Packed[tuple[Network, Table]]
 """Network and table `neurons`, packed for kernels."""
 
 
@@ -172,7 +172,7 @@ def oscillator_output(neurons: Table, output: Table) -> None:
 
 
 @compiled
-def network_rates(parts: Parts, state: Table, inputs: Table, rates: Table) -> None:
+def network_rates(parts: NetworkParts, state: Table, inputs: Table, rates: Table) -> None:
     """Writes the rates (1/s) of all u, then of all v, to `rates` (4n,). `state` (4n,) is u, then v.
 
     `inputs` (2n,) is the sum of tonic input u0 and feedback f. `parts` is a Network and a table
