@@ -116,7 +116,7 @@ def test_draws_without_result_are_counted_and_the_same_seed_gives_the_same(tmp_p
 
 
 def test_draws_are_simulated_with_a_gait():
-    changes = {"tolerances": {"ground.stiffness": "20 %"}, "simulation.duration": "1 s"}
+    changes = {"tolerances": {"ground.stiffness": "20 %"}, "simulation.duration": "1.6 s"}
     scenario = load_scenario("prism").with_changes(changes)
     measures = {"way": "distance", "own": lambda result: result.metrics.distance}
     draws = predict(scenario, measures, gait=td.seeded_gait(scenario, 1), draws=8).draws
