@@ -22,9 +22,9 @@ from tetra_drake.settings.units import shown_in
 
 @pytest.fixture
 def tiny():
-    """Four gaits and two iterations of 0.3 s on the compiled engine."""
+    """Four gaits and two iterations of 0.1 s on the compiled engine."""
     small = small_scenario(population=4, iterations=2, trials=1)
-    return shortly(small, 0.3, engine="!Compiled")
+    return shortly(small, 0.1, engine="!Compiled")
 
 
 @pytest.fixture
