@@ -11,7 +11,7 @@ from helpers.converged import shortly
 import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluators import on_executor
+from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
 from tetra_drake.evolution.manifest import RunRecord, write_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
@@ -22,9 +22,9 @@ from tetra_drake.settings.units import shown_in
 
 @pytest.fixture
 def tiny():
-    """Four gaits and two iterations of 0.3 s on the compiled engine."""
+    """Four gaits and two iterations of 0.1 s on the compiled engine."""
     small = small_scenario(population=4, iterations=2, trials=1)
-    return shortly(small, 0.3, engine="!Compiled")
+    return shortly(small, 0.1, engine="!Compiled")
 
 
 @pytest.fixture
@@ -64,9 +64,17 @@ def interrupting():
 QUICK = {"reevaluate": False, "report": False}
 
 
-def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports, monkeypatch):
-    progress = MagicMock(spec=Progress)
-    run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=1, progress=progress)
+@pytest.mark.parametrize(
+    "make", [ThreadPoolExecutor, pytest.param(WorkerProcesses, marks=pytest.mark.slow)]
+)
+def test_a_run_is_evolved_checked_on_the_diagram_and_reported(
+    make, tiny, tmp_path, reports, monkeypatch
+):
+    """With threads in place of worker processes, and with these."""
+    progress, made = MagicMock(spec=Progress), MagicMock(wraps=make)
+    monkeypatch.setattr("tetra_drake.evolution.evaluators.WorkerProcesses", made)
+    run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
+    made.assert_called_once_with(2)
     assert run.manifest.seed == 3
     assert run.evaluations["engine"].tolist() == ["compiled"] * 8
     assert run.reevaluations["engine"].tolist() == ["drake"] * 5

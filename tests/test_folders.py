@@ -18,7 +18,7 @@ from tetra_drake.scenario.load import load_scenario
 
 FIELD = {"robot.contacts": "all", "terrain": "!HeightField {file: heights.txt, cell: 0.5 m}"}
 MAP = {"optimizer": {"_tag": "QualityDiversity", "cells": [2, 2]}}
-SCENARIOS = {"force": ("coulomb", FIELD), "map": ("thesis", MAP), "motor": ("coulomb", MOTOR)}
+SCENARIOS = {"force": ("coulomb", FIELD), "map": ("coulomb", MAP), "motor": ("coulomb", MOTOR)}
 
 PLAY = "simulate --command export_{0}/command.csv --scenario export_{0}/scenario.yaml"
 WRITERS = {

@@ -13,6 +13,7 @@ from tetra_drake.interrupts import heeding_interrupts
 PROGRAM = Path(__file__).parent / "helpers" / "terminated_compiler.py"
 
 
+@pytest.mark.slow
 def test_a_sigterm_during_compilation_ends_a_command(tmp_path):
     ended = subprocess.run(
         [sys.executable, PROGRAM, tmp_path / "out"],

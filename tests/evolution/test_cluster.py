@@ -11,6 +11,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
+from unittest.mock import Mock
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -137,16 +138,32 @@ def test_the_batch_script_of_the_page_runs_and_goes_on(tmp_path):
     assert load_run(tmp_path / "runs" / "cluster").statuses[0].stop
 
 
-def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
+def cluster_of_a_thread(workers):
+    """In place of local_cluster(): its worker is a thread of this process."""
+    options = {"threads_per_worker": 1, "dashboard_address": None, "processes": False}
+    return distributed.LocalCluster(n_workers=workers, **options)
+
+
+@pytest.mark.parametrize(
+    "make", [cluster_of_a_thread, pytest.param(local_cluster, marks=pytest.mark.slow)]
+)
+def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(
+    make, tmp_path, monkeypatch, capsys
+):
+    made = Mock(wraps=make)
+    monkeypatch.setattr("tetra_drake.evolution.cluster.local_cluster", made)
+
     def evaluator_of(evaluate, *, executor, **_):
         return on_executor(analytic.Bowl(), executor or ThreadPoolExecutor, 1)
 
     for module in ("experiment", "evolution.reevaluation"):
         monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", evaluator_of)
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
+    monkeypatch.setattr("tetra_drake.study.spread.record_spread", lambda *_, **__: None)
     command = ["evolve", "--scenario", "quick", "--evaluations", "16", "--workers", "1"]
     for name, executor in (("dask", ("--dask",)), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0
+    made.assert_called_once_with(1)
     assert analytic.read_record(tmp_path / "dask") == analytic.read_record(tmp_path / "local")
     with dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}):
         for wrong in ("slurm", "tcp://127.0.0.1:1", "gopher://here"):

@@ -5,10 +5,13 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from types import ModuleType
 
 import pytest
 from helpers import analytic
+from helpers.converged import shortly
 
+import tetra_drake
 from tetra_drake.evolution.evaluators import WorkerProcesses, on_executor
 from tetra_drake.evolution.run import load_run
 
@@ -50,6 +53,8 @@ def evolve(**options):
     run = tetra_drake.evolve(small.with_changes(times), "run", **options)
     print(len(run.evaluations), run.statuses[0].failures)
 """
+PROGRAM_FROM_STDIN = ModuleType("__main__")
+PROGRAM_FROM_STDIN.__file__ = "<stdin>"
 EVALUATE = """
 with on_executor(Bowl(), WorkerProcesses, 1) as processes:
     print(evaluated(processes, tasks_of(np.ones((1, 26)))))
@@ -81,11 +86,37 @@ def test_a_program_without_guard_is_told(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("program", "problem"),
+    [
+        (ModuleType("__main__"), "what is defined interactively"),
+        (PROGRAM_FROM_STDIN, "'<stdin>' is no file"),
+        (None, "define it in a module"),
+    ],
+)
+def test_gaits_are_evaluated_in_this_process_if_others_cannot_import_the_program(
+    program, problem, tmp_path, monkeypatch
+):
+    def objective(result):
+        return result.metrics.twist
+
+    if program:
+        monkeypatch.setitem(sys.modules, "__main__", program)
+        monkeypatch.setattr(program, "objective", objective, raising=False)
+        objective.__module__, objective.__qualname__ = "__main__", "objective"
+    scenario = shortly(analytic.small_scenario(population=4, iterations=1, trials=1), 0.02)
+    quick = {"reevaluate": False, "report": False}
+    with pytest.warns(RuntimeWarning, match=f"one by one in this process.* {problem}"):
+        run = tetra_drake.evolve(scenario, tmp_path / "run", objective=objective, **quick)
+    assert len(run.evaluations) == 6 and run.evaluations["fitness"].notna().all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
     ("how", "call", "alone"),
     [
         ("argument", "evolve(objective=objective)", True),
-        pytest.param("stdin", "evolve()", True, marks=pytest.mark.slow),
-        pytest.param("argument", "evolve()", False, marks=pytest.mark.slow),
+        ("stdin", "evolve()", True),
+        ("argument", "evolve()", False),
     ],
 )
 def test_evolution_works_where_processes_cannot_import_the_program(how, call, alone, tmp_path):
