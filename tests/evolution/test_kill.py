@@ -46,7 +46,7 @@ def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=
 @pytest.fixture(scope="module")
 def uninterrupted(tmp_path_factory):
     directory = tmp_path_factory.mktemp("uninterrupted") / "whole"
-    record_run(directory, drawn_scenario(iterations=150), seed=9, evaluate=DrawnBowl())
+    record_run(directory, drawn_scenario(iterations=100), seed=9, evaluate=DrawnBowl())
     return read_record(directory)
 
 
@@ -67,6 +67,6 @@ def test_killed_runs_resume_and_end_alike(tmp_path, uninterrupted, executor, sig
     hits = sum(run_and_kill(tmp_path, executor, after=after, **options) != 0 for after in moments)
     assert hits >= (kills + 1) // 2
     # The rest in threads of this process; the record must not depend on it.
-    scenario = None if (tmp_path / MANIFEST).exists() else drawn_scenario(iterations=150)
+    scenario = None if (tmp_path / MANIFEST).exists() else drawn_scenario(iterations=100)
     record_run(tmp_path, scenario, seed=9, evaluate=DrawnBowl())
     assert read_record(tmp_path) == uninterrupted

@@ -20,7 +20,7 @@ if __name__ == "__main__":
     if (directory / MANIFEST).exists():
         opened = RunRecord.resume(directory)
     else:
-        opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9)
+        opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=100), seed=9)
     make = WorkerProcesses if sys.argv[2] == "processes" else ThreadPoolExecutor
     evaluator = on_executor(DrawnBowl(delay=float(sys.argv[3])), make, 2)
     with heeding_interrupts(), opened as record, evaluator as submit:
