@@ -38,7 +38,7 @@ def package(tmp_path: Path) -> Path:
 def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
     """What the program prints."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
-    environment |= {"PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment |= {"PYTHONPATH": str(package)}
     environment |= {"XDG_CACHE_HOME": str(cache_home), "HOME": str(cache_home)}
     command = [sys.executable, "-c", program]
     return subprocess.check_output(command, env=environment, cwd=package, text=True)

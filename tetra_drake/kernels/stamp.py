@@ -58,7 +58,8 @@ def _text(value: Any) -> str | None:
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, type):  # such as a NamedTuple
-        return f"{value.__qualname__} {getattr(value, '_fields', ())}"
+        fields = getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
+        return f"{value.__qualname__} {fields}"
     is_function = isinstance(getattr(value, "py_func", value), FunctionType)
     if is_function and value.__module__.partition(".")[0] not in _LIBRARIES:
         return None
