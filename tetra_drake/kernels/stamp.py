@@ -66,6 +66,7 @@ def _text(value: Any) -> str | None:
     return str(getattr(value, "__name__", repr(value)))
 
 
+@functools.cache  # many kernels use the same functions
 def _head(function: Any) -> str:
     """What machine code takes from a function or kernel, without the values that it uses."""
     options = getattr(function, "targetoptions", {})
@@ -90,18 +91,21 @@ def _constant(value: Any) -> str:
     return repr(value)
 
 
-def _used(function: Any) -> Iterator[tuple[str, Any]]:
+@functools.cache
+def _used(function: Any) -> list[tuple[str, Any]]:
     """Values that a function or kernel uses, with their names: of its globals, its closure and its
     defaults. Tuples are taken apart."""
     function = getattr(function, "py_func", function)
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     pending = [*_globals(function.__code__, function.__globals__)]
     pending += [("", value) for value in (*cells, *(function.__defaults__ or ()))]
+    found = []
     for name, value in pending:
         if isinstance(value, (tuple, list)):
             pending += [(name, item) for item in value]
         else:
-            yield name, value
+            found.append((name, value))
+    return found
 
 
 def _globals(code: CodeType, space: dict[str, Any]) -> Iterator[tuple[str, Any]]:
