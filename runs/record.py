@@ -122,11 +122,18 @@ EXPERIMENTS = {
     ),
     "thesis": Experiment("the thesis's experiment, ten trials", "thesis", {}),
     "thesis-listing": Experiment(
-        "the same with the listing's mutation, which never reaches τ_A", "thesis-listing", {}
+        "the same as the thesis's code ran: the listing's signals, mutation and distance",
+        "thesis-listing",
+        {},
+    ),
+    "thesis-reversal": Experiment(
+        "the same where nodes that break free slip until their velocity changes sign",
+        "thesis-reversal",
+        {},
     ),
     "thesis-drake": Experiment(
         "the same evolved on the Drake diagram itself",
-        "thesis",
+        "thesis-reversal",
         {"evolution.trials": 1, "evolution.evaluations": 250, "engine.scheme": "radau3"},
         engine="drake",
     ),

@@ -7,6 +7,7 @@ import dataclasses
 import weakref
 from collections.abc import Mapping
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.common import RandomGenerator
@@ -67,20 +68,39 @@ _AIM_BEYOND = 5e-5
 predicted time to the change, times _AIM_FACTOR, plus at most this time."""
 _APPROACH = 0.8
 """Length of a step before a mode change later than _NEAR, as a share of the time to the change."""
-_FIRST_STEP = 3e-4
-"""Longest step (s) after a mode change."""
-_GROWTH = 3.0
-"""Factor by which the longest step grows with each step until the next mode change."""
-_RENEW_FROM = 8e-4
-"""Length (s) of a step after a mode change from which it needs a new Jacobian. Shorter steps mostly
-converge without one."""
 _FEW, _RATE_PER_SQUARE = 12, 14.0
 """Limits of default_scheme(): a number of bodies, and a rate in 1/s per body squared. With the
 second one, both schemes take equally long for rows of 25 tetrahedra."""
-_FINEST, _COARSEST = 2e-5, 5e-3
-"""Smallest and largest default of the target accuracy; see MakeSimulator()."""
+_FINEST = 2e-5
+"""Smallest default of the target accuracy; see MakeSimulator()."""
 _WORK = ("steps", "derivative_evaluations", "jacobian_evaluations")
 """Counts of the integrator's work; fields of IntegratorWork."""
+
+
+class _Pace(NamedTuple):
+    """Steps that suit a law of friction, where the settings do not say otherwise; times in s."""
+
+    coarsest: float
+    """Largest target accuracy."""
+    max_step: float
+    look_ahead: float
+    first_step: float
+    """Longest step after a mode change."""
+    growth: float
+    """Factor by which the longest step grows with each step until the next mode change."""
+    renew_from: float
+    """Length of a step after a mode change from which it needs a new Jacobian. Shorter steps mostly
+    converge without one."""
+
+
+_SLIPPING = _Pace(
+    5e-3, max_step=8e-3, look_ahead=2e-5, first_step=3e-4, growth=3.0, renew_from=8e-4
+)
+_STICKING = _Pace(
+    1e-2, max_step=12e-3, look_ahead=3e-4, first_step=1e-4, growth=2.0, renew_from=3e-3
+)
+"""For nodes that never slip. A foot that lands fast is thrown off the ground by its friction, up to
+seven thousand times per second. Steps that end at each of these contacts gain nothing."""
 
 
 class DrakeEngine(Engine):
@@ -100,19 +120,18 @@ class _DiagramRobot(LoneRobot):
         self.driven, self._record, self._viewer = driven, record, viewer
         self.first = driven
         robot, engine = driven.robot, driven.robot.scenario.settings_of(Drake)
-        engine = engine.model_copy(update={"scheme": engine.scheme or default_scheme(robot)})
         if driven.gait is not None:
             diagram = MakeTensegrityDiagram(robot, driven.gait, steering=driven.steering)
         else:
             diagram = MakeTensegrityDiagram(robot, controller=HeldSignals(robot))
-        self._diagram, self._engine = diagram, engine
-        self._simulator = MakeSimulator(diagram, robot, engine)
+        self._diagram, self._steps = diagram, _Steps.of(robot, engine)
+        self._simulator = _make_simulator(diagram, self._steps)
         self._state, self._signals = (diagram.GetOutputPort(name) for name in ("state", "signals"))
         self._observer = Observer(driven)
         self._work = _Work(self._simulator.get_integrator())
-        self._aimer = _StepAimer(diagram, self._simulator, engine, self._work)
+        self._aimer = _StepAimer(diagram, self._simulator, self._steps, self._work)
         times = motion_times(robot.scenario.simulation, record=record)
-        self._sampler = Sampler(diagram, times, max_step=engine.max_step)
+        self._sampler = Sampler(diagram, times, max_step=self._steps.max_step)
         self.wall_time, self._speed_limit = 0.0, speed_limit(driven)
         self._marks, self._changes = driven.marks.tolist(), driven.changes
         self._held, self._change_end = robot.first_signals, 0.0
@@ -232,7 +251,7 @@ class _DiagramRobot(LoneRobot):
             self.first,
             self._sampler.motion(),
             totals=self._observer.tally,
-            work=self._work.total(str(self._engine.scheme), accuracy),
+            work=self._work.total(self._steps.scheme, accuracy),
             wall_time=self.wall_time,
             record=self._record,
         )
@@ -268,25 +287,19 @@ def MakeSimulator(diagram: Diagram, robot: Robot, settings: Drake) -> Simulator:
     """Drake's Simulator for a robot's diagram, with the integrator settings of the scenario.
 
     If the scenario sets no target accuracy, it is half the least damping ratio of a cable, but at
-    least 2e-5 and at most 5e-3. The damping ratio c / (2 sqrt(k m)) is for the cable's damping c
-    and stiffness k, and the reduced mass m of the two bodies that it joins. For a structure
-    without elastic cables it is 2e-5.
+    least 2e-5 and at most 5e-3, or 1e-2 where nodes never slip. The damping ratio c / (2 sqrt(k m))
+    is for the cable's damping c and stiffness k, and the reduced mass m of the two bodies that it
+    joins. For a structure without elastic cables it is 2e-5.
     """
-    structure = robot.structure
-    is_elastic = structure.cables["stiffness"] > 0.0
-    cables, carriers = structure.cables[is_elastic], structure.carriers[structure.segments.ends]
-    per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
-    per_reduced_mass = structure.along_cables(per_mass[carriers].sum(axis=1))[is_elastic]
-    ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
-    by_damping = min(_COARSEST, max(_FINEST, 0.5 * min(ratios, default=0.0)))
+    return _make_simulator(diagram, _Steps.of(robot, settings))
 
-    accuracy = settings.accuracy or by_damping
+
+def _make_simulator(diagram: Diagram, steps: _Steps) -> Simulator:
     simulator = Simulator(diagram)
-    scheme = settings.scheme or default_scheme(robot)
-    integrator = ResetIntegratorFromFlags(simulator, scheme, settings.max_step)
-    integrator.set_target_accuracy(accuracy)
-    if settings.mode_changes == "witness":
-        window = _WITNESS_WINDOW * min(1.0, accuracy / 1e-3)
+    integrator = ResetIntegratorFromFlags(simulator, steps.scheme, steps.max_step)
+    integrator.set_target_accuracy(steps.accuracy)
+    if not steps.at_step_end:
+        window = _WITNESS_WINDOW * min(1.0, steps.accuracy / 1e-3)
         simulator.get_mutable_context().SetAccuracy(window / _WITNESS_WINDOW_PER_ACCURACY)
     return simulator
 
@@ -321,6 +334,45 @@ def MakeDisturbedSimulator(
         raise InputError(scenario.name, "events", "found some; only td.simulate() knows them")
     robot = Robot.of(disturbed(scenario, draw))
     return MakeSimulator(MakeTensegrityDiagram(robot, gait), robot, scenario.settings_of(Drake))
+
+
+@dataclasses.dataclass(frozen=True)
+class _Steps:
+    """Integrator of a robot and its steps: the settings, with defaults for what is not given."""
+
+    scheme: str
+    accuracy: float
+    max_step: float
+    look_ahead: float
+    at_step_end: bool
+    """True if modes change at the end of steps."""
+    pace: _Pace
+
+    @classmethod
+    def of(cls, robot: Robot, settings: Drake) -> _Steps:
+        """The steps of a robot; see MakeSimulator()."""
+        pace = _STICKING if robot.scenario.friction.never_slips else _SLIPPING
+        look_ahead = pace.look_ahead if settings.look_ahead is None else settings.look_ahead
+        ratio = _least_damping_ratio(robot)
+        return cls(
+            scheme=settings.scheme or default_scheme(robot),
+            accuracy=settings.accuracy or min(pace.coarsest, max(_FINEST, 0.5 * ratio)),
+            max_step=settings.max_step or pace.max_step,
+            look_ahead=look_ahead,
+            at_step_end=settings.mode_changes == "step_end",
+            pace=pace,
+        )
+
+
+def _least_damping_ratio(robot: Robot) -> float:
+    """Least damping ratio of an elastic cable between its bodies; 0 if there is none."""
+    structure = robot.structure
+    is_elastic = structure.cables["stiffness"] > 0.0
+    cables, carriers = structure.cables[is_elastic], structure.carriers[structure.segments.ends]
+    per_mass = np.append(1.0 / structure.mass, 0.0)  # of the bodies, then of the world
+    per_reduced_mass = structure.along_cables(per_mass[carriers].sum(axis=1))[is_elastic]
+    ratios = 0.5 * cables["damping"] * np.sqrt(per_reduced_mass / cables["stiffness"])
+    return float(min(ratios, default=0.0))
 
 
 def default_scheme(robot: Robot) -> str:
@@ -390,45 +442,43 @@ class _Work:
 class _StepAimer:
     """Limits the next integrator step by the predicted time to the next change of contact mode.
 
-    A change is, for instance, that a node touches the ground. Settings of the engine, in s, are
-    `max_step`, the longest step, and `look_ahead`, the shortest step that is aimed at a change.
+    A change is, for instance, that a node touches the ground. `max_step` is the longest step,
+    `look_ahead` the shortest one that is aimed at a change; see _Pace for the others.
 
     | predicted mode change   | longest step                                                     |
     |-------------------------|------------------------------------------------------------------|
     | in max_step or later    | max_step                                                         |
     | later than 1 ms         | 0.8 of the time to it: over a long step the prediction is poor   |
     | in 1 ms or sooner       | to just after it, but at least look_ahead                        |
-    | at the end of this step | 0.3 ms, which then grows: long steps mostly fail at first        |
+    | at the end of this step | first_step, which then grows: long steps mostly fail at first    |
 
     The prediction uses the mean acceleration of the last step, which costs nothing. The present
     acceleration is no better: the vibrations after a mode change decay at rates of 1e4 /s.
 
     A mode change also changes the Jacobian. The integrator would keep the old one as long as
     Newton's iterations converge, slowly and with an error of one sign. So we renew the Jacobian,
-    unless the next step is shorter than 0.8 ms.
+    unless the next step is shorter than `renew_from`.
 
     All this is for the scheme radau3 with `mode_changes: step_end`. With any scheme, struts
     that approach limit the step, so that they cannot pass through each other.
     """
 
-    def __init__(
-        self, diagram: Diagram, simulator: Simulator, settings: Drake, work: _Work
-    ) -> None:
-        self._integrator, self._settings = simulator.get_mutable_integrator(), settings
+    def __init__(self, diagram: Diagram, simulator: Simulator, steps: _Steps, work: _Work) -> None:
+        self._integrator, self._steps = simulator.get_mutable_integrator(), steps
         self._work = work
         self._ground = diagram.GetSubsystemByName("ground")
         self._ground_context = self._ground.GetMyContextFromRoot(simulator.get_mutable_context())
         self._aims = (
-            settings.mode_changes == "step_end"
-            and settings.look_ahead > 0.0
-            and settings.scheme == "radau3"  # other schemes take short steps anyway
+            steps.at_step_end
+            and steps.look_ahead > 0.0
+            and steps.scheme == "radau3"  # other schemes take short steps anyway
         )
         touches = diagram.HasSubsystemNamed("state_forces")
         self._struts = diagram.GetSubsystemByName("state_forces") if touches else None
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
         self._last_velocities = self._acceleration = np.zeros(size)
-        self._longest = settings.max_step
+        self._longest = steps.max_step
         self._jacobian_is_old = False
 
     def numbers(self) -> np.ndarray:
@@ -448,7 +498,7 @@ class _StepAimer:
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the length of the next step. Call it after each step, with the simulator's context
         and the bodies' velocities v (6*bodies,), both at the end of the step."""
-        longest = self._settings.max_step
+        longest = self._steps.max_step
         if self._struts is not None:
             here = self._struts.GetMyContextFromRoot(context)
             longest = self._struts.LongestStep(here, horizon=longest)
@@ -460,24 +510,24 @@ class _StepAimer:
             self._acceleration = (velocities - self._last_velocities) / step_taken
         self._last_time, self._last_velocities = context.get_time(), velocities
 
+        look_ahead, pace = self._steps.look_ahead, self._steps.pace
         due, time_to_change = self._ground.NextModeChange(
-            self._ground_context, acceleration=self._acceleration, horizon=self._settings.max_step
+            self._ground_context, acceleration=self._acceleration, horizon=self._steps.max_step
         )
         if due:
-            self._longest, self._jacobian_is_old = _FIRST_STEP, True
-        elif self._longest < self._settings.max_step:
-            self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
-        look_ahead = self._settings.look_ahead
-        if _NEAR < time_to_change < self._settings.max_step:
+            self._longest, self._jacobian_is_old = pace.first_step, True
+        elif self._longest < self._steps.max_step:
+            self._longest = pace.growth * max(step_taken, pace.first_step)
+        if _NEAR < time_to_change < self._steps.max_step:
             aimed = _APPROACH * time_to_change
         else:
             margin = min(_AIM_BEYOND, 0.25 * look_ahead)
             aimed = max(look_ahead, _AIM_FACTOR * time_to_change + margin)
         step = min(longest, self._longest, aimed)
-        if self._jacobian_is_old and step >= _RENEW_FROM:
+        if self._jacobian_is_old and step >= pace.renew_from:
             self._work.before = self._work.total()
             # Initialize() needs a limit that allows the initial step, which is the longest.
-            self._integrator.set_maximum_step_size(self._settings.max_step)
+            self._integrator.set_maximum_step_size(self._steps.max_step)
             self._integrator.Initialize()
             self._jacobian_is_old = False
         self._integrator.set_maximum_step_size(step)

@@ -117,6 +117,12 @@ class FrictionKind(Section):
         return self
 
     @property
+    def never_slips(self) -> bool:
+        """True if nodes on the ground stick at all times. Then a coarse step cannot miss the moment
+        when a node begins or ends to slip."""
+        return False
+
+    @property
     def text(self) -> str:
         """Description of the law for pages that show a robot or its results, such as "the thesis's
         friction"."""
@@ -218,9 +224,9 @@ class ResetIntegrator(FrictionKind):
     """Friction divided by deflection and by velocity, sigma_0."""
     stiffness: Stiffness = Field(default=0.0, ge=0)
     """Stiffness of the bristle: friction divided by deflection, as sigma_0 in Olsson's model."""
-    reset: Literal["reversal", "range", "never"] = "reversal"
-    """Where the deflection becomes 0: at `reversal` of the velocity; or at the stiction `range`,
-    and the node sticks again at once; or `never`."""
+    reset: Literal["range", "reversal", "never"] = "range"
+    """Where the deflection becomes 0: at the stiction `range`, and the node sticks again at once;
+    or at `reversal` of the velocity; or `never`."""
     breaks_free: Literal["each", "both"] = "each"
     """Tangents along which a node breaks free: `each` by itself, or `both` as soon as the
     deflection along one reaches the stiction range."""
@@ -238,6 +244,16 @@ class ResetIntegrator(FrictionKind):
             per_load=0.0 if self.load is None else 1.0 / self.load,
         )
         return FrictionLaw(RESET_INTEGRATOR, np.array(constants))
+
+    @model_validator(mode="after")
+    def _check(self) -> ResetIntegrator:
+        if self.breaks_free == "both" and self.reset == "range":
+            refuse("breaks_free", "found 'both' with reset 'range', expected 'each'")
+        return self
+
+    @property
+    def never_slips(self) -> bool:
+        return self.reset == "range"
 
     @property
     def text(self) -> str:

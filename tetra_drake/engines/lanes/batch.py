@@ -40,7 +40,6 @@ from tetra_drake.robot.readings import Readings, bodies_state
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.structure import with_origins
-from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.scenario import Scenario
 
 FIRST = SurfaceGrid._fields.index("first")
@@ -245,7 +244,7 @@ class LaneBatch(Batch):
             totals=views(prepared.start.tally, state[self._tally :]),
             work=IntegratorWork(
                 scheme="ros2",
-                accuracy=prepared.driven.robot.scenario.settings_of(Compiled).tolerance,
+                accuracy=float(prepared.constants.tolerance[0]),
                 steps=int(state[loop.TAKEN]),
                 derivative_evaluations=loop.EVALUATIONS * int(state[loop.TRIED]),
             ),

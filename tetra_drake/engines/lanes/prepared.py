@@ -20,7 +20,7 @@ from tetra_drake.results.result import motion_times
 from tetra_drake.robot.network import initial_neurons
 from tetra_drake.robot.signals import MARK_DECIMALS, DrivenRobot
 from tetra_drake.robot.speed_limit import speed_limit
-from tetra_drake.scenario.engine_kinds import Compiled
+from tetra_drake.scenario.engine_kinds import Compiled, look_ahead
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +50,7 @@ class Prepared:
         robot, model, structure = driven.robot, driven.robot.model, driven.robot.structure
         scenario, turns, solver = robot.scenario, driven.turns, Solver.of(model)
         cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
+        tolerance = engine.tolerance_under(scenario.friction)
         times = motion_times(scenario.simulation, record=record)
         # The ring buffer of signals has two steps' worth of rows, or a whole command.
         rows = max(2.0 * engine.max_step / cpg.listing_step + 32.0, len(driven.samples))
@@ -79,9 +80,9 @@ class Prepared:
             period=np.array([cpg.listing_step]),
             samples=np.array([driven.sample_count], dtype=float),
             start_up=np.array([driven.start_up]).round(MARK_DECIMALS),  # as its mark
-            tolerance=np.array([engine.tolerance]),
+            tolerance=np.array([tolerance]),
             max_step=np.array([max_step]),
-            look_ahead=np.array([engine.look_ahead]),
+            look_ahead=np.array([look_ahead(tolerance)]),
             max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
             max_speed=np.array([speed_limit(driven)]),
         )
@@ -91,7 +92,7 @@ class Prepared:
 
         start = allocate(LaneState, sizes)
         start.clock[loop.STATUS], start.clock[loop.DUE] = loop.DONE, times[1]
-        start.clock[loop.PLANNED] = min(engine.look_ahead, engine.max_step)
+        start.clock[loop.PLANNED] = min(look_ahead(tolerance), engine.max_step)
         start.clock[loop.SAMPLES] = len(driven.samples)
         start.tally.begins[0] = round(driven.steady_start, MARK_DECIMALS)
         start.step.state[:] = structure.initial_state
